@@ -19,6 +19,7 @@ import numpy as np
 
 import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.trials import rounded
 from ringbalance.design.axes import Plan, Point
 from ringbalance.design.hunt import threshold
 from ringbalance.design.racing import judged_design, race
@@ -40,7 +41,7 @@ class Problem:
     vary: tuple[str, ...]
     changes: Mapping[str, Any] = field(default_factory=dict)
     stands: str = ""
-    """Code of the finding that says what stands against every design; empty: there is one."""
+    """How the code of the finding begins that says what stands against every design; empty: there is one."""
 
     @property
     def scene(self) -> Scene:
@@ -111,36 +112,69 @@ def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
 
 def best_of_grid(space: Space) -> tuple[float, Point] | None:
     """Size, m^3, or gas, J, of the best point of the grid; None: none meets what is required."""
-    points = sorted((space.followed(each) for each in Plan(axes=space.axes).points()), key=space.size)
+    grid = [
+        {path: rounded(value) if isinstance(value, float) else value for path, value in each.items()}
+        for each in Plan(axes=space.axes).points()
+    ]
+    points = sorted(map(space.followed, grid), key=space.size)
     met = answers(space, points)
     if space.sized:
         return next(((space.size(point), point) for point, _ in met), None)
     return min(((gas, point) for point, gas in met), key=lambda each: each[0], default=None)
 
 
-def compared(name: str) -> str:
-    """One problem: processor times, what was found, and what the grid has."""
-    problem = PROBLEMS[name]
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """One problem."""
+
+    name: str
+    value: float | None
+    """Size, m^3, or gas, J; None: no design meets what is required."""
+    grid: float | None
+    """The same of the grid's best."""
+    codes: tuple[str, ...]
+    """Of the findings."""
+    seconds: float
+    """Processor time of the search."""
+    grid_seconds: float
+
+    @property
+    def beyond(self) -> float:
+        """By how much the design is worse than the grid's best, relative; infinite for one that is wrong."""
+        if self.value is not None and self.grid is not None:
+            return self.value / self.grid - 1
+        named = any(code.startswith(PROBLEMS[self.name].stands) for code in self.codes)
+        return 0.0 if self.value is self.grid and named else float("inf")
+
+    @property
+    def text(self) -> str:
+        """A line."""
+        answer = self.codes[0] if self.value is None else f"{self.value:.4g}"
+        best = "none" if self.grid is None else f"{self.grid:.4g}"
+        times = f"{self.seconds:.1f} s, grid {self.grid_seconds:.1f} s of processor time"
+        return f"{self.name}: {answer}, grid {best}, {self.beyond:+.1%}; {times}"
+
+
+def compared(name: str) -> Compared:
+    """Design a problem, and search its grid."""
     start = time.process_time()
-    design = rb.find_design(problem.scene, workers=1)
+    design = rb.find_design(PROBLEMS[name].scene, workers=1)
     spent = time.process_time() - start
     best = best_of_grid(design.space)
-    grid = time.process_time() - start - spent
-    codes = [each.code for each in design.rows().findings]
-    if best is None or not design.succeeded:
-        right = best is None and not design.succeeded and problem.stands in codes
-        text = (
-            f"grid: {'none' if best is None else best}, named: {codes[0]} ({'right' if right else 'WRONG'})"
-        )
-    else:
-        judged = design.judgement
-        assert judged is not None
-        gas = float(np.nanmedian(judged.outcomes.energy))
+    value = None
+    if design.succeeded and design.judgement is not None:
+        gas = float(np.nanmedian(design.judgement.outcomes.energy))
         value = design.size if design.space.sized else gas
-        text = f"{value:.4g}, grid {best[0]:.4g}: {value / best[0] - 1:+.1%}; {dict(design.point)}; {best[1]}"
-    return f"{name}: {text}; {spent:.1f} s, grid {grid:.1f} s of processor time"
+    return Compared(
+        name=name,
+        value=value,
+        grid=None if best is None else best[0],
+        codes=tuple(each.code for each in design.rows().findings),
+        seconds=spent,
+        grid_seconds=time.process_time() - start - spent,
+    )
 
 
 if __name__ == "__main__":
     for chosen in sys.argv[1:] or PROBLEMS:
-        print(compared(chosen), flush=True)
+        print(compared(chosen).text, flush=True)

@@ -1,18 +1,22 @@
-"""A sweep against a loop of calibrations, as a ratio within one run, and its growth with its size.
+"""A sweep against a loop of calibrations, its growth with its size, runs, and a thousand workers on paper.
 
 python benchmarks/sweep.py [DESIGNS]
 """
 
 from __future__ import annotations
 
+import heapq
 import sys
 import time
 from collections.abc import Callable
 from functools import partial
 
 import ringbalance as rb
+from ringbalance.design.work import CALL, bundle_size
 
 CALIBRATED = 20
+DRIVEN, RUNS = 20, 200
+"""Designs that are run, and devices of each at most."""
 VARY = {"tube.bore": "0.7mm:2.5mm", "rotor.speed": "5000rpm:7000rpm", "gas.pressure": "0.5MPa:1MPa"}
 
 
@@ -23,20 +27,40 @@ def seconds(call: Callable[[], object]) -> float:
     return time.process_time() - start
 
 
+def on_paper(workers: int, *, designs: int, each: float) -> float:
+    """Share of the workers' time that goes into designs, if one process sends and takes all bundles.
+
+    Args: `each`: s, that a design takes.
+    """
+    size = bundle_size(each, count=designs, workers=workers)
+    free, caller = [0.0] * workers, 0.0
+    for start in range(0, designs, size):
+        caller = max(caller, heapq.heappop(free)) + CALL
+        heapq.heappush(free, caller + min(size, designs - start) * each)
+    return designs * each / (workers * max(free))
+
+
 def main(designs: int) -> None:
-    """Print times a design, and the ratio."""
+    """Print times a design, and the ratios."""
     scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
     small = rb.sweep(scene, VARY, sample=f"latin:{CALIBRATED}")
     scenes = [small.point_scene(row) for row in range(CALIBRATED)]
     rb.calibrate(scenes[0])
     one = seconds(lambda: [rb.calibrate(each) for each in scenes]) / CALIBRATED
-    for intervals in (False, True):
-        for count in (designs // 4, designs):
-            sample = f"latin:{count}"
-            run = partial(rb.sweep, scene, VARY, sample=sample, intervals=intervals)
+    print(f"calibrate: {1e3 * one:.0f} ms each")
+    for intervals, sizes in ((False, (1, 4, 16, 64)), (True, (1, 4, 8))):
+        for count in (designs * size // 8 for size in sizes):
+            run = partial(rb.sweep, scene, VARY, sample=f"latin:{count}", intervals=intervals)
             spent = seconds(run) / count
             what = f"{count} designs, {'with' if intervals else 'without'} intervals"
             print(f"{what}: {1e3 * spent:.2f} ms each, calibrate takes {one / spent:.0f} times as long")
+    ran = [seconds(partial(rb.objective, scene, point, runs=RUNS)) for point in small.points[:DRIVEN]]
+    each = sum(ran) / DRIVEN
+    print(f"up to {RUNS} devices each: {each:.2f} s, from {min(ran):.2f} to {max(ran):.2f} s")
+    for workers in (10, 100, 1000):
+        for count in (1000, 10_000, 100_000):
+            share = on_paper(workers, designs=count, each=each)
+            print(f"{workers} workers on paper, {count} designs with runs: {share:.0%} of their time is used")
 
 
 if __name__ == "__main__":

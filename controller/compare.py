@@ -18,7 +18,7 @@ import numpy as np
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
+from ringbalance.controller.judging.tuning import plain_settings, setting_text
 from ringbalance.controller.rotor import (
     CommonRotor,
     Rotors,

@@ -39,12 +39,11 @@ from ringbalance.controller.loop_records import (
     TRIAL,
     UNUSABLE,
     USABLE,
-    Record,
 )
 from ringbalance.reduced_model.injection.column import gas_volume
 from ringbalance.reduced_model.injection.dynamics import P, X
 from ringbalance.reduced_model.injection.events import rests, would_start
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record
 from ringbalance.scene.platform.compiled import in_place
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
-from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS, Record, pair_moment
+from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS, pair_moment
 from ringbalance.reduced_model.injection.dynamics import WORK, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record
 from ringbalance.scene.platform.compiled import in_place
 
 

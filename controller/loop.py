@@ -11,16 +11,15 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.document import command_document, simulation_rows
 from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.liquid_ring.plant import LiquidRing
-from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
-from ringbalance.controller.loop_records import NONE
-from ringbalance.controller.outcome import Facts, run_findings
+from ringbalance.controller.loop_plan import LoopPlan, Trace
+from ringbalance.controller.outcome import run_findings
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
 from ringbalance.controller.simulation import Injection, Sample, Simulation
-from ringbalance.controller.terms import check_fit, check_settings, dynamics_of, run_models, terms_modelled
+from ringbalance.controller.terms import check_fit, dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
@@ -41,7 +40,7 @@ def simulate(
     model: BalancerModel | None = None,
     *,
     flow_law: CompleteLaw | None = None,
-    controller: Controller[Any] | None = None,
+    controller: Controller[Any] | BuiltIn | None = None,
     sensor: Sensor | None = None,
     progress: Progress | None = None,
     modelled: Collection[str] | None = None,
@@ -65,13 +64,11 @@ def simulate(
             fill at which gas enters the port.
         speed: factor on the law's velocity.
         noise: random numbers of the scene's sensor; default those of the scene's seed.
-    Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
-        slow to form a ring, or a model made for another disc.
+    Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
     Raises: ValueError: both a model and a flow law, or neither; terms to model that the scene or the law
         gives no numbers for; gas into both chambers of a pair at once.
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
-    check_settings(scene)
     check_ring(scene)
     balancer = _one_of(model, flow_law)
     check_fit(scene, balancer)
@@ -96,10 +93,21 @@ def simulate(
     if own is not None or sensor is not None:
         used_sensor = sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed)
         outside = _Outside(sensor=used_sensor, controller=own, chambers=scene.disc.chambers)
-    random = noise or np.random.default_rng(scene.run.seed)
-    trace = _carried(plan.begin(runs), random, scene.run.time_limit, outside, progress)
+
+    def watch() -> None:
+        if progress is not None:
+            progress(float(runs[0]["time"]), scene.run.time_limit)
+        if outside is not None:
+            outside.answer(runs[0])
+
+    trace = plan.carry(
+        runs,
+        [noise or np.random.default_rng(scene.run.seed)],
+        traced=True,
+        watch=None if progress is None and outside is None else watch,
+    )
     time, vibration, fills = _histories(scene, balancer, trace)
-    facts = Facts(
+    run = Simulation(
         scene=scene,
         plant=LiquidRing(
             model=balancer,
@@ -107,35 +115,22 @@ def simulate(
             dynamics=dynamics,
             total=2 * scene.disc.initial_fill,
         ),
-        loop=loop,
-        own_algorithm="" if own is None else type(own).__name__,
-        run=runs[0],
-        samples=_samples(trace, scene.disc.chambers, outside),
-        injections=_injections(trace, scene.disc.chambers),
-        amplitude=np.abs(vibration),
-    )
-    return Simulation(
-        scene=scene,
-        model=balancer,
-        controller=facts.own_algorithm or scene.controller.kind,
+        state=runs[0],
+        controller=scene.controller.kind if own is None else type(own).__name__,
         as_scene=controller is None and sensor is None,
-        outcome=facts.outcome,
-        settling_time=facts.settling_time,
-        usable_moment=facts.plant.moment_towards(-scene.rotor.initial_unbalance),
         loop=loop,
-        findings=run_findings(facts),
         time=time,
-        amplitude=facts.amplitude,
+        amplitude=np.abs(vibration),
         phase=np.angle(vibration),
         fill_ratio=dict(zip(chamber_letters(scene.disc.chambers), fills, strict=True)),
-        injections=facts.injections,
-        samples=facts.samples,
-        **{name: int(facts.run[name]) for name in ("overshoots", "shortened", "misadjustments")},
+        injections=_injections(trace, scene.disc.chambers),
+        samples=_samples(trace, scene.disc.chambers, outside),
         terms_modelled=terms_modelled(used),
         models_used=used,
         presentation=Presentation(document=command_document, rows=simulation_rows),
         again=partial(_again, balancer),
     )
+    return replace(run, findings=run_findings(run))
 
 
 def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
@@ -144,26 +139,6 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     if flow_law is not None and model is None:
         return BalancerModel.of(flow_law)
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
-
-
-def _carried(
-    hand: RunsInHand,
-    random: np.random.Generator,
-    limit: float,
-    outside: _Outside | None,
-    progress: Progress | None,
-) -> Trace:
-    """Carry a run to its end, by one sample where anybody looks on. Returns: its trace."""
-    run = hand.runs[0]
-    parts = [hand.go_on(np.zeros((1, 0, 2)), traced=True)]
-    while run["cause"] == NONE:
-        if progress is not None:
-            progress(float(run["time"]), limit)
-        if outside is not None:
-            outside.answer(run)
-        size = CHUNK if progress is None and outside is None else 1
-        parts.append(hand.go_on(random.standard_normal((1, size, 2)), traced=True))
-    return joined(parts)
 
 
 @dataclass(kw_only=True)

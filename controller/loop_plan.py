@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn
@@ -31,18 +30,15 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record, Records
 from ringbalance.scene.models import Scene
 
 CHUNK: Final = 128
 """Samples for which runs are continued at once."""
-GROUP: Final = 256
-"""Runs that are continued together."""
 ALLOWED: Final = 0.01
 """Fraction of the samples in that time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
 """Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
-Records = npt.NDArray[np.void]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,6 +60,15 @@ class Trace:
             instants=np.empty((rows, 1 + pairs)),
             injections=np.zeros(pairs * samples, dtype=INJECTION),
             samples=np.zeros(samples, dtype=SAMPLE),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Trace]) -> Trace:
+        """Parts of one run, one after the other."""
+        return cls(
+            instants=np.concatenate([part.instants for part in parts]),
+            injections=np.concatenate([part.injections for part in parts]),
+            samples=np.concatenate([part.samples for part in parts]),
         )
 
 
@@ -138,70 +143,69 @@ class LoopPlan:
         runs["gas_line"] = [float(self.plant[name][0]) for name in GAS_LINE]
         return runs
 
-    def begin(self, runs: Records) -> RunsInHand:
-        """Runs before their first sample."""
+    def carry(
+        self,
+        runs: Records,
+        random: Sequence[np.random.Generator],
+        *,
+        traced: bool = False,
+        watch: Callable[[], None] | None = None,
+    ) -> Trace:
+        """Carry runs to their ends.
+
+        Args: `random`: numbers of each run's sensor; empty for an exact one. `traced`: whether the trace of
+            the first run is kept. `watch`: called before each sample, as it may write into the run.
+        Returns: that trace; an empty one where none is asked for.
+        """
+        shape = (runs.size, CHUNK if watch is None else 1, 2)
         motions = np.zeros((runs.size, 2 * self.pairs + 1), dtype=MOTION)
         liquid = np.tile(self.liquid, (runs.size, 1))
-        return RunsInHand(self, runs, motions, liquid)
+        room = self.plant.copy()[0], np.zeros(NOTES), np.zeros(WORKSPACE)
+        noise, parts = np.zeros(shape), []
+        parts.append(self._continued(runs, motions, liquid, noise[:, :0], *room, traced=traced))
+        while np.any(running := runs["cause"] == NONE):
+            if watch is not None:
+                watch()
+            for i in np.flatnonzero(running).tolist() if random else ():
+                noise[i] = random[i].standard_normal(shape[1:])
+            parts.append(self._continued(runs, motions, liquid, noise, *room, traced=traced))
+        return Trace.joined(parts)
 
-    def finish(self, runs: Records, noise: Callable[[int], np.random.Generator]) -> None:
-        """Carry runs to their ends, without traces. Args: `noise`: makes the random numbers of a run."""
-        quiet = bool(self.loop["exact"][0])
-        for first in range(0, runs.size, GROUP):
-            group = runs[first : first + GROUP]
-            hand = self.begin(group)
-            random = [] if quiet else [noise(first + i) for i in range(group.size)]
-            values = np.zeros((group.size, CHUNK, 2))
-            hand.go_on(values[:, :0])
-            while np.any(group["cause"] == NONE):
-                for i in np.flatnonzero(group["cause"] == NONE) if not quiet else ():
-                    values[i] = random[i].standard_normal((CHUNK, 2))
-                hand.go_on(values)
-
-
-class RunsInHand:
-    """Runs of a plan with their liquid, to be continued by some samples at a time."""
-
-    def __init__(self, plan: LoopPlan, runs: Records, motions: Records, liquid: Records) -> None:
-        self.plan, self.runs, self._motions, self._liquid = plan, runs, motions, liquid
-        self._plant, self._notes, self._room = plan.plant.copy(), np.zeros(NOTES), np.zeros(WORKSPACE)
-
-    def go_on(self, noise: FloatArray, *, traced: bool = False) -> Trace:
-        """Continue by as many samples as there is noise for, in standard deviations, shape (n, samples, 2).
-
-        Without samples the runs begin. Returns: the trace of the first run; empty where none is asked for.
-        """
-        run, plan = self.runs[0], self.plan
-        trace = Trace.room(noise.shape[1] + 1 if traced else 0, plan.pairs)
+    def _continued(
+        self,
+        runs: Records,
+        motions: Records,
+        liquid: Records,
+        noise: FloatArray,
+        plant: Record,
+        notes: FloatArray,
+        workspace: FloatArray,
+        *,
+        traced: bool,
+    ) -> Trace:
+        """By as many samples as there is noise for; without any the runs begin. Returns: what happened in the
+        first run."""
+        run, trace = runs[0], Trace.room(noise.shape[1] + 1 if traced else 0, self.pairs)
         run["instants"], run["injections"], run["samples_before"] = 0, 0, run["samples"]
         continue_runs(
-            plan.loop[0],
-            self._plant[0],
-            plan.assumed[0],
-            self.runs,
-            self._motions,
-            self._liquid,
+            self.loop[0],
+            plant,
+            self.assumed[0],
+            runs,
+            motions,
+            liquid,
             noise,
             trace.instants,
             trace.injections,
             trace.samples,
-            self._notes,
-            self._room,
+            notes,
+            workspace,
         )
         return Trace(
             instants=trace.instants[: run["instants"]],
             injections=trace.injections[: run["injections"]],
             samples=trace.samples[: run["samples"] - run["samples_before"]],
         )
-
-
-def joined(parts: list[Trace]) -> Trace:
-    """Parts of one run's trace, one after the other."""
-    return Trace(
-        instants=np.concatenate([part.instants for part in parts]),
-        injections=np.concatenate([part.injections for part in parts]),
-        samples=np.concatenate([part.samples for part in parts]),
-    )
 
 
 def _settings(scene: Scene, further: float) -> dict[str, Any]:

@@ -6,7 +6,7 @@ counted at every call, which costs more than the work itself.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,6 @@ TAIL_POINTS: Final = 12
 MOMENT_NODES: Final = 4097
 """Of the table of a pair's moment."""
 PAIRS: Final = MAX_CHAMBERS // 2
-Record = Any
-"""One element of an array with one of the types below; compiled code changes it in place."""
 TARGET_VECTOR: Final = 0
 TRIAL: Final = 1
 LAW_BASED: Final = 2

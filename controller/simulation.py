@@ -9,10 +9,14 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Final
 
+import numpy as np
+
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.liquid_ring.loop_factor import LoopFactor
-from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
-from ringbalance.controller.loop_records import NOTICEABLE
+from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL, LiquidRing
+from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, SAMPLES
+from ringbalance.controller.rotor import chamber_letters
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.chamber.contributions import chamber_status
@@ -194,19 +198,16 @@ class Simulation(PresentedResult):
     """
 
     scene: Scene
-    model: BalancerModel
+    plant: LiquidRing
+    state: np.void
+    """As it ended, type `RUN`."""
     controller: str
     """`controller.kind` of the scene; of another algorithm the name of its type."""
     as_scene: bool
     """Whether algorithm and sensor are those of the scene."""
-    outcome: Outcome
-    settling_time: float | None
-    """s, from which on it first held, whatever the time limit; None when not settled."""
-    usable_moment: float
-    """Largest unbalance that the disc cancels where the scene's lies, kg m."""
     loop: LoopFactor
     """The loop about the balanced state."""
-    findings: tuple[Finding, ...]
+    findings: tuple[Finding, ...] = ()
     """How the run ended, what stands behind it, and what to do next."""
     time: FloatArray
     """s, shape (m,): samples, and instants within operations and waits."""
@@ -218,12 +219,6 @@ class Simulation(PresentedResult):
     """x of each chamber by letter, shape (m,) each."""
     injections: tuple[Injection, ...]
     samples: tuple[Sample, ...]
-    overshoots: int
-    """Times that the residual turned by more than 90 degrees between samples while above the limit."""
-    shortened: int
-    """Injections shortened or left out so that the driven chamber keeps its residual fill."""
-    misadjustments: int
-    """Operations after which the measured amplitude was higher by more than the noise floor."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
@@ -235,6 +230,119 @@ class Simulation(PresentedResult):
     def status(self) -> str:
         """The findings as sentences."""
         return "; ".join(finding.text for finding in self.findings)
+
+    @property
+    def model(self) -> BalancerModel:
+        """The disc under its law."""
+        return self.plant.model
+
+    @property
+    def overshoots(self) -> int:
+        """Times that the residual turned by more than 90 degrees between samples while above the limit."""
+        return int(self.state["overshoots"])
+
+    @property
+    def shortened(self) -> int:
+        """Injections shortened or left out so that the driven chamber keeps its residual fill."""
+        return int(self.state["shortened"])
+
+    @property
+    def misadjustments(self) -> int:
+        """Operations after which the measured amplitude was higher by more than the noise floor."""
+        return int(self.state["misadjustments"])
+
+    @property
+    def usable_moment(self) -> float:
+        """Largest unbalance that the disc cancels where the scene's lies, kg m."""
+        return self.plant.moment_towards(-self.scene.rotor.initial_unbalance)
+
+    @property
+    def settling_time(self) -> float | None:
+        """s, from which on it first held, whatever the time limit; None when not settled."""
+        first, last = float(self.state["held_since"]), float(self.state["since"])
+        if self.state["settled"]:
+            return first
+        return last if self.state["cause"] == AT_REST and last < math.inf else None
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Letters of the driven chambers of the last command at their residual fills."""
+        letters = chamber_letters(self.scene.disc.chambers)
+        return tuple(letters[i] for i in np.flatnonzero(self.state["refused"]))
+
+    @cached_property
+    def unreachable_amplitude(self) -> float:
+        """Vibration that remains with the liquid at its best, m."""
+        return self.plant.unreachable_vibration(rotor=self.scene.rotor)
+
+    @property
+    def longest(self) -> Injection | None:
+        """The longest injection of the last command; None when there was none."""
+        last = [each for each in self.injections if each.time == self.injections[-1].time]
+        return max(last, key=lambda injection: injection.duration, default=None)
+
+    @property
+    def unusable(self) -> int:
+        """Number of samples that every algorithm passed over."""
+        return sum(sample.command.reason == NO_SAMPLE for sample in self.samples)
+
+    @cached_property
+    def outcome(self) -> Outcome:
+        """How the run ended.
+
+        SETTLED takes a true amplitude that held within the limit for the hold time and then in all but 1 % of
+        the samples of a further minute, or a run in which nothing can change any more.  Both are known when
+        they happen, so that a later time limit gives the same answer.
+        """
+        state, limit, cause = self.state, self.limit, self.state["cause"]
+        if self.settling_time is not None:
+            return Outcome.SETTLED
+        residual = self.plant.residual_fill
+        beyond_disc = self.plant.unreachable_vibration(rotor=self.scene.rotor, least_fill=residual)
+        if beyond_disc > limit and not self.loop.unstable:
+            return Outcome.CAPACITY_EXCEEDED
+        if state["drains"]:
+            return Outcome.DRIFTING
+        higher = self.amplitude[-1] > self.amplitude[0] + self.noise_floor
+        if cause == RISING or (cause == IDLE and higher):
+            return Outcome.DRIFTING if state["drift"] > NOTICEABLE else Outcome.DIVERGING
+        if self.loop.unstable:
+            return Outcome.UNSTABLE
+        if self.unreachable_amplitude > limit:
+            return Outcome.STALLED
+        if state["lost"] or min(state["since"], state["held_since"]) < math.inf:
+            return Outcome.HOVERING if state["lost"] else Outcome.HOLD_INCOMPLETE
+        if self.refused and cause == IDLE:
+            return Outcome.CHAMBER_EMPTY
+        if self.longest is not None and not self.longest.moved:
+            return self._unmoved(self.longest)
+        return Outcome.TOO_MANY_SAMPLES if cause == SAMPLES else self._out_of_time
+
+    def _unmoved(self, last: Injection) -> Outcome:
+        """Why an injection moved nothing; gas that would drive it may lack the time to fill the chamber."""
+        plant = self.plant
+        if last.event in {Event.EMPTY, Event.FULL}:
+            return Outcome.CHAMBER_EMPTY
+        if plant.dynamics.quasi_steady:
+            return Outcome.STALLED
+        other = min(max(plant.total - last.fill_after, 0.0), plant.model.flow.max_fill_ratio)
+        flow = plant.model.flow.evaluate(
+            fill_ratio=last.fill_after, opposite_fill_ratio=other, gas_pressure=plant.gas_pressure
+        )
+        return Outcome.GAS_TIME_TOO_SHORT if flow.velocity > 0 else Outcome.STALLED
+
+    @property
+    def _out_of_time(self) -> Outcome:
+        if 2 * self.unusable > len(self.samples):
+            return Outcome.NO_SAMPLES
+        if self.state["drift"] > NOTICEABLE:
+            return Outcome.DRIFTING
+        if NOISE_DEVIATIONS * self.scene.sensor.amplitude_noise > self.limit:
+            return Outcome.NOISE
+        last = self.samples[-1].command
+        if not last.resting and not last.valves and last.reason == BELOW_MINIMUM:
+            return Outcome.GAS_TIME_TOO_SHORT
+        return Outcome.TIME_LIMIT
 
     @property
     def verdict(self) -> RunVerdict:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Sequence
-from operator import attrgetter
 from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
@@ -18,7 +16,6 @@ from ringbalance.reduced_model.terms import FILLING, HELD, IN_INJECTIONS, INERTI
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.rules.working import period_covers_lag
 
 VOLUME_TOLERANCE: Final = 0.05
 """Relative: a flat-strip volume or an input's spread passes, another disc does not."""
@@ -100,52 +97,6 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
     faults = [*_fill_faults(scene, model), *_volume_faults(scene, model)]
     if faults:
         raise SceneError(faults)
-
-
-def check_settings(scene: Scene) -> None:
-    """Refuse settings that a loaded scene cannot have, but one changed in Python can.
-
-    Raises: SceneError: a number outside its range, or a period shorter than the valve's lag.
-    """
-    faults = [*_number_faults(scene)]
-    lag = scene.gas.valve_lag
-    found = None if lag is None else period_covers_lag(scene.controller.period, lag)
-    if found is not None:
-        faults.append(scene_fault(scene, "controller.period", problem=found.problem, allowed=found.allowed))
-    if faults:
-        raise SceneError(faults)
-
-
-_POSITIVE: Final = {
-    "rotor.influence_coefficient",
-    "controller.assumed_influence_coefficient",
-    "controller.limit",
-    "controller.period",
-    "controller.proportional",
-    "controller.integral_time",
-    "controller.maximum_gas_time",
-    "run.time_limit",
-}
-_NOT_NEGATIVE: Final = {
-    "rotor.initial_amplitude",
-    "sensor.amplitude_noise",
-    "sensor.phase_noise",
-    "controller.derivative_time",
-    "controller.minimum_gas_time",
-    "gas.pressure",
-    "gas.valve_lag",
-}
-
-
-def _number_faults(scene: Scene) -> Iterator[Fault]:
-    for path in sorted(_POSITIVE | _NOT_NEGATIVE):
-        value: float | None = attrgetter(path)(scene)
-        positive = path in _POSITIVE
-        if value is None or (math.isfinite(value) and (value > 0 or (value == 0 and not positive))):
-            continue
-        bound = "above 0" if positive else "at least 0"
-        allowed = "a number above 0" if positive else "a number of at least 0"
-        yield scene_fault(scene, path, problem=f"it must be {bound}", allowed=allowed)
 
 
 def _fill_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:

@@ -49,18 +49,6 @@ class Trials:
     such as the supply's pressure; a point without it is at the scene's."""
 
 
-def scaled(
-    kind: str, values: Mapping[str, float], factors: tuple[float, ...], *, first: tuple[int, ...]
-) -> Trials:
-    """Every value of a scene times factors. Args: `values`: by path. `first`: as `Axis.first`."""
-    axes = tuple(Axis(name=path, levels=factors, first=first) for path in values)
-
-    def settings(point: Point) -> dict[str, float]:
-        return {path: rounded(point[path] * value) for path, value in values.items()}
-
-    return Trials(kind=kind, axes=axes, settings=settings)
-
-
 def rounded(value: float, digits: int = 3) -> float:
     """To significant digits."""
     return float(f"{value:.{digits}g}")

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
@@ -157,16 +158,7 @@ def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> P
         mappings from its keys, or a CSV file.
     Raises: SceneError: everything that is wrong with it.
     """
-    axes: list[Axis] = []
-    faults: list[Fault] = []
-    for name, values in vary.items():
-        try:
-            axes.append(_axis_of(scene, name, values))
-        except SceneError as error:
-            faults += error.faults
-    if faults:
-        raise SceneError(faults)
-    return Plan(axes=tuple(axes), sample=sample)
+    return _plan([partial(_axis_of, scene, name, values) for name, values in vary.items()], sample)
 
 
 def plan_of_texts(
@@ -176,16 +168,21 @@ def plan_of_texts(
 
     Args: `folder`: from which files are looked for; default that of the process.
     """
-    axes: list[Axis] = []
+    return _plan([partial(_axis_of_text, scene, each, folder=folder or Path()) for each in texts], sample)
+
+
+def _plan(axes: Iterable[Callable[[], Axis]], sample: str) -> Plan:
+    """Raises: SceneError: everything that is wrong with the axes."""
+    made: list[Axis] = []
     faults: list[Fault] = []
-    for text in texts:
+    for axis in axes:
         try:
-            axes.append(_axis_of_text(scene, text, folder=folder or Path()))
+            made.append(axis())
         except SceneError as error:
             faults += error.faults
     if faults:
         raise SceneError(faults)
-    return Plan(axes=tuple(axes), sample=sample)
+    return Plan(axes=tuple(made), sample=sample)
 
 
 def plan_of_file(scene: SceneFile, file: Path) -> Plan:
@@ -201,8 +198,7 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
     if content or not isinstance(texts, list) or not isinstance(sample, str):
         problem = f"unknown key {next(iter(content))}" if content else "it is no plan"
         raise SceneError.of_file(str(file), problem, 'vary = ["tube.bore=0.5mm:2mm:30"], sample = "sobol:64"')
-    axes = tuple(_axis_of_text(scene, str(text), folder=file.parent) for text in texts)
-    return Plan(axes=axes, sample=sample)
+    return plan_of_texts(scene, list(map(str, texts)), sample=sample, folder=file.parent)
 
 
 def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:

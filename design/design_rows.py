@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import Demand
 from ringbalance.controller.judging.judge import Judgement
-from ringbalance.controller.judging.tuning_rows import (
+from ringbalance.controller.judging.tuning import (
     causes_of,
     judgement_document,
     plain_settings,

@@ -7,7 +7,7 @@ from scipy.stats.qmc import Sobol
 from ringbalance.scene.arrays import FloatArray
 
 
-def sobol(axes: int, count: int) -> FloatArray:
+def sobol(axes: int, count: int, *, seed: int = 0) -> FloatArray:
     """The first points of the sequence in the unit cube, scrambled after Owen, shape (count, axes)."""
-    whole: FloatArray = Sobol(axes, rng=0).random(1 << max(count - 1, 0).bit_length())
+    whole: FloatArray = Sobol(axes, rng=seed).random(1 << max(count - 1, 0).bit_length())
     return whole[:count]

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.controller.judging.tuning import setting_text
 from ringbalance.design.axes import Axis, Point, Range, plan_of, plan_of_texts
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError

@@ -17,12 +17,17 @@ from typing import Any, Final
 from ringbalance.design.store import Store, key_of
 from ringbalance.scene.platform.processes import beside
 
+CALL: Final = 5e-3
+"""s, that a call of an executor costs there and back, at most."""
 _BUNDLE: Final = 0.5
-"""s of work in one call of an executor: a call costs some 5 ms there and back."""
+"""s of work in one call, at least."""
+_IDLE: Final = 0.05
+"""Share of their time that workers may wait for the process that sends and takes all bundles."""
 _WORTH: Final = 4.0
 """s of work for which processes are started, which takes each a second."""
 _SHARES: Final = 8
-"""Bundles for each worker at least, so that all end at about the same time."""
+"""Bundles for each worker at least, so that all end at about the same time; unless there are so many workers
+that the calls themselves take longer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,12 +180,15 @@ def _cancelled() -> Iterator[dict[Future[list[Any]], Sequence[int]]]:
 
 
 def bundle_size(seconds: float, *, count: int, workers: int) -> int:
-    """Tasks in one call of an executor, so that calls cost little and workers end together.
+    """Tasks in one call of an executor, so that calls cost little, none of many workers waits for the process
+    that makes them, and workers end together.
 
     Args: `seconds`: processor time that each takes. `count`: of tasks that are left.
     """
-    enough = math.ceil(_BUNDLE / max(seconds, 1e-6))
-    return max(1, min(enough, math.ceil(count / (_SHARES * workers))))
+    busy = CALL * workers / (1 - _IDLE)
+    enough = math.ceil(max(_BUNDLE, busy) / max(seconds, 1e-6))
+    shares = _SHARES if busy <= _BUNDLE else 1
+    return max(1, min(enough, math.ceil(count / (shares * workers))))
 
 
 def _bundle(calls: Sequence[Callable[[], Any]]) -> list[Any]:

@@ -14,7 +14,7 @@ from importlib.resources import files
 from types import ModuleType
 from typing import Any, Final, Literal
 
-from ringbalance.controller.algorithms.by_name import target_vector_of
+from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.export import controller, disc, point
@@ -229,9 +229,8 @@ def controller_block(scene: Scene) -> Block:
 
 def _settings(scene: Scene) -> Numbers:
     """What `controller` finds in its constants."""
-    settings = target_vector_of(scene)
-    chambers = settings.chambers
-    sectors = zip(chamber_directions(chambers).tolist(), settings.offsets, strict=True)
+    settings, chambers = scene.controller, scene.disc.chambers
+    sectors = zip(chamber_directions(chambers).tolist(), settings.offsets(chambers), strict=True)
     return (
         float(chambers),
         settings.limit,
@@ -240,9 +239,9 @@ def _settings(scene: Scene) -> Numbers:
         settings.derivative_time,
         settings.minimum_gas_time,
         settings.maximum_gas_time,
-        scene.controller.period,
-        float(settings.on_reversal == "reset"),
-        *_parts(cmath.rect(1.0, settings.lag_angle)),
+        settings.period,
+        float(TargetVector.on_reversal == "reset"),
+        *_parts(cmath.rect(1.0, settings.assumed_lag_angle)),
         *(number for axis, offset in sectors for number in (*_parts(axis), offset)),
     )
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.faults import Fault, did_you_mean
+from ringbalance.scene.platform.files import read_bounded
 from ringbalance.scene.toml import read_toml, toml_text
 from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
 
@@ -25,6 +26,7 @@ LARGEST_FILE: Final = 8 * 2**20
 MOST_ROWS: Final = 2000
 """A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
 holds the covariance of every pair of rows: more would take gigabytes."""
+_WHAT: Final = "file of measurements"
 _SERIES: Final = "series"
 _MARK: Final = "#"
 _SEPARATORS: Final = ";\t,"
@@ -108,21 +110,15 @@ def file_name(path: Path) -> str:
 
 def read_content(path: Path) -> tuple[bytes, tuple[Fault, ...]]:
     """The bytes of a file, no more than are read in any case, or why there are none."""
-    file = file_name(path)
-    try:
-        with open(path, "rb") as stream:
-            return stream.read(LARGEST_FILE + 1), ()
-    except IsADirectoryError:
-        return b"", (data_fault(file, "", "this is a folder, not a file of measurements"),)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        return b"", (data_fault(file, "", f"the file cannot be read: {reason}"),)
+    content, problem = read_bounded(path, what=_WHAT, most=LARGEST_FILE)
+    # One that is too large is refused with what else is wrong with its bytes.
+    return content, () if content or not problem else (data_fault(file_name(path), "", problem),)
 
 
 def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
     """The text of a file's bytes, or why it is none."""
     if len(content) > LARGEST_FILE:
-        problem = "the file is larger than any list of measurements; average or thin out a recording"
+        problem = f"the file is larger than any {_WHAT}; average or thin out a recording"
         return "", (data_fault(file, "", problem, allowed=f"up to {LARGEST_FILE // 2**20} MiB"),)
     if content.startswith(_WORKBOOKS):
         problem = 'this is a workbook, not text; save the sheet as "CSV UTF-8"'

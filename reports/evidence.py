@@ -19,7 +19,7 @@ import numpy as np
 from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
 from ringbalance.controller.eccentric_mass.plant import rotor_record
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import amplitude_band
+from ringbalance.controller.eccentric_mass.run_rows import amplitude_band
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, loops_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.judging.judge import FRESH

@@ -13,9 +13,9 @@ from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_a
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.judging.tuning_rows import (
+from ringbalance.controller.judging.tuning import (
     LONGER,
+    Tuning,
     judgement_document,
     plain_settings,
     required_document,

@@ -15,6 +15,10 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 ComplexArray = npt.NDArray[np.complex128]
 StringArray = npt.NDArray[np.str_]
+Records = npt.NDArray[np.void]
+"""A structured array."""
+Record = Any
+"""One element of a structured array, which compiled code changes in place."""
 
 
 def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:

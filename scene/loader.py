@@ -17,6 +17,7 @@ from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import CheckedValues, InputUncertainty, ShownOrigin
+from ringbalance.scene.platform.files import read_bounded
 from ringbalance.scene.registry import balancers
 from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml import read_toml, toml_text
@@ -48,7 +49,9 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
     """
     name = str(path)
     file = name if name.isprintable() else toml_text(name)
-    content = _content(name, file)
+    content, problem = read_bounded(name, what="scene file", most=_LARGEST_FILE)
+    if problem:
+        raise SceneError.of_file(file, problem, "a TOML file")
     scene = scene_from(content=content, file=file, folder=Path(name).parent)
     return scene, content.decode("utf-8-sig")
 
@@ -271,22 +274,6 @@ def _sorted(faults: Iterable[Fault], schema: Schema) -> list[Fault]:
         return table, known.index(key) if key in known else len(known)
 
     return sorted(faults, key=place)
-
-
-def _content(name: str, file: str) -> bytes:
-    try:
-        with open(name, "rb") as stream:
-            content = stream.read(_LARGEST_FILE + 1)
-    except FileNotFoundError as error:
-        raise SceneError.of_file(file, "there is no such file") from error
-    except IsADirectoryError as error:
-        raise SceneError.of_file(file, "this is a folder, not a scene file", "a TOML file") from error
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise SceneError.of_file(file, f"the file cannot be read: {reason}") from error
-    if len(content) > _LARGEST_FILE:
-        raise SceneError.of_file(file, "the file is larger than any scene", "a TOML file up to 1 MiB")
-    return content
 
 
 def _document(content: bytes, file: str) -> Mapping[str, Any]:

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from algorithm_steps import Stepped
 
 import ringbalance as rb
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -91,7 +92,7 @@ class Wrapped:
 
     def __init__(self, weaker: float) -> None:
         settings = {"controller.proportional": short().controller.proportional * weaker}
-        self.inner = controller_of(short().with_values(settings))
+        self.inner = Stepped(TargetVector(scene=liquid_ring_scene(short().with_values(settings))))
         self.rises_tolerated = self.inner.rises_tolerated
 
     def start(self) -> Any:

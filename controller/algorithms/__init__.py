@@ -1,4 +1,4 @@
 """Control algorithms: pure steps from state and measurement to state and command.
 
-A new algorithm implements `algorithm` in a module of its own and gets its scene name in `by_name`.
+A new algorithm is a `BuiltIn` with a compiled step, and gets its scene name in `law_based.controller_of`.
 """

@@ -5,25 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.loop_records import (
-    LOOP,
     NO_PHASE,
-    RUN,
     TARGET_VECTOR,
     TOO_SHORT,
     TRIAL,
     UNUSABLE,
     USABLE,
-    Record,
 )
+from ringbalance.controller.rotor import chamber_letters
 from ringbalance.reduced_model.injection.dynamics import MOTION
+from ringbalance.scene.arrays import Record, Records
+from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.compiled import in_place
 
 NO_SAMPLE: Final = "no usable sample"
@@ -32,74 +30,29 @@ BELOW_MINIMUM: Final = "the valve-open time is below the minimum"
 REASONS: Final = {0: "", UNUSABLE: NO_SAMPLE, TOO_SHORT: BELOW_MINIMUM}
 
 
-@dataclass(frozen=True, eq=False)
-class Memory:
-    """State of an algorithm of the program between two samples; arrays of one element, never changed."""
-
-    run: npt.NDArray[np.void]
-    """What it remembers, type `RUN`."""
-    liquid: npt.NDArray[np.void]
-    """Of the law-based algorithm: the pairs as it believes them to be, type `MOTION`; empty for others."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Memory) and all(
-            mine.tobytes() == yours.tobytes()
-            for mine, yours in ((self.run, other.run), (self.liquid, other.liquid))
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-
+@dataclass(frozen=True, kw_only=True, eq=False)
 class BuiltIn:
-    """An algorithm of the program: frozen settings, with its step compiled.
+    """An algorithm of the program, whose step is compiled within the loop."""
 
-    `simulate` runs that step within the compiled loop; `start` and `step` are the same for one sample, so
-    that an algorithm of a user's own can build on it.
-    """
-
-    needs: ClassVar[int] = USABLE
-    """What it reads of a sample."""
+    scene: Scene
+    """Whose settings it has."""
 
     @property
     def rises_tolerated(self) -> int:
-        """As `Controller` has it."""
-        raise NotImplementedError
+        """As `Controller` has it: a rise, and another after what was assumed has been corrected."""
+        return 2
 
-    def fill(self, loop: Record, run: Record) -> None:
+    def fill(self, loop: Record, run: Record) -> None:  # noqa: ARG002
         """Write the settings into an element of type `LOOP`, and the first memory into one of type `RUN`."""
-        raise NotImplementedError
+        settings, chambers = self.scene.controller, self.scene.disc.chambers
+        loop["chambers"], loop["rest_limit"] = chambers, settings.limit
+        loop["minimum_gas_time"] = settings.minimum_gas_time
+        loop["maximum_gas_time"] = settings.maximum_gas_time
+        loop["offset"][:chambers] = settings.offsets(chambers)
 
-    def liquid(self) -> npt.NDArray[np.void]:
+    def liquid(self) -> Records:
         """The pairs as the algorithm believes them to be at the start; empty where it has no belief."""
         return np.zeros(0, dtype=MOTION)
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """Call the compiled step on a memory that shows a usable sample."""
-        raise NotImplementedError
-
-    @cached_property
-    def _filled(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Settings and first memory, shape (1,) each."""
-        loop, run = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
-        self.fill(loop[0], run[0])
-        return loop, run
-
-    def start(self) -> Memory:
-        """The state before the first sample."""
-        return Memory(self._filled[1], self.liquid())
-
-    def step(self, state: Memory, measurement: Measurement | None) -> tuple[Memory, Command]:
-        """Next state and command after one sample (None: dropped); a pure function."""
-        seen = state.run.copy()
-        show(seen[0], measurement)
-        if measurement is None or seen["usable"][0] < self.needs:
-            return state, Command(reason=NO_SAMPLE)
-        seen["time"], seen["asked"], seen["resting"], seen["reason"] = measurement.time, 0.0, 0, 0
-        seen["at_residual"][0, : len(measurement.at_residual)] = measurement.at_residual
-        after = Memory(seen, state.liquid.copy())
-        self.react(self._filled[0][0], after)
-        seen["reason"] = 0 if seen["resting"][0] or np.any(seen["asked"]) else TOO_SHORT
-        return after, command_of(seen[0], int(self._filled[0]["chambers"][0]))
 
 
 @in_place
@@ -132,7 +85,7 @@ def command_of(sample: Record, chambers: int) -> Command:
 OnReversal = Literal["reset", "accumulate"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class TargetVector(BuiltIn):
     """Valve-open time of the correction *vector*, T = Kc (e + 1/Ti int e dt + Td de/dt), split over two
     chambers.
@@ -156,45 +109,17 @@ class TargetVector(BuiltIn):
         Clegg, "A nonlinear integrator for servomechanisms", Trans. AIEE 77 (1958).
     """
 
-    chambers: int
-    """n, even."""
-    lag_angle: float
-    """What the algorithm assumes, rad."""
-    limit: float
-    """m."""
-    proportional: float
-    """Kc, s/m."""
-    integral_time: float | None
-    """Ti, s; None: no integral part."""
-    derivative_time: float
-    """Td, s."""
-    minimum_gas_time: float
-    """s."""
-    maximum_gas_time: float
-    """s."""
-    offsets: tuple[float, ...] = ()
-    """Added to a valve's share, one for each chamber, s; empty: none."""
     on_reversal: OnReversal = "reset"
     """What becomes of the integral when the residual turns round."""
 
-    @property
-    def rises_tolerated(self) -> int:
-        """Two: this algorithm lowers the amplitude with every operation unless its beliefs are wrong."""
-        return 2
-
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
-        loop["algorithm"], loop["chambers"], loop["rest_limit"] = TARGET_VECTOR, self.chambers, self.limit
-        loop["assumed_lag"], loop["resets"] = self.lag_angle, self.on_reversal == "reset"
-        loop["integral_time"] = math.inf if self.integral_time is None else self.integral_time
-        loop["derivative_time"] = self.derivative_time
-        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
-        loop["offset"][: len(self.offsets)] = self.offsets
-        run["proportional"], run["before_time"] = self.proportional, math.inf
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """As `BuiltIn.react`."""
-        target_vector_step(loop, memory.run[0])
+        super().fill(loop, run)
+        settings = self.scene.controller
+        loop["algorithm"], loop["resets"] = TARGET_VECTOR, self.on_reversal == "reset"
+        loop["assumed_lag"], loop["derivative_time"] = settings.assumed_lag_angle, settings.derivative_time
+        loop["integral_time"] = math.inf if settings.integral_time is None else settings.integral_time
+        run["proportional"], run["before_time"] = settings.proportional, math.inf
 
 
 @in_place
@@ -290,7 +215,7 @@ def vector_shares(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Trial(BuiltIn):
     """Gas into one chamber at a time, with a step that shrinks near the goal; the phase is not read.
 
@@ -303,43 +228,19 @@ class Trial(BuiltIn):
     Source: section 4.1 of the liquid-ring paper.
     """
 
-    needs: ClassVar[int] = NO_PHASE
-    chambers: int
-    """n, even."""
-    sequence: tuple[int, ...]
-    """Chamber indices in the order of trial."""
-    limit: float
-    """m."""
-    first_trial: float
-    """s."""
-    long_step: float
-    """s."""
-    short_step: float
-    """s."""
-    fine_below: float
-    """m."""
-    minimum_gas_time: float
-    """s."""
-    maximum_gas_time: float
-    """s."""
-
     @property
     def rises_tolerated(self) -> int:
         """One round through the sequence: a rise is how this algorithm learns."""
-        return len(self.sequence)
+        return len(self.scene.controller.sequence)
 
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
-        run["position"] = 0
-        loop["algorithm"], loop["chambers"], loop["rest_limit"] = TRIAL, self.chambers, self.limit
-        loop["trials"], loop["sequence"][: len(self.sequence)] = len(self.sequence), self.sequence
+        super().fill(loop, run)
+        settings, letters = self.scene.controller, chamber_letters(self.scene.disc.chambers)
+        sequence = [letters.index(letter) for letter in settings.sequence]
+        loop["algorithm"], loop["trials"], loop["sequence"][: len(sequence)] = TRIAL, len(sequence), sequence
         for name in ("first_trial", "long_step", "short_step", "fine_below"):
-            loop[name] = getattr(self, name)
-        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """As `BuiltIn.react`."""
-        trial_step(loop, memory.run[0])
+            loop[name] = getattr(settings, name)
 
 
 @in_place

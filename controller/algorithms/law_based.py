@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
+from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector, Trial, open_valve
 from ringbalance.controller.liquid_ring.plant import LiquidRing
-from ringbalance.controller.loop_records import LAW_BASED, MomentTable, Record, pair_moment
+from ringbalance.controller.loop_records import LAW_BASED, MomentTable, pair_moment
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.injection.column import steady
-from ringbalance.reduced_model.injection.dynamics import EVENTS, WORKSPACE, Event, X
+from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR, Event, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import at_rest
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
+from ringbalance.scene.arrays import ComplexArray, FloatArray, Record, Records
+from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.compiled import in_place
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
@@ -39,7 +42,7 @@ _EMPTY: Final = EVENTS.index(Event.EMPTY)
 _FULL: Final = EVENTS.index(Event.FULL)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LawBased(BuiltIn):
     """Valve-open times that take the whole residual away in one operation, t = (V/S) integral dx/u(x) for
     each pair.
@@ -52,37 +55,31 @@ class LawBased(BuiltIn):
 
     Limits: a valve whose time is below minimum_gas_time does not open, one above maximum_gas_time is cut to
     it.  Where the law says that nothing flows, or that a chamber is empty, gas is given all the same, since
-    fills and law are only assumed: `probe` long, or as long as the missing moment would take.
+    fills and law are only assumed: a period long, or as long as the missing moment would take.
     At or below `limit` the algorithm rests.  A dropped sample or a NaN changes nothing: no valve opens, and
     the next usable sample shows the response.
     """
 
-    ring: LiquidRing
-    """The disc as the algorithm assumes it."""
-    influence: complex
-    """K before the first operation, m/(kg m)."""
-    limit: float
-    """m."""
-    amplitude_noise: float
-    """Standard deviation of a sample's amplitude, m."""
-    phase_noise: float
-    """Standard deviation of a sample's phase, rad."""
-    probe: float
-    """s."""
-    minimum_gas_time: float
-    """s."""
-    maximum_gas_time: float
-    """s."""
-    offsets: tuple[float, ...] = ()
-    """Added to a valve's time, one for each chamber, s: what the law does not know; empty: none."""
+    model: BalancerModel
+    """As the algorithm assumes it, which need not be the one that is controlled."""
+    relative_error: float = RELATIVE_ERROR
+    """Allowed to a step of the liquid that it follows."""
+
+    @cached_property
+    def ring(self) -> LiquidRing:
+        """The disc as the algorithm assumes it."""
+        scene, model = self.scene, self.model
+        residual = residual_fill_ratio(scene, law=model.flow)
+        dynamics = dynamics_of(scene=scene, model=model, modelled=(), residual_fill=residual)
+        return LiquidRing(
+            model=model,
+            chambers=scene.disc.chambers,
+            total=2 * scene.disc.initial_fill,
+            dynamics=replace(dynamics, relative_error=self.relative_error),
+        )
 
     @property
-    def rises_tolerated(self) -> int:
-        """Two: the first response corrects a belief that was wrong."""
-        return 2
-
-    @property
-    def plant(self) -> npt.NDArray[np.void]:
+    def plant(self) -> Records:
         """The assumed disc, type `PLANT`, shape (1,)."""
         return self.ring.dynamics.kept_plant(total=self.ring.total)
 
@@ -103,33 +100,38 @@ class LawBased(BuiltIn):
 
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
-        chambers, total = self.ring.chambers, self.ring.total
-        loop["algorithm"], loop["chambers"], loop["rest_limit"] = LAW_BASED, chambers, self.limit
-        loop["assumed_amplitude_noise"], loop["assumed_phase_noise"] = self.amplitude_noise, self.phase_noise
-        loop["probe"], loop["influence"], loop["total"] = self.probe, self.influence, total
-        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
-        loop["offset"][: len(self.offsets)] = self.offsets
+        super().fill(loop, run)
+        scene, chambers, total = self.scene, self.ring.chambers, self.ring.total
+        influence, sensor = scene.controller.assumed_influence, scene.sensor
+        loop["algorithm"], loop["total"], loop["influence"] = LAW_BASED, total, influence
+        loop["assumed_amplitude_noise"], loop["assumed_phase_noise"] = (
+            sensor.amplitude_noise,
+            sensor.phase_noise,
+        )
+        loop["probe"], loop["law_deviation"] = scene.controller.period, self.law_standard_deviation
         loop["axis"][: chambers // 2] = chamber_directions(chambers)[: chambers // 2]
         loop["assumed_lowest"], loop["assumed_step"], loop["assumed_moment"] = self._moments
         lowest = total - self.ring.model.flow.max_fill_ratio
         loop["least_fill"] = max(min(self.ring.residual_fill, total / 2), lowest)
-        loop["law_deviation"] = self.law_standard_deviation
-        run["influence"], run["before_time"] = self.influence, math.inf
-        run["variance"] = abs(PRIOR_STANDARD_DEVIATION * self.influence) ** 2
+        run["influence"], run["before_time"] = influence, math.inf
+        run["variance"] = abs(PRIOR_STANDARD_DEVIATION * influence) ** 2
 
-    def liquid(self) -> npt.NDArray[np.void]:
+    def liquid(self) -> Records:
         """As `BuiltIn.liquid`."""
         return self._liquid.copy()
 
     @cached_property
-    def _liquid(self) -> npt.NDArray[np.void]:
+    def _liquid(self) -> Records:
         level = at_rest(self.plant, fill=self.ring.total / 2)
         return np.repeat(level, self.ring.chambers // 2 + 1)
 
-    def react(self, loop: Record, memory: Memory) -> None:
-        """As `BuiltIn.react`."""
-        room = np.zeros(WORKSPACE)
-        law_based_step(loop, self.plant[0], memory.run[0], memory.liquid, np.zeros((2, 1)), room)
+
+def controller_of(scene: Scene, model: BalancerModel, *, relative_error: float = RELATIVE_ERROR) -> BuiltIn:
+    """The control algorithm that a scene asks for. Args: `model`, `relative_error`: as in `LawBased`."""
+    kind = scene.controller.kind
+    if kind == "law_based":
+        return LawBased(scene=scene, model=model, relative_error=relative_error)
+    return TargetVector(scene=scene) if kind == "target_vector" else Trial(scene=scene)
 
 
 @in_place

@@ -28,7 +28,8 @@ from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device,
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.remedies import remedies_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_rows import eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import (
     RecommendedGains,
     advised,

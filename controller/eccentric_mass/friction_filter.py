@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record
+from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 
@@ -79,7 +79,7 @@ def friction_flow(
 
 @in_place
 def friction_step(
-    known: Record,
+    estimate: Record,
     model: TrackModel,
     noise: FrictionNoise,
     measured_rate: float,
@@ -92,27 +92,27 @@ def friction_step(
 
     Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
     """
-    rate, by_rate, by_arm = friction_flow(model, known.rate, known.arm, speed, torque, step, euler)
+    rate, by_rate, by_arm = friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
     wander, r = noise.arm * step, noise.rate_variance
     p11 = (
-        by_rate**2 * known.rate_variance
-        + 2 * by_rate * by_arm * known.covariance
-        + by_arm**2 * (known.arm_variance + wander / 3)
+        by_rate**2 * estimate.rate_variance
+        + 2 * by_rate * by_arm * estimate.covariance
+        + by_arm**2 * (estimate.arm_variance + wander / 3)
         + noise.acceleration * step
     )
-    p12 = by_rate * known.covariance + by_arm * (known.arm_variance + wander / 2)
-    p22 = known.arm_variance + wander
+    p12 = by_rate * estimate.covariance + by_arm * (estimate.arm_variance + wander / 2)
+    p22 = estimate.arm_variance + wander
     seen = p11 + r > 0 and math.isfinite(measured_rate)
     k1, k2 = (p11 / (p11 + r), p12 / (p11 + r)) if seen else (0.0, 0.0)
     innovation = measured_rate - rate if seen else 0.0
-    known.rate = rate + k1 * innovation
-    known.arm += k2 * innovation
-    known.rate_variance = (1 - k1) ** 2 * p11 + r * k1 * k1
-    known.covariance = (1 - k1) * (p12 - k2 * p11) + r * k1 * k2
-    known.arm_variance = p22 - 2 * k2 * p12 + k2 * k2 * p11 + r * k2 * k2
+    estimate.rate = rate + k1 * innovation
+    estimate.arm += k2 * innovation
+    estimate.rate_variance = (1 - k1) ** 2 * p11 + r * k1 * k1
+    estimate.covariance = (1 - k1) * (p12 - k2 * p11) + r * k1 * k2
+    estimate.arm_variance = p22 - 2 * k2 * p12 + k2 * k2 * p11 + r * k2 * k2
 
 
 @in_place
-def friction_restart(known: Record, noise: FrictionNoise, measured_rate: float) -> None:
-    """Rate from the encoder alone, arm as known, of a mass that sticks or turns: no flow holds there."""
-    known.rate, known.rate_variance, known.covariance = measured_rate, noise.rate_variance, 0.0
+def friction_restart(estimate: Record, noise: FrictionNoise, measured_rate: float) -> None:
+    """Rate from the encoder alone, arm as estimated, of a mass that sticks or turns: no flow holds there."""
+    estimate.rate, estimate.rate_variance, estimate.covariance = measured_rate, noise.rate_variance, 0.0

@@ -17,17 +17,14 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record, Records
 from ringbalance.scene.platform.compiled import compiled, in_place
 
-Record = Any
-"""One element of a structured array, which compiled code changes in place."""
-Records = npt.NDArray[np.void]
 Numbers = Sequence[float] | FloatArray
 
 _GAUSS_POINTS: FloatArray
@@ -203,7 +200,7 @@ def _sandwich(a: FloatArray, p: FloatArray, half: FloatArray) -> None:
 
 
 @compiled
-def set_speed(known: Record, settings: FilterSettings, speed: float) -> None:
+def set_speed(estimate: Record, settings: FilterSettings, speed: float) -> None:
     """Write the matrices at a speed, rad/s, into an element of type `IMBALANCE_FILTER`.
 
     A laboratory sensor shows Z' = (z' + j W z) exp(j W t); turned back by the rotor's angle, which leaves the
@@ -211,45 +208,45 @@ def set_speed(known: Record, settings: FilterSettings, speed: float) -> None:
     Source: Eq. 17 of the paper on eccentric masses, corrected: as printed it lets the imbalance into the last
         row, where it is not seen.
     """
-    known.speed = speed
+    estimate.speed = speed
     if settings.euler:
-        _write_euler_transition(settings.model, speed, settings.step, known.transition)
+        _write_euler_transition(settings.model, speed, settings.step, estimate.transition)
     else:
-        _write_transition(settings.model, speed, settings.step, known.transition)
-    _write_process(settings, speed, known.process)
-    _write_identity(known.observation)
+        _write_transition(settings.model, speed, settings.step, estimate.transition)
+    _write_process(settings, speed, estimate.process)
+    _write_identity(estimate.observation)
     if settings.laboratory:
-        known.observation[2, 1], known.observation[3, 0] = -speed, speed
+        estimate.observation[2, 1], estimate.observation[3, 0] = -speed, speed
 
 
 @in_place
-def begin_whirl(known: Record, settings: FilterSettings) -> None:
+def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
     """Before the first sample nothing moves; the imbalance is kept."""
     position, velocity, _ = settings.start
     for i in range(4):
-        known.state[i] = 0.0
+        estimate.state[i] = 0.0
         for k in range(6):
-            known.covariance[i, k] = known.covariance[k, i] = 0.0
-    known.covariance[0, 0] = known.covariance[1, 1] = position * position
-    known.covariance[2, 2] = known.covariance[3, 3] = velocity * velocity
+            estimate.covariance[i, k] = estimate.covariance[k, i] = 0.0
+    estimate.covariance[0, 0] = estimate.covariance[1, 1] = position * position
+    estimate.covariance[2, 2] = estimate.covariance[3, 3] = velocity * velocity
 
 
 @compiled
-def begin_filter(known: Record, settings: FilterSettings, speed: float) -> None:
+def begin_filter(estimate: Record, settings: FilterSettings, speed: float) -> None:
     """Before the first sample, at a speed, rad/s: nothing moves and nothing is out of balance.
 
-    Args: `known`: an element of type `IMBALANCE_FILTER`, of zeros.
+    Args: `estimate`: an element of type `IMBALANCE_FILTER`, of zeros.
     """
-    begin_whirl(known, settings)
-    known.covariance[4, 4] = known.covariance[5, 5] = settings.start[2] * settings.start[2]
-    set_speed(known, settings, speed)
+    begin_whirl(estimate, settings)
+    estimate.covariance[4, 4] = estimate.covariance[5, 5] = settings.start[2] * settings.start[2]
+    set_speed(estimate, settings, speed)
 
 
 def imbalance_filter(settings: FilterSettings, *, speed: float) -> Records:
     """A filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
-    known = np.zeros(1, dtype=IMBALANCE_FILTER)
-    begin_filter(known[0], settings, speed)
-    return known
+    estimate = np.zeros(1, dtype=IMBALANCE_FILTER)
+    begin_filter(estimate[0], settings, speed)
+    return estimate
 
 
 class MassInput(NamedTuple):
@@ -292,12 +289,12 @@ def encoder_covariance(moment: float, angle: Numbers, deviation: float) -> tuple
 
 
 @in_place
-def predict(known: Record, masses: MassInput) -> None:
+def predict(estimate: Record, masses: MassInput) -> None:
     """Carry the estimate one step on; the drift acts half at its beginning and half at its end.
 
     Source: Eqs. 14 and 15 of the paper on eccentric masses, with the whole force of moving masses.
     """
-    x, a, p, (xx, xy, yy) = known.state, known.transition, known.covariance, masses.covariance
+    x, a, p, (xx, xy, yy) = estimate.state, estimate.transition, estimate.covariance, masses.covariance
     drive = (
         x[0] - 0.5 * masses.drift.real,
         x[1] - 0.5 * masses.drift.imag,
@@ -312,10 +309,10 @@ def predict(known: Record, masses: MassInput) -> None:
             x[i] += a[i, k] * drive[k]
     x[0] -= 0.5 * masses.drift.real
     x[1] -= 0.5 * masses.drift.imag
-    _sandwich(a, p, known.half)
+    _sandwich(a, p, estimate.half)
     for i in range(6):
         for k in range(6):
-            p[i, k] += known.process[i, k]
+            p[i, k] += estimate.process[i, k]
     for i in range(4):
         for k in range(4):
             p[i, k] += a[i, 4] * xx * a[k, 4]
@@ -327,7 +324,7 @@ def predict(known: Record, masses: MassInput) -> None:
 
 
 @in_place
-def correct(known: Record, sample: Numbers, variance: Numbers) -> float:
+def correct(estimate: Record, sample: Numbers, variance: Numbers) -> float:
     """Take in one sample, one sensor after the other, in Joseph's form, and square its innovation.
 
     The latter, normalised, has a chi-square distribution of four degrees of freedom, independent of earlier
@@ -338,9 +335,9 @@ def correct(known: Record, sample: Numbers, variance: Numbers) -> float:
     Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
     Processes with Applications to Guidance" (1968).
     """
-    state, p, cross, surprise = known.state, known.covariance, known.cross, 0.0
+    state, p, cross, surprise = estimate.state, estimate.covariance, estimate.cross, 0.0
     for m in range(4):
-        h, r = known.observation[m], variance[m]
+        h, r = estimate.observation[m], variance[m]
         innovation, total = sample[m], r
         for i in range(6):
             innovation -= h[i] * state[i]
@@ -379,26 +376,26 @@ def imbalance_deviation(covariance: FloatArray) -> float:
 
 
 def imbalance_history(
-    known: Records, *, samples: FloatArray, variance: FloatArray, masses: MassInput | None = None
+    estimate: Records, *, samples: FloatArray, variance: FloatArray, masses: MassInput | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Run a filter over a record: predict, then take in the sample, for each.
 
-    Args: `known`: type `IMBALANCE_FILTER`, shape (1,), one step before the first sample; not changed.
+    Args: `estimate`: type `IMBALANCE_FILTER`, shape (1,), one step before the first sample; not changed.
     Returns: States, shape (n, 6), and covariances, shape (n, 6, 6), after each sample.
     Raises: ValueError: a rotor at rest, which shows no imbalance.
     Source: section 3.1 of the paper on eccentric masses.
     """
-    if known["speed"][0] == 0:
+    if estimate["speed"][0] == 0:
         raise ValueError("a rotor at rest shows no imbalance: the speed must not be zero")
     states, covariances = np.empty((len(samples), 6)), np.empty((len(samples), 6, 6))
     seen = np.ascontiguousarray(samples, dtype=np.float64)
-    _history(known.copy()[0], seen, variance, masses or locked_masses(0.0j), states, covariances)
+    _history(estimate.copy()[0], seen, variance, masses or locked_masses(0.0j), states, covariances)
     return states, covariances
 
 
 @in_place
 def _history(
-    known: Record,
+    estimate: Record,
     samples: FloatArray,
     variance: FloatArray,
     masses: MassInput,
@@ -406,9 +403,9 @@ def _history(
     covariances: FloatArray,
 ) -> None:
     for i in range(samples.shape[0]):
-        predict(known, masses)
-        correct(known, samples[i], variance)
+        predict(estimate, masses)
+        correct(estimate, samples[i], variance)
         for j in range(6):
-            states[i, j] = known.state[j]
+            states[i, j] = estimate.state[j]
             for k in range(6):
-                covariances[i, j, k] = known.covariance[j, k]
+                covariances[i, j, k] = estimate.covariance[j, k]

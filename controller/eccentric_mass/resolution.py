@@ -46,14 +46,14 @@ def rotor_covariance(
     step = max(scene.imbalance_filter.step, duration / _LONGEST_STEPS)
     count = max(round(duration / step), 1)
     settings = filter_settings(scene)._replace(step=step, euler=False)
-    known, assumed = imbalance_filter(settings, speed=speed), scene.imbalance_filter
+    estimate, assumed = imbalance_filter(settings, speed=speed), scene.imbalance_filter
     variance = np.repeat([assumed.position_noise**2, assumed.velocity_noise**2], 2) * (assumed.step / step)
 
     def estimated(plant: EccentricScene) -> FloatArray:
         whirls = _whirls(plant, imbalance, speed=speed, begin=begin, step=step, count=count)
-        samples = whirls @ known["observation"][0].T
+        samples = whirls @ estimate["observation"][0].T
         masses = locked_masses(_place(scene))
-        states, _ = imbalance_history(known, samples=samples, variance=variance, masses=masses)
+        states, _ = imbalance_history(estimate, samples=samples, variance=variance, masses=masses)
         return np.asarray(states[-1, 4:6])
 
     middle = estimated(scene)

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.balancer import Progress
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record, Records
 from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, stretches
 from ringbalance.controller.eccentric_mass.memory import (
     HISTORY,
@@ -29,10 +28,12 @@ from ringbalance.controller.eccentric_mass.plant import (
     turned,
 )
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_rows import eccentric_document, eccentric_rows
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.results.result import Presentation
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, Record, Records
 from ringbalance.scene.platform.compiled import compiled, in_place
 
 Seed = int | np.random.Generator | None
@@ -205,7 +206,8 @@ def simulate_eccentric(
     history, memory = _recorded(
         scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
     )
-    return EccentricRun(scene=scene, history=history, memory=memory[0])
+    presentation = Presentation(document=eccentric_document, rows=eccentric_rows)
+    return EccentricRun(scene=scene, history=history, memory=memory[0], presentation=presentation)
 
 
 def locked_run(scene: EccentricScene) -> EccentricRun:

@@ -1,29 +1,92 @@
-"""The record of one run with two eccentric masses, frozen, with its document and its rows."""
+"""What a run with two eccentric masses leaves: every sample, what follows, and what is said of it."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import RunResult
-from ringbalance.controller.document import amplitude_line
-from ringbalance.controller.eccentric_mass.findings import ended, warnings_of
-from ringbalance.controller.eccentric_mass.run_facts import RunFacts
-from ringbalance.results.numbers import given
-from ringbalance.results.result import Result, Rows, Table
-from ringbalance.results.rows import Finding, Quantity, around
-from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.controller.eccentric_mass.drive_law import believed_whirl
+from ringbalance.controller.eccentric_mass.memory import (
+    BALANCED,
+    CAUSE_NAMES,
+    CHECK,
+    CORRECTION,
+    FRICTION,
+    HELD,
+    IMBALANCE,
+    NONE,
+    POSITIONING,
+    RELEASED,
+    SPEED_CHANGED,
+    SPEED_NOT_CONSTANT,
+    STAGE_NAMES,
+    STALLED,
+    TOO_SLOW,
+)
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.supervisor import STALLED_SHARE
+from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
+from ringbalance.results.result import PresentedResult
+from ringbalance.results.rows import Finding, Value, sentences
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Records
+
+_NOTHING: Final = 1e-6
+"""Share of the limit below which a vibration is round-off."""
+_FINAL_TIME: Final = 1.0
+"""Over which the final amplitude is averaged, s."""
+
+
+_NOTICEABLE_STALL: Final = 0.05
+"""Share of the friction stage with a mass nearly at a standstill that is worth a warning."""
+_WRONG_MODEL: Final = 1.5
+"""Mean normalised innovation squared beyond which the filter's model is called wrong; chance alone keeps it
+within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
+
+
+class EccentricOutcome(StrEnum):
+    """How a run ended."""
+
+    SETTLED = "settled"
+    RISES_AGAIN = "rises_again"
+    SATURATED = "saturated"
+    RESIDUAL = "residual"
+    TUNING_TIME = "tuning_time"
+    SPEED_CHANGED = "speed_changed"
+    TOO_SLOW = "too_slow"
+    SPEED_NOT_CONSTANT = "speed_not_constant"
+    MASSES_MOVE = "masses_move"
+    IMBALANCE_UNCERTAIN = "imbalance_uncertain"
+    FRICTION_UNCERTAIN = "friction_uncertain"
+    STALLED = "stalled"
+    NOT_ARRIVED = "not_arrived"
+    TIME_LIMIT = "time_limit"
+    DIVERGED = "diverged"
+    LOCKED = "locked"
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageSpan:
+    """One stage of the strategy."""
+
+    name: str
+    start: float
+    """s."""
+    end: float
+    """s."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class EccentricRun(RunFacts, Result):
-    """One run of the whole strategy on the plant, with what is said of it.
+class EccentricRun(PresentedResult):
+    """One run of the whole strategy on the plant.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
@@ -34,23 +97,260 @@ class EccentricRun(RunFacts, Result):
 
     balancer: ClassVar = "eccentric_mass"
 
+    scene: EccentricScene
+    history: Records
+    """Every sample, type `HISTORY`."""
+    memory: np.void
+    """Of the strategy at the end, type `MEMORY`."""
+
+    @property
+    def innovation(self) -> float | None:
+        """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without
+        any."""
+        judged = int(self.memory["judged"])
+        return float(self.memory["surprise"]) / (4 * judged) if judged else None
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """s, shape (n,)."""
+        return np.arange(len(self.history["state"]), dtype=np.float64) * self.scene.sensor.step
+
+    @cached_property
+    def speed(self) -> FloatArray:
+        """W, rad/s, shape (n,)."""
+        return np.asarray(np.interp(self.time, *self.scene.rotor.profile))
+
+    @cached_property
+    def whirl(self) -> ComplexArray:
+        """True displacement of the rotor along its own axes, m, shape (n,)."""
+        return np.asarray(self.history["state"][:, 0] + 1j * self.history["state"][:, 1])
+
+    @cached_property
+    def amplitude(self) -> FloatArray:
+        """True vibration, m zero-to-peak, shape (n,)."""
+        return np.asarray(np.abs(self.whirl), dtype=np.float64)
+
+    @property
+    def phase(self) -> FloatArray:
+        """Of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
+        return np.asarray(np.angle(self.whirl), dtype=np.float64)
+
+    @property
+    def mass_angle(self) -> FloatArray:
+        """True angles of the masses, rad, not wrapped, shape (2, n)."""
+        return self.history["state"][:, 4:6].T
+
+    @property
+    def mass_rate(self) -> FloatArray:
+        """rad/s, shape (2, n)."""
+        return self.history["state"][:, 6:8].T
+
+    @property
+    def goal(self) -> FloatArray:
+        """Where the masses should be, rad, shape (2, n)."""
+        return self.history["goal"].T
+
+    @property
+    def voltage(self) -> FloatArray:
+        """V, shape (2, n)."""
+        return self.history["voltage"].T
+
+    @property
+    def drive_off(self) -> BoolArray:
+        """Whether both drives are off, shape (n,)."""
+        return np.asarray(self.history["hold"] == RELEASED)
+
+    @property
+    def limit(self) -> float:
+        """m."""
+        return self.scene.supervisor.limit
+
+    @property
+    def stage(self) -> int:
+        """At the end of the run."""
+        return int(self.history["stage"][-1])
+
+    @property
+    def end(self) -> float:
+        """s."""
+        return float(self.time[-1])
+
+    @property
+    def diverged(self) -> bool:
+        """Whether it ended early, at the last sample that means anything."""
+        return self.time.size < self.scene.samples
+
+    @cached_property
+    def left(self) -> int | None:
+        """Sample of the largest vibration above the limit after the rotor was balanced to within it; None for
+        none.
+        """
+        content = np.isin(self.history["cause"], (BALANCED, SPEED_CHANGED))
+        within = np.flatnonzero(content & (self.amplitude <= self.limit))
+        if within.size == 0:
+            return None
+        worst = int(within[0]) + int(np.argmax(self.amplitude[within[0] :]))
+        return worst if self.amplitude[worst] > self.limit else None
+
+    @cached_property
+    def within_since(self) -> float | None:
+        """Recorded instant from which on the amplitude is not above the limit to the end, s; None: it ends
+        above.
+        """
+        above = np.flatnonzero(self.amplitude > self.limit)
+        first = int(above[-1]) + 1 if above.size else 0
+        return None if first == self.time.size else float(self.time[first])
+
+    @cached_property
+    def outcome(self) -> EccentricOutcome:
+        """SETTLED only when the strategy was content and the true amplitude stays within the limit after."""
+        if self.diverged:
+            return EccentricOutcome.DIVERGED
+        cause = int(self.history["cause"][-1])
+        kept = self.within_since is not None and self.left is None
+        if cause == BALANCED:
+            return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
+        # What was measured to be within the limit may be made better still as the run ends.
+        correcting = self.stage in {CHECK, CORRECTION} and self.memory["objective"] <= self.limit
+        if kept and (cause == SPEED_CHANGED or correcting):
+            return EccentricOutcome.SETTLED
+        cause = self._shown_cause(cause)
+        return EccentricOutcome.TIME_LIMIT if cause == NONE else EccentricOutcome(CAUSE_NAMES[cause])
+
+    def _shown_cause(self, cause: int) -> int:
+        """Of the end; a run that ends within a stage may show already why the stage would have failed."""
+        speed = self.speed
+        if self.stage == IMBALANCE:
+            if abs(speed[-1]) < self.scene.supervisor.lowest_speed:
+                return TOO_SLOW
+            steady = speed.size < 2 or speed[-1] == speed[-2]
+            return cause if steady else SPEED_NOT_CONSTANT
+        stalled = self.stage == FRICTION and self.memory["stalled"] > STALLED_SHARE * self.memory["driven"]
+        return STALLED if stalled else cause
+
+    @property
+    def settling_time(self) -> float | None:
+        """s, from which on the amplitude stays at or below the limit; None when not settled."""
+        ended_well = self.outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}
+        return self.within_since if ended_well else None
+
+    @property
+    def settled(self) -> bool:
+        """Whether the amplitude ends at or below the limit and stays there."""
+        return self.settling_time is not None
+
+    @cached_property
+    def estimated_at(self) -> IntArray:
+        """Samples at which the imbalance was estimated."""
+        return np.flatnonzero(self.history["stage"] == IMBALANCE)
+
+    @property
+    def friction_known(self) -> bool:
+        """Whether the friction stage came to its end: then its drives have done what they are there for."""
+        return bool(np.any(self.history["stage"] == POSITIONING))
+
+    @property
+    def imbalance(self) -> complex:
+        """As estimated at the end, kg m."""
+        return complex(*self.history["imbalance"][-1])
+
+    @cached_property
+    def rotor_covariance(self) -> FloatArray:
+        """Of the estimated imbalance, from what is stated of rotor and masses, kg^2 m^2, shape (2, 2)."""
+        estimating, step = self.estimated_at, self.scene.sensor.step
+        if estimating.size == 0:
+            return np.zeros((2, 2))
+        return rotor_covariance(
+            self.scene,
+            imbalance=self.imbalance,
+            speed=float(self.speed[estimating[-1]]),
+            begin=float(estimating[0]) * step,
+            duration=estimating.size * step,
+        )
+
+    @property
+    def imbalance_covariance(self) -> FloatArray:
+        """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
+        return np.asarray(self.history["imbalance_covariance"][-1] + self.rotor_covariance)
+
+    @property
+    def stages(self) -> tuple[StageSpan, ...]:
+        """Those that the strategy went through, one after the other."""
+        stage, time = self.history["stage"], self.time
+        edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
+        return tuple(
+            StageSpan(name=STAGE_NAMES[stage[a]], start=float(time[a]), end=float(time[b]))
+            for a, b in itertools.pairwise(edges)
+        )
+
+    @property
+    def targets(self) -> Targets | None:
+        """For the imbalance as it was estimated; None when it never came to that."""
+        if not self.friction_known:
+            return None
+        x, y = self.history["imbalance"][-1]
+        masses = self.scene.masses
+        gap, moment = masses.arc_length / masses.guide_radius, PlantParameters.of(self.scene).moment
+        return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
+
+    @property
+    def unbalanced_amplitude(self) -> float:
+        """Steady amplitude that the masses' first places would give at the last speed, m."""
+        speed = float(self.speed[-1])
+        if speed == 0:
+            return 0.0
+        return abs(PlantParameters.of(self.scene).steady_whirl(speed, self.scene.masses.initial_angle))
+
+    @property
+    def final_amplitude(self) -> float:
+        """Mean over the last second, m."""
+        return float(np.mean(self.amplitude[self.time >= self.time[-1] - _FINAL_TIME]))
+
+    @property
+    def residual_ratio(self) -> float | None:
+        """Final amplitude over that of the first places at this speed; None where nothing would vibrate."""
+        unbalanced = self.unbalanced_amplitude
+        return None if unbalanced < _NOTHING * self.limit else self.final_amplitude / unbalanced
+
+    @property
+    def electrical_energy(self) -> float:
+        """Taken by both motors from the supply in the whole run, J."""
+        return float(self.history["energy"][-1])
+
+    @property
+    def worst_amplitude(self) -> float:
+        """Largest true vibration on the way, m."""
+        return float(np.max(self.amplitude))
+
+    @property
+    def saturation(self) -> float:
+        """Seconds for which a voltage was at its limit."""
+        most = PlantParameters.of(self.scene).maximum_voltage
+        at_limit = np.any(np.abs(self.history["voltage"]) >= most, axis=1)
+        return float(np.count_nonzero(at_limit)) * self.scene.sensor.step
+
+    @property
+    def least_gap(self) -> float:
+        """Smallest angle between the masses on the way, rad."""
+        first, second = self.mass_angle
+        return float(np.min(np.abs(np.pi - np.mod(np.pi - (second - first), 2 * np.pi))))
+
     @cached_property
     def ended(self) -> Finding:
-        """How the run ended."""
-        return ended(self)
+        """How the run ended, with its numbers."""
+        code = f"masses_{self.outcome.value}"
+        if self.outcome is EccentricOutcome.RISES_AGAIN and self.left is None:
+            code = "masses_not_kept"
+        if self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
+            code = "masses_locked_within"
+        return _finding(code, _numbers(self))
 
     @cached_property
     def warned(self) -> tuple[Finding, ...]:
         """What the user should know although the run continued."""
-        return warnings_of(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """See `_document`."""
-        return _document(self)
-
-    def rows(self) -> Rows:
-        """Quantities, findings and stages of the run."""
-        return _rows(self)
+        numbers = {name: value for name, value in _numbers(self).items() if value is not None}
+        due = (_finding(code, numbers) for code, is_due in _due(self).items() if is_due)
+        return (*_unstable(self.scene), *due)
 
     @property
     def status(self) -> str:
@@ -63,173 +363,90 @@ class EccentricRun(RunFacts, Result):
         return tuple(each.text for each in self.warned)
 
 
-_MOST_ROWS: Final = 2500
-"""Instants in the document; a run has a hundred times as many."""
+def _finding(code: str, numbers: Mapping[str, Value]) -> Finding:
+    return Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
 
 
-def _document(run: EccentricRun) -> dict[str, Any]:
-    """Turn a run into plain numbers, lists and text, all in SI.
+def _by_euler(run: EccentricRun) -> bool:
+    """Whether the filter is wrong, or says so, with the Euler transition: the cause to remove first."""
+    told = run.scene.imbalance_filter
+    unlike = run.innovation is not None and run.innovation > _WRONG_MODEL
+    return told.discretisation == "euler" and (unlike or told.step > _euler_limit(run))
 
-    Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
-    the largest vibration among them.
-    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
-    """
-    kept = _thinned(run)
+
+def _euler_limit(run: EccentricRun) -> float:
+    """Longest step of the paper's transition at the highest speed of the estimation, s."""
+    speeds = np.abs(run.speed[run.estimated_at])
+    fastest = float(speeds.max()) if speeds.size else 0.0
+    return float(believed_whirl(run.scene).euler_step_limit(angular_velocity=fastest))
+
+
+def _unstable(scene: EccentricScene) -> Iterator[Finding]:
+    """Loops whose poles are outside the unit circle, each with the gain or the hold that would do."""
+    if scene.supervisor.strategy == "locked":
+        return
+    gains = RecommendedGains.of(scene)
+    for loop in gains.loops:
+        if not loop.stable and not (loop is gains.pair and not gains.speed.stable):
+            numbers = {"radius": loop.radius, "gain": loop.recommended, "hold": loop.recommended_step}
+            yield Finding(
+                code="loop_unstable",
+                values={"loop": loop.name, "key": loop.key, **numbers},
+                change={loop.key: loop.recommended},
+            )
+
+
+def _due(run: EccentricRun) -> dict[str, bool]:
+    """Whether each warning is."""
+    unlike = run.innovation is not None and run.innovation > _WRONG_MODEL
     return {
-        "balancer": run.balancer,
-        "scene": {"name": run.scene.name, "source": run.scene.source, "sha256": run.scene.sha256},
-        "settled": run.settled,
-        "settling_time_s": run.settling_time,
-        "outcome": run.outcome.value,
-        "status": run.status,
-        "warnings": list(run.warnings),
+        "drive_nearly_stalled": _stalled(run) > _NOTICEABLE_STALL and not run.friction_known,
+        "voltage_at_limit": run.saturation > 0,
+        "euler_too_coarse": _by_euler(run),
+        "innovations_unlike_model": unlike and not _by_euler(run),
+        "drives_stay_on": int(run.history["hold"][-1]) == HELD,
+        "masses_meet": run.least_gap < _own_angle(run.scene),
+    }
+
+
+def _stalled(run: EccentricRun) -> float:
+    return int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1)
+
+
+def _deviation(run: EccentricRun) -> float:
+    """Standard deviation of the imbalance by noise, kg m."""
+    return float(np.sqrt(np.max(np.linalg.eigvalsh(run.history["imbalance_covariance"][-1]))))
+
+
+def _own_angle(scene: EccentricScene) -> float:
+    return scene.masses.arc_length / scene.masses.guide_radius
+
+
+def _numbers(run: EccentricRun) -> dict[str, Value]:
+    """Of which a sentence takes what it names."""
+    scene, left = run.scene, run.left
+    supervisor = scene.supervisor
+    return {
+        "final_amplitude": float(run.amplitude[-1]),
+        "time": run.end,
+        "limit": supervisor.limit,
+        "settling_time": run.within_since,
+        "later_amplitude": None if left is None else float(run.amplitude[left]),
+        "later_speed": None if left is None else float(run.speed[left]),
+        "imbalance": abs(run.imbalance),
+        "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
+        "residual": float(run.memory["left"]),
+        "lowest_speed": supervisor.lowest_speed,
+        "imbalance_time": supervisor.imbalance_time,
+        "deviation_ratio": _deviation(run) / abs(run.imbalance) if run.imbalance else None,
+        "imbalance_gate": scene.imbalance_filter.gate,
+        "friction_gate": scene.friction_filter.gate,
+        "positioning_time": supervisor.positioning_time,
+        "stage": STAGE_NAMES[run.stage],
+        "stalled_fraction": _stalled(run),
+        "saturation": run.saturation,
+        "euler_limit": _euler_limit(run),
         "innovation": run.innovation,
-        "limit_m": run.limit,
-        "residual_ratio": run.residual_ratio,
-        "final_amplitude_m": run.final_amplitude,
-        "worst_amplitude_m": run.worst_amplitude,
-        "energy_J": run.electrical_energy,
-        "peak_voltage_V": float(np.abs(run.voltage).max()),
-        "stages": [{"name": s.name, "start_s": s.start, "end_s": s.end} for s in run.stages],
-        "targets": None if run.targets is None else _targets(run),
-        "time_s": run.time[kept].tolist(),
-        "speed_rad_s": run.speed[kept].tolist(),
-        "amplitude_m": run.amplitude[kept].tolist(),
-        "phase_rad": run.phase[kept].tolist(),
-        "mass_angle_rad": run.mass_angle[:, kept].tolist(),
-        "goal_rad": run.goal[:, kept].tolist(),
-        "voltage_V": run.voltage[:, kept].tolist(),
-        "drive_off": run.drive_off[kept].tolist(),
-        "estimates": {
-            "imbalance_kg_m": run.history["imbalance"][kept].T.tolist(),
-            "imbalance_covariance": run.history["imbalance_covariance"][kept].tolist(),
-            "imbalance_rotor_covariance": run.rotor_covariance.tolist(),
-            "imbalance_half_width_kg_m": (NORMAL_95 * np.sqrt(np.diag(run.imbalance_covariance))).tolist(),
-            "friction_arm_m": run.history["friction_arm"][kept].T.tolist(),
-            "friction_variance": run.history["friction_variance"][kept].T.tolist(),
-        },
-        **run.rows().document(),
+        "least_gap": run.least_gap,
+        "own_angle": _own_angle(scene),
     }
-
-
-def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
-    """Every sample of a run by name of its column: rotor-fixed vectors, angles not wrapped."""
-    history = run.history
-    stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
-    columns: dict[str, FloatArray] = {
-        "time_s": run.time,
-        "speed_rad_s": run.speed,
-        "whirl_x_m": run.whirl.real,
-        "whirl_y_m": run.whirl.imag,
-        "amplitude_m": run.amplitude,
-        "phase_rad": run.phase,
-        **_each("mass_angle_{}_rad", run.mass_angle),
-        **_each("mass_rate_{}_rad_s", run.mass_rate),
-        **_each("goal_{}_rad", run.goal),
-        **_each("voltage_{}_V", run.voltage),
-        "energy_J": run.history["energy"],
-        "imbalance_x_kg_m": history["imbalance"][:, 0],
-        "imbalance_y_kg_m": history["imbalance"][:, 1],
-        "imbalance_variance_xx_kg2_m2": history["imbalance_covariance"][:, 0, 0],
-        "imbalance_variance_xy_kg2_m2": history["imbalance_covariance"][:, 0, 1],
-        "imbalance_variance_yy_kg2_m2": history["imbalance_covariance"][:, 1, 1],
-        **_each("friction_arm_{}_m", history["friction_arm"].T),
-        **_each("friction_variance_{}_m2", history["friction_variance"].T),
-    }
-    return {
-        **{name: values.tolist() for name, values in columns.items()},
-        "drive_off": run.drive_off.astype(int).tolist(),
-        "stage": [run.stages[place].name for place in stages],
-    }
-
-
-def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
-    return {name.format(mass): row for mass, row in enumerate(values, start=1)}
-
-
-def _thinned(run: EccentricRun) -> IntArray:
-    """Numbers of samples to show: equally spaced, with the stages' edges and the largest vibration."""
-    last = run.time.size - 1
-    even = np.linspace(0, last, min(_MOST_ROWS, run.time.size)).round().astype(np.int64)
-    edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])
-    extra = np.array([int(np.argmax(run.amplitude)), last], dtype=np.int64)
-    return np.unique(np.concatenate([even, np.minimum(edges, last), extra]))
-
-
-def _targets(run: EccentricRun) -> dict[str, Any]:
-    found = {} if run.targets is None else run.targets._asdict()
-    return {
-        "angle_rad": [found["first"], found["second"]],
-        "half_angle_rad": found["half_angle"],
-        "residual_kg_m": found["residual"],
-        "saturated": bool(found["saturated"]),
-    }
-
-
-def _rows(run: EccentricRun) -> Rows:
-    at = np.searchsorted(run.time, [stage.end for stage in run.stages])
-    stages = [
-        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
-        for stage, amplitude in zip(run.stages, run.amplitude[at], strict=True)
-    ]
-    return Rows(
-        title=f"Run of {run.scene.name} ({run.scene.source}), eccentric masses",
-        quantities=tuple(_quantities(run)),
-        findings=(run.ended, *run.warned),
-        facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
-        tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
-    )
-
-
-def _quantities(run: EccentricRun) -> Iterator[Quantity]:
-    x, y = (float(each) for each in run.history["imbalance"][-1])
-    width = NORMAL_95 * math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
-    size = math.hypot(x, y)
-    rows: list[tuple[str, str, str, float | None, float]] = [
-        ("settling_time", "settling time", "s", run.settling_time, 0.0),
-        ("final_amplitude", "amplitude at the end", "m", run.final_amplitude, 0.0),
-        ("worst_amplitude", "amplitude at worst", "m", run.worst_amplitude, 0.0),
-        ("limit", "limit", "m", run.limit, 0.0),
-        ("residual_ratio", "of the vibration without balancing", "1", run.residual_ratio, 0.0),
-        ("imbalance", "imbalance", "kg m", size, width),
-        ("imbalance_angle", "angle of the imbalance", "rad", math.atan2(y, x) % math.tau, 0.0),
-        ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
-    ]
-    for number, arm in enumerate(run.history["friction_arm"][-1], start=1):
-        wide = NORMAL_95 * math.sqrt(run.history["friction_variance"][-1][number - 1])
-        rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), wide))
-    for number, angle in enumerate(run.mass_angle[:, -1], start=1):
-        place = float(angle) % math.tau
-        rows.append((f"mass_angle_{number}", f"mass {number} at", "rad", place, 0.0))
-    for key, name, unit, value, half in rows:
-        low, high = (None, None) if value is None else around(value, half)
-        origin = "given" if key == "limit" else "simulated"
-        yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)
-
-
-_INSTANTS = 600
-
-
-def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
-    """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
-    one, so that no peak is lost.
-
-    Args: `end`: of the times, s. Returns: For JSON, SI; a run that ended before has its last value.
-    """
-    time = np.linspace(0.0, end, _INSTANTS)
-    peaks = np.array([_peaks(run.run, time) for run in runs])
-    low, middle, high = (row.tolist() for row in np.quantile(peaks, [0.0, 0.5, 1.0], axis=0))
-    return {
-        "time_s": time.tolist(),
-        "low_m": low,
-        "middle_m": middle,
-        "high_m": high,
-        "runs": len(runs),
-        "settled": sum(each.settled for each in runs),
-    }
-
-
-def _peaks(run: Any, time: Any) -> Any:
-    edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
-    since = np.concatenate([edges[:1], edges[:-1]])
-    return [float(run.amplitude[a : max(b, a) + 1].max()) for a, b in zip(since, edges, strict=True)]

@@ -22,7 +22,6 @@ from ringbalance.controller.eccentric_mass.drive_law import (
 from ringbalance.controller.eccentric_mass.friction_filter import friction_restart, friction_step
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
     MassInput,
-    Record,
     begin_filter,
     begin_whirl,
     correct,
@@ -43,6 +42,7 @@ from ringbalance.controller.eccentric_mass.memory import (
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.supervisor import arm_deviation, enter, is_constant, supervise
 from ringbalance.controller.eccentric_mass.targets import set_pair, wrapped
+from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import compiled, in_place
 
 _LARGEST_TURN: Final = 0.05
@@ -154,22 +154,22 @@ def _estimate_imbalance(
     if not visible:
         memory.running = 0
         return
-    law, known = settings.law, memory.filter
-    if known.speed != motion.speed:
-        set_speed(known, settings.filter, motion.speed)
+    law, estimate = settings.law, memory.filter
+    if estimate.speed != motion.speed:
+        set_speed(estimate, settings.filter, motion.speed)
     place, pace = mass_vector(law.track.moment, motion.angle, motion.rate)
     before, drift = memory.mass_vector, memory.mass_pace
     if memory.running == 0:
-        begin_whirl(known, settings.filter)
+        begin_whirl(estimate, settings.filter)
         before, drift = place, pace
-    predict(known, _mass_input(settings, motion, 0.5 * (before + place), 0.5 * (drift + pace)))
+    predict(estimate, _mass_input(settings, motion, 0.5 * (before + place), 0.5 * (drift + pace)))
     position, velocity = sample[0], sample[1] + pace / law.whirl.mass
     shown = (position.real, position.imag, velocity.real, velocity.imag)
-    memory.surprise += correct(known, shown, _sample_variance(settings, motion))
+    memory.surprise += correct(estimate, shown, _sample_variance(settings, motion))
     memory.judged, memory.running = memory.judged + 1, 1
     memory.mass_vector, memory.mass_pace = place, pace
-    memory.imbalance = complex(known.state[4], known.state[5])
-    memory.deviation = imbalance_deviation(known.covariance)
+    memory.imbalance = complex(estimate.state[4], estimate.state[5])
+    memory.deviation = imbalance_deviation(estimate.covariance)
 
 
 @in_place
@@ -207,7 +207,7 @@ def _estimate_friction(settings: StrategySettings, memory: Record, motion: Motio
 
 @in_place
 def _follow(
-    settings: StrategySettings, known: Record, torque: float, rate: float, smooth: float, speed: float
+    settings: StrategySettings, estimate: Record, torque: float, rate: float, smooth: float, speed: float
 ) -> None:
     """One step of a mass's filter, if the mass certainly moves and has not turned round.
 
@@ -215,11 +215,11 @@ def _follow(
     """
     own = settings.friction
     moves = abs(smooth) > own.least_motion and smooth * rate > 0 and abs(rate) > settings.law.slow
-    if not moves or known.rate * rate <= 0:
-        friction_restart(known, own.noise, rate)
+    if not moves or estimate.rate * rate <= 0:
+        friction_restart(estimate, own.noise, rate)
     else:
         step = settings.step * own.every
-        friction_step(known, own.track, own.noise, rate, speed, torque, step, own.euler)
+        friction_step(estimate, own.track, own.noise, rate, speed, torque, step, own.euler)
 
 
 @in_place

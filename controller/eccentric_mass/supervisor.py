@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, Motion, friction_needed
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
     CHECK,
@@ -55,6 +54,7 @@ from ringbalance.controller.eccentric_mass.targets import (
     target_angles,
     tuning_place,
 )
+from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 _HOLDS_FOR_SURE: Final = 0.7
@@ -200,11 +200,8 @@ def _goal(gates: Gates, angle: Sequence[float], imbalance: complex) -> tuple[Pai
     Returns: Goal, whether it is saturated, and the imbalance that it leaves, kg m.
     """
     targets = target_angles(abs(imbalance), cmath.phase(imbalance), gates.moment, gates.gap)
-    travel = assign(angle[0], angle[1], targets.first, targets.second)
-    goal = (
-        angle[0] + travel.first + gates.target_error[0],
-        angle[1] + travel.second + gates.target_error[1],
-    )
+    one, two = assign(angle[0], angle[1], targets.first, targets.second)
+    goal = (angle[0] + one + gates.target_error[0], angle[1] + two + gates.target_error[1])
     return goal, 1 if targets.saturated else 0, targets.residual
 
 

@@ -19,11 +19,10 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record
 from ringbalance.controller.eccentric_mass.memory import Pair
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record
 from ringbalance.scene.platform.compiled import in_place
 
 
@@ -40,17 +39,6 @@ class Targets(NamedTuple):
     """Imbalance that is left, kg m."""
     saturated: bool
     """Whether the imbalance is more than the masses can undo, which takes them side by side."""
-
-
-class _Assignment(NamedTuple):
-    """How far each mass goes."""
-
-    first: float
-    """Travel of the first mass, rad, signed, whole turns included."""
-    second: float
-    """Travel of the second mass, rad."""
-    swapped: bool
-    """Whether the first mass goes to the second target."""
 
 
 @in_place
@@ -82,28 +70,25 @@ def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> 
 
 
 @in_place
-def assign(first: float, second: float, target_one: float, target_two: float) -> _Assignment:
+def assign(first: float, second: float, target_one: float, target_two: float) -> Pair:
     """Send each mass to a target by the shortest pair of travels on which they do not meet.
 
     The sum of squared travels is least over both assignments and all whole turns that keep the order of the
     masses on the track.  Masses that share one law of motion then never come closer than they are at the
     start or at the end.
-    Returns: _Assignment; of two equal ones the unswapped.
+    Returns: Travel of each mass, rad, signed, whole turns included; of two equal ones that of the first mass
+        to the first target.
     Source: Eqs. 27 and 28 of the paper on eccentric masses, with angles wrapped.
     """
-    lead = (second - first) % (2 * math.pi)
-    best = _Assignment(0.0, 0.0, False)
-    least = math.inf
-    for swapped in (False, True):
-        goal = target_two if swapped else target_one
-        other = target_one if swapped else target_two
+    lead, least, best = (second - first) % (2 * math.pi), math.inf, (0.0, 0.0)
+    for goal, other in ((target_one, target_two), (target_two, target_one)):
         # Keeping the order fixes the second travel once the first one is chosen.
         change = (other - goal) % (2 * math.pi) - lead
         for turn in (-1, 0, 1):
             travel = wrapped(goal - first) + 2 * math.pi * turn
             cost = travel**2 + (travel + change) ** 2
             if cost < least - 1e-12:
-                least, best = cost, _Assignment(travel, travel + change, swapped)
+                least, best = cost, (travel, travel + change)
     return best
 
 

@@ -20,10 +20,8 @@ from ringbalance.controller.judging.search import (
     searched_along,
     top_level,
 )
-from ringbalance.controller.judging.tuning import BestOfKind, Tuning
-from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, tuning_rows
+from ringbalance.controller.judging.tuning import LONGER, BestOfKind, Tuning
 from ringbalance.results.requirements import MET
-from ringbalance.results.result import Presentation
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import value_at, with_values_at
 
@@ -63,7 +61,6 @@ def tuned(
     settings = partial(searched, along=level)
     mends = remedies is not False and best.verdict != MET
     return Tuning(
-        presentation=Presentation(document=tuning_document, rows=tuning_rows),
         given=balancer.scene,
         recommended=best,
         own=own,

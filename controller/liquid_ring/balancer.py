@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import (
     FURTHER,
     Balancer,
@@ -32,8 +32,7 @@ from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
-from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
-from ringbalance.controller.liquid_ring.trials import trials
+from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
 from ringbalance.controller.simulation import Simulation

@@ -20,7 +20,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, vibration_rates
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -138,14 +137,14 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     if scene.controller.kind != "target_vector":
         problem = f"the controller {scene.controller.kind!r} has no linear loop"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
-    settings, dt = target_vector_of(scene), scene.controller.period
+    settings, dt = scene.controller, scene.controller.period
     rate = float(np.max(np.mean(vibration_rates(scene, BalancerModel.of(flow_law)), axis=1)))
     integral = 0.0 if settings.integral_time is None else dt / settings.integral_time
     derivative = settings.derivative_time / dt
     return LinearLoop(
         plant=_plant(rate, scene.rotor.lag_angle, dt),
-        controller=_controller(settings.proportional, settings.lag_angle, integral, derivative, dt),
-        gain=cmath.rect(settings.proportional * rate, settings.lag_angle - scene.rotor.lag_angle),
+        controller=_controller(settings.proportional, settings.assumed_lag_angle, integral, derivative, dt),
+        gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - scene.rotor.lag_angle),
         integral=integral,
         derivative=derivative,
     )

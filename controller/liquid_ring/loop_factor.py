@@ -22,9 +22,8 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.built_in import TargetVector
-from ringbalance.controller.algorithms.by_name import controller_of
-from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
+from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector
+from ringbalance.controller.algorithms.law_based import LawBased, controller_of, fill_for_moment, split_change
 from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
@@ -62,7 +61,7 @@ class LoopFactor:
         return self.fixed and self.value is not None and self.value >= self.limit
 
 
-def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any]) -> LoopFactor:
+def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] | BuiltIn) -> LoopFactor:
     """The loop of a scene under a law and a controller.
 
     The law-based algorithm removes kappa/kappa' of a residual, kappa' its assumed influence coefficient, and
@@ -73,13 +72,14 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any])
     error = 0.0
     value: float | None = None
     integral = derivative = 0.0
+    settings = scene.controller
     if isinstance(controller, TargetVector):
-        value = controller.proportional * rate
-        error = controller.lag_angle - scene.rotor.lag_angle
-        integral = scene.controller.period / (controller.integral_time or math.inf)
-        derivative = controller.derivative_time / scene.controller.period
+        value = settings.proportional * rate
+        error = settings.assumed_lag_angle - scene.rotor.lag_angle
+        integral = settings.period / (settings.integral_time or math.inf)
+        derivative = settings.derivative_time / settings.period
     if isinstance(controller, LawBased):
-        value = scene.rotor.influence_coefficient / abs(controller.influence)
+        value = scene.rotor.influence_coefficient / abs(settings.assumed_influence)
     deviation = _stationary_deviation(
         loop_factor=1.0 if value is None or isinstance(controller, LawBased) else value,
         noise=noise,

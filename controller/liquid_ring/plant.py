@@ -1,4 +1,4 @@
-"""What a disc's liquid can do at best, what pressure starts a flow, and what to do where neither suffices."""
+"""What a disc's liquid can do at best, and what pressure starts a flow."""
 
 from __future__ import annotations
 
@@ -27,12 +27,6 @@ NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 LEAST_PRESSURE: Final = 1.0
 """Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
-BEYOND_CAPACITY: Final = (
-    "balance the rotor first, use a denser liquid, or a larger or differently clocked disc"
-)
-"""What to do about an unbalance that the disc cannot cancel."""
-RUNS_BACK: Final = "raise rotor.speed or lower tube.hump_radius so that the column breaks, or vent the tube"
-"""What to do about a full tube that lets liquid run back while the gas is off."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import stat
 import subprocess
 import sys
 import tempfile
@@ -26,6 +24,7 @@ from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.kinds import Finding
+from ringbalance.scene.platform.files import read_bounded
 from ringbalance.scene.uncertain import SHAPE
 from ringbalance.scene.units import DIMENSIONS
 
@@ -157,23 +156,9 @@ def _content_of(path: Path) -> bytes:
         raise MeshFileError.of(
             f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS
         )
-    try:
-        # Without blocking: a pipe that nobody writes to must not hold the program.
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-        with os.fdopen(handle, "rb") as stream:
-            kind = os.fstat(stream.fileno())
-            if not stat.S_ISREG(kind.st_mode):
-                raise MeshFileError.of("this is a folder or a device, not a file", FORMATS)
-            content = stream.read(_LARGEST_FILE + 1)
-    except FileNotFoundError as error:
-        raise MeshFileError.of(
-            f"there is no file {path}", "a path from the folder of the scene file"
-        ) from error
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise MeshFileError.of(f"the file cannot be read: {reason}") from error
-    if len(content) > _LARGEST_FILE:
-        raise MeshFileError.of("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
+    content, problem = read_bounded(path, what="mesh", most=_LARGEST_FILE, regular=True)
+    if problem:
+        raise MeshFileError.of(f"{path}: {problem}", "a path from the folder of the scene file")
     if not content.strip():
         raise MeshFileError.of("the file is empty", FORMATS)
     return content

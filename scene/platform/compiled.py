@@ -25,7 +25,7 @@ from types import FrameType
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
-from numba.core import compiler, registry, sigutils, types
+from numba.core import registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable
 
@@ -47,7 +47,6 @@ _MARKS: Final = tuple(f"from {name} import".encode() for name in (__name__, both
 _Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
 _normalized: Any = sigutils.normalize_signature
 _unliteral: Any = types.unliteral
-_Flags: Any = compiler.Flags
 _FINAL_STEPS: Final = ("_linking_libraries", "_reload_init", "_finalize_dynamic_globals", "_finalized")
 
 
@@ -119,7 +118,6 @@ class _Called(_Dispatcher):  # type: ignore[misc]
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
-        self._compiler._customize_flags = _Alike
         # Called only where no code is kept.
         self._compiler.compile = partial(_compile_announced, self._compiler.compile)
 
@@ -186,37 +184,13 @@ def _left_to_callers(library: Any) -> list[Any]:
     return [library, *needed]
 
 
-class _Alike(_Flags):  # type: ignore[misc]
-    """Flags of a function that are those of all functions here, for what numba compiles on their behalf.
-
-    It keeps what it has compiled (`min` of two numbers) by the caller's flags, which it compares at every
-    operator, all thirty; of these but the ones below reach what is called.
-    """
-
-    __slots__ = ()
-
-    def __hash__(self) -> int:
-        return _HASH
-
-    def __eq__(self, other: object) -> bool:
-        return self is other or (isinstance(other, _Flags) and _inherited(self) == _inherited(other))
-
-
-_HASH: Final = hash(_Flags())
-"""The same of all flags: of their names."""
-
-
-def _inherited(flags: Any) -> tuple[Any, ...]:
-    return flags.nrt, flags.error_model, flags.boundscheck, flags.fastmath
-
-
 class _NoAddress:
     """Tells compiled functions without an address apart."""
 
 
 def _without_address(flags: Any) -> Any:
     flags.no_compile = True
-    return _Alike(flags)
+    return flags
 
 
 class _Guarded(_Called):

@@ -13,6 +13,7 @@ import os
 import re
 import secrets
 import shutil
+import stat
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -69,6 +70,28 @@ def check_file(path: Path, *, apart_from: Path | None = None) -> None:
         if not _is_special(path):
             with draft_folder(_nearest(_target(path).parent)):
                 pass
+
+
+def read_bounded(path: str | Path, *, what: str, most: int, regular: bool = False) -> tuple[bytes, str]:
+    """The bytes of a file, and what is wrong with it: empty, or that it cannot be read or is too large.
+
+    Args: `what`: such as "scene file". `most`: bytes that are still read. `regular`: whether a pipe is
+        refused, which nobody may ever write to.
+    """
+    try:
+        if regular and not stat.S_ISREG(os.stat(path).st_mode):
+            return b"", "this is a folder or a device, not a file"
+        with open(path, "rb") as stream:
+            content = stream.read(most + 1)
+    except FileNotFoundError:
+        return b"", "there is no such file"
+    except IsADirectoryError:
+        return b"", f"this is a folder, not a {what}"
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        return b"", f"the file cannot be read: {reason}"
+    too_large = f"the file is larger than any {what}, which has up to {most // 2**20} MiB"
+    return content, too_large if len(content) > most else ""
 
 
 @contextmanager

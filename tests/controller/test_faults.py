@@ -14,7 +14,6 @@ from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 KINDS = ("target_vector", "trial", "law_based")
@@ -37,40 +36,6 @@ def seen_through(
         return fault(count, Measurement(time=time, amplitude=abs(vibration), phase=phase))
 
     return simulate(changed(scene, "run", time_limit=20.0), model, sensor=sensor)
-
-
-@pytest.mark.parametrize(
-    ("table", "key", "value"),
-    [
-        *(("controller", "proportional", value) for value in (0.0, -0.08e6, math.nan, math.inf)),
-        ("controller", "limit", 0.0),
-        ("controller", "period", -1.0),
-        ("controller", "integral_time", 0.0),
-        ("controller", "derivative_time", -1.0),
-        ("controller", "maximum_gas_time", math.nan),
-        ("rotor", "initial_amplitude", math.nan),
-        ("gas", "pressure", -1.0),
-        ("gas", "valve_lag", math.nan),
-        ("run", "time_limit", math.inf),
-        ("sensor", "phase_noise", -0.1),
-    ],
-)
-def test_settings_without_a_meaning_are_refused(
-    scene: Scene, model: BalancerModel, table: str, key: str, value: float
-) -> None:
-    with pytest.raises(SceneError, match=rf"\[{table}\] {key}"):
-        simulate(changed(scene, table, **{key: value}), model)
-
-
-def test_all_errors_are_reported_at_once(scene: Scene, model: BalancerModel) -> None:
-    with pytest.raises(SceneError) as caught:
-        simulate(changed(scene, "controller", proportional=0.0, limit=-1.0), model)
-    assert len(caught.value.faults) == 2
-
-
-def test_a_period_shorter_than_the_valves_lag_is_refused(scene: Scene, model: BalancerModel) -> None:
-    with pytest.raises(SceneError, match="before the valve has moved"):
-        simulate(changed(scene, "gas", valve_lag=0.6), model)
 
 
 def test_a_limit_below_the_noise_ends_with_the_noise_named(scene: Scene, model: BalancerModel) -> None:

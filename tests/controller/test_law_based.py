@@ -11,14 +11,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from algorithm_steps import Stepped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
+from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.algorithms.law_based import (
     LawBased,
     _gas_time,
+    controller_of,
     fill_for_moment,
     learnt,
     split_change,
@@ -233,8 +235,6 @@ def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
 
 def test_a_scene_can_ask_for_it(scene: Scene, model: BalancerModel) -> None:
     assert isinstance(controller_of(law_based(scene), model), LawBased)
-    with pytest.raises(ValueError, match="needs a model"):
-        controller_of(law_based(scene))
 
 
 @pytest.mark.parametrize("chambers", [2, 4, 6, 8])
@@ -265,7 +265,7 @@ def test_a_lag_that_drives_the_target_vector_apart_is_learnt(
 ) -> None:
     wrong = law_based(scene, assumed_lag_angle=scene.controller.assumed_lag_angle + math.radians(degrees))
     noisy = replace(wrong, sensor=replace(scene.sensor, amplitude_noise=1e-8, phase_noise=0.01))
-    assert simulate(noisy, model, controller=target_vector_of(noisy)).outcome is Outcome.DIVERGING
+    assert simulate(noisy, model, controller=TargetVector(scene=noisy)).outcome is Outcome.DIVERGING
     run = simulate(noisy, model)
     assert run.settled
     assert run.misadjustments <= 1
@@ -283,7 +283,7 @@ def test_a_wrong_coefficient_and_a_wrong_k_are_learnt_together(
     # The algorithm assumes k = 20 where it is 50: 1.56 times too fast.
     tube = replace(scene.tube, drag_coefficient=20.0)
     believed = paper_model(replace(asked, tube=tube))
-    run = simulate(asked, model, controller=law_based_of(asked, believed))
+    run = simulate(asked, model, controller=LawBased(scene=asked, model=believed))
     assert run.settled
     assert len({i.time for i in run.injections}) <= 8
 
@@ -293,10 +293,10 @@ def test_an_empty_belief_does_not_stop_it(scene: Scene, model: BalancerModel) ->
     heavy = replace(scene, rotor=replace(scene.rotor, initial_amplitude=9.5e-6))
     fast = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=25.0)))
     asked = law_based(heavy)
-    assert simulate(asked, model, controller=law_based_of(asked, fast)).settled
+    assert simulate(asked, model, controller=LawBased(scene=asked, model=fast)).settled
     # The same with k believed 15 times too small: empty on paper after a quarter of the way.
     wild = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=2.4)))
-    assert simulate(asked, model, controller=law_based_of(asked, wild)).settled
+    assert simulate(asked, model, controller=LawBased(scene=asked, model=wild)).settled
 
 
 def test_beyond_the_capacity_and_without_pressure_it_says_so(scene: Scene, model: BalancerModel) -> None:
@@ -307,14 +307,15 @@ def test_beyond_the_capacity_and_without_pressure_it_says_so(scene: Scene, model
 
 
 def test_the_step_is_pure(scene: Scene, model: BalancerModel) -> None:
-    algorithm = law_based_of(scene, model)
+    algorithm = Stepped(LawBased(scene=scene, model=model))
     first = Measurement(time=0.0, amplitude=6e-6, phase=1.0)
     once, again = (algorithm.step(algorithm.start(), first) for _ in range(2))
     assert once == again
 
 
 def test_limits_of_the_valves_hold(scene: Scene, model: BalancerModel) -> None:
-    algorithm = replace(law_based_of(scene, model), maximum_gas_time=0.2, minimum_gas_time=0.01)
+    narrow = law_based(scene, maximum_gas_time=0.2, minimum_gas_time=0.01)
+    algorithm = Stepped(LawBased(scene=narrow, model=model))
     _, command = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=9e-6, phase=0.6))
     assert max(valve.duration for valve in command.valves) == 0.2
     _, small = algorithm.step(algorithm.start(), Measurement(time=0.0, amplitude=6e-8, phase=0.6))

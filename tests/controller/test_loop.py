@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from algorithm_steps import Stepped
 from pairs import Passage
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
@@ -152,7 +153,7 @@ def test_a_wrong_lag_angle_is_found_out_and_stopped(scene: Scene, model: Balance
 
 
 def test_a_wrong_sense_of_rotation_is_found_out(scene: Scene, model: BalancerModel) -> None:
-    mirrored = controller_of(scene)
+    mirrored = Stepped(controller_of(scene, model))
 
     class Mirrored:
         rises_tolerated = mirrored.rises_tolerated

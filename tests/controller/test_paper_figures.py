@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.algorithms.by_name import target_vector_of
+from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -90,7 +90,7 @@ def test_the_literal_integral_of_an_amplitude_never_lets_go(scene: Scene, model:
     # With Kc = 0.12 and the paper's Ti the residual turns round once; an integral that cannot fall then
     # pushes for ever, while one that is dropped at the turn settles.
     high = replace(scene, controller=replace(scene.controller, proportional=0.12e6))
-    literal = simulate(high, model, controller=replace(target_vector_of(high), on_reversal="accumulate"))
+    literal = simulate(high, model, controller=TargetVector(scene=high, on_reversal="accumulate"))
     assert not literal.settled
     assert literal.misadjustments > 10
     assert simulate(high, model).settled

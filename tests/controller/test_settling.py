@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pairs import Motion, PairState, opened, pass_time
 
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.loop_factor import (
     LoopFactor,

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from algorithm_steps import Memory, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.built_in import Memory, TargetVector, vector_shares
+from ringbalance.controller.algorithms.built_in import OnReversal, TargetVector, vector_shares
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 
-PID = TargetVector(
-    chambers=4,
-    lag_angle=0.3,
+PAPER = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+SETTINGS = replace(
+    PAPER.controller,
+    assumed_lag_angle=0.3,
     limit=1e-7,
     proportional=1e5,
     integral_time=20.0,
@@ -24,6 +28,15 @@ PID = TargetVector(
     minimum_gas_time=1e-3,
     maximum_gas_time=5.0,
 )
+
+
+def pid(on_reversal: OnReversal = "reset", **settings: Any) -> Stepped:
+    """Four chambers, without offsets."""
+    scene = replace(PAPER, controller=replace(SETTINGS, **settings))
+    return Stepped(TargetVector(scene=scene, on_reversal=on_reversal))
+
+
+PID = pid()
 
 
 def sample(time: float, amplitude: float, phase: float = 0.2) -> Measurement:
@@ -133,7 +146,7 @@ def test_pid_by_hand_with_the_actual_interval() -> None:
 
 
 def test_without_an_integral_time_there_is_no_integral_part() -> None:
-    pd = replace(PID, integral_time=None, derivative_time=0.0)
+    pd = pid(integral_time=None, derivative_time=0.0)
     state, _ = pd.step(pd.start(), sample(0.0, 4e-6))
     _, command = pd.step(state, sample(100.0, 4e-6))
     assert vector_time(command) == pytest.approx(0.4)
@@ -155,22 +168,22 @@ def test_a_short_share_is_not_executed() -> None:
     # 0.4 s at 0.002 rad: the share of B is 0.8 ms, below the valves' 1 ms.
     _, command = PID.step(PID.start(), sample(0.0, 4e-6, phase=-0.298))
     assert gas(command) == pytest.approx({0: 0.4}, rel=1e-5)
-    _, none = replace(PID, minimum_gas_time=1.0).step(PID.start(), sample(0.0, 4e-6))
+    _, none = pid(minimum_gas_time=1.0).step(PID.start(), sample(0.0, 4e-6))
     assert none.valves == ()
     assert none.reason
     assert not none.resting
 
 
 def test_the_integral_is_dropped_when_the_residual_has_turned_round() -> None:
-    accumulating = replace(PID, on_reversal="accumulate")
-    for pid, expected in ((replace(PID, on_reversal="reset"), 0.0), (accumulating, (4e-6 + 1e-6) / 2)):
-        state, _ = pid.step(pid.start(), sample(0.0, 4e-6))
-        state, _ = pid.step(state, sample(1.0, 1e-6, phase=0.2 + math.pi))
+    accumulating = pid("accumulate")
+    for own, expected in ((PID, 0.0), (accumulating, (4e-6 + 1e-6) / 2)):
+        state, _ = own.step(own.start(), sample(0.0, 4e-6))
+        state, _ = own.step(state, sample(1.0, 1e-6, phase=0.2 + math.pi))
         assert integral(state) == pytest.approx(expected)
 
 
 def test_a_falling_amplitude_never_asks_for_negative_gas() -> None:
-    eager = replace(PID, derivative_time=50.0)
+    eager = pid(derivative_time=50.0)
     state, _ = eager.step(eager.start(), sample(0.0, 4e-6))
     _, command = eager.step(state, sample(1.0, 1e-6))
     assert command.valves == ()

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+
+from algorithm_steps import Memory, Stepped
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.built_in import Memory, Trial
+from ringbalance.controller.algorithms.built_in import Trial
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 
-TRIAL = Trial(
-    chambers=4,
-    sequence=(0, 2, 1, 3),
+PAPER = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
+SETTINGS = replace(
+    PAPER.controller,
+    sequence=("A", "C", "B", "D"),
     limit=0.05e-6,
     first_trial=0.05,
     long_step=0.2,
@@ -18,6 +23,7 @@ TRIAL = Trial(
     minimum_gas_time=1e-3,
     maximum_gas_time=5.0,
 )
+TRIAL = Stepped(Trial(scene=replace(PAPER, controller=SETTINGS)))
 
 
 def run(amplitudes: list[float]) -> list[tuple[int, float] | None]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweep import on_paper
 
 import ringbalance as rb
 from ringbalance.controller.balancer import Draws, balancer_of
@@ -182,6 +183,12 @@ def test_bundles_hide_what_a_call_costs_and_leave_work_for_all() -> None:
         size = bundle_size(seconds, count=100_000, workers=4)
         assert size * seconds >= 0.1
     assert bundle_size(1e-3, count=64, workers=4) == 2
+
+
+@pytest.mark.parametrize(("workers", "least"), [(10, 0.95), (100, 0.95), (1000, 0.8)])
+def test_many_workers_wait_little_for_the_process_that_serves_them(workers: int, least: float) -> None:
+    """On paper: 100,000 designs of 0.25 s, 5 ms a call."""
+    assert on_paper(workers, designs=100_000, each=0.25) > least
 
 
 def test_a_map_is_drawn_with_its_boundary(paper_scene: Scene, tmp_path: Path) -> None:

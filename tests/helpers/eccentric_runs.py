@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
-from ringbalance.controller.eccentric_mass.run_facts import StageSpan
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray

@@ -214,7 +214,7 @@ def test_all_errors_of_all_files_are_reported_together(
         ["/one.csv", 'line 11, column "flow_rate [ml/s]" = "x"'],
         ["/one.csv", "line 12"],
         ["/two.csv", 'line 14, column "fill_ratio" = "-0.25"'],
-        ["/three.csv", "the file cannot be read"],
+        ["/three.csv", "there is no such file"],
         ["", "this is a folder, not a file of measurements"],
     ]
 

@@ -31,8 +31,10 @@ _TRAVEL: Final = (-1.0, 0.6)
 """rad, of the two masses."""
 _SHARES: Final = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
 """Of the friction arm that is compensated; as printed the angle stands where the rate belongs."""
-_START: Final = -1.0
+_START: Final = 1.0
 """rad, of a mass from its target."""
+_FAR: Final = 10.0
+"""rad, from which on a mass does not come back."""
 _KNOWN: Final = 0.98
 """Of the friction arm, what is compensated."""
 _CASES: Final = 20_000
@@ -111,9 +113,7 @@ def efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
         natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * _MASS_RATIOS[i])))
         for (name, share), (k, ratio) in itertools.product(_SHARES.items(), enumerate(_SPEED_RATIOS)):
             speed, printed = ratio * natural, name == "printed"
-            found[name][i, j, k] = _positioning_effort(
-                law, arm, share * arm, speed, *_TRAVEL, step, _DURATION, printed
-            )
+            found[name][i, j, k], _ = _move(law, arm, share * arm, speed, *_TRAVEL, step, _DURATION, printed)
     return found
 
 
@@ -123,7 +123,7 @@ def growth(effort: FloatArray) -> FloatArray:
 
 
 @compiled
-def _positioning_effort(
+def _move(
     law: DriveLaw,
     arm: float,
     believed_arm: float,
@@ -133,9 +133,11 @@ def _positioning_effort(
     step: float,
     duration: float,
     printed: bool,
-) -> float:
-    """Integral of the norm of the regulator's torques over a move, N m s, the whirl's loads compensated.
+) -> tuple[float, float]:
+    """Two masses on their ways to their targets, rad, the whirl's loads compensated.
 
+    Returns: Integral of the norm of the regulator's torques, N m s; distance of the first mass from its
+        target in the end, rad, or where it has gone far away.
     Source: Eqs. 40 and 55 of the paper on eccentric masses.
     """
     angle, rate, asked = np.array([-first, -second]), np.zeros(2), np.zeros(2)
@@ -151,7 +153,9 @@ def _positioning_effort(
             rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
             angle[i] += step * rate[i]
         total += step * math.hypot(asked[0], asked[1])
-    return total
+        if abs(angle[0]) > _FAR:
+            break
+    return total, abs(angle[0])
 
 
 @compiled
@@ -187,7 +191,10 @@ def stability(scene: EccentricScene, level: Level, defect: str | None = None) ->
     speed = scene.rotor.speed_profile[0].speed
     decay = _decay(law)
     duration = 25.0 / abs(decay)
-    rest, exact = (_rest(law, arm, share * arm, speed, _STEP[level], duration) for share in (_KNOWN, 1.0))
+    rest, exact = (
+        _move(law, arm, share * arm, speed, _START, 0.0, _STEP[level], duration, False)[1]
+        for share in (_KNOWN, 1.0)
+    )
     friction = law.track.moment * speed**2
     return Evidence(
         found={"rest": Found(value=rest, corrected=exact), "decay": Found(value=decay)},
@@ -204,19 +211,6 @@ def _decay(law: DriveLaw) -> float:
     """Of the slowest pole of (J + J_add) e'' + (C_add + k_d) e' + k_p e = 0, 1/s."""
     polynomial = [law.track.inertia, law.track.damping + law.rate_gain, law.position_gain]
     return -float(np.max(np.roots(polynomial).real))
-
-
-def _rest(law: DriveLaw, arm: float, compensated: float, speed: float, step: float, duration: float) -> float:
-    """Distance from its target of a mass after a move, rad."""
-    angle, rate = _START, 0.0
-    for _ in range(round(duration / step)):
-        torque = regulator_torque(law, angle, rate, 0.0)
-        torque += friction_torque(law, compensated, 0.0, speed, rate, -angle)
-        rate = _later_rate(law, arm, speed, rate, torque - law.track.damping * rate, step)
-        angle += step * rate
-        if abs(angle) > abs(10 * _START):
-            break
-    return abs(angle)
 
 
 def collision(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:

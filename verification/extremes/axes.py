@@ -13,8 +13,8 @@ from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats.qmc import Sobol
 
+from ringbalance.design.sobol import sobol
 from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of
@@ -190,8 +190,7 @@ def designed_set(*, count: int, seed: int) -> tuple[Point, ...]:
 
     Source: Sobol's sequence, scrambled after Owen, as in scipy.stats.qmc.
     """
-    size = 1 << max(count - 1, 0).bit_length()
-    columns = Sobol(2 * len(AXES), rng=seed).random(size)[:count].T
+    columns = sobol(2 * len(AXES), count, seed=seed).T
     values = {
         axis.name: _drawn(axis, share, kind)
         for axis, share, kind in zip(AXES, columns[: len(AXES)], columns[len(AXES) :], strict=True)

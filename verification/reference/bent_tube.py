@@ -28,7 +28,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
@@ -46,8 +45,10 @@ from ringbalance.verification.navier_stokes.newton import (
 from ringbalance.verification.navier_stokes.tube import (
     SectionMesh,
     developed_section,
+    geometric_vertices,
     named_facets,
     on_symmetry,
+    with_midpoints,
 )
 
 # Corner of the section (0 to 3) and end of the slab for each vertex, in scikit-fem's order.
@@ -87,38 +88,26 @@ class SweptTube:
 
 def _stations(*, segments: Sequence[Segment]) -> FloatArray:
     """Arc lengths of all nodes along a path, mid-nodes included. Returns: Shape (2 cells + 1,)."""
-    at = [0.0]
+    vertices = [np.zeros(1)]
     for segment in segments:
-        steps = segment.ratio ** (np.linspace(0, 1, segment.cells) if segment.cells > 1 else np.zeros(1))
-        ends = at[-1] + segment.length * np.cumsum(steps) / steps.sum()
-        middles = (np.concatenate([[at[-1]], ends[:-1]]) + ends) / 2
-        at += np.stack([middles, ends], axis=1).ravel().tolist()
-    return np.array(at)
+        shares = geometric_vertices(cells=segment.cells, ratio=segment.ratio)
+        vertices.append(vertices[-1][-1] + segment.length * shares[1:])
+    return with_midpoints(vertices=np.concatenate(vertices))
 
 
-def _path_points(*, segments: Sequence[Segment], arc_length: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _path_points(*, segments: Sequence[Segment], arc_length: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Points of a path at arc lengths, and its unit tangents there, each of shape (2, n)."""
-    s = np.asarray(arc_length, dtype=np.float64)
-    place, tangent = np.zeros((2, s.size)), np.zeros((2, s.size))
-    start, origin, heading = 0.0, np.zeros(2), 0.0
-    for i, segment in enumerate(segments):
-        last = i == len(segments) - 1
-        inside = (s >= start) if last else (s >= start) & (s < start + segment.length)
-        offset, angle = _along(segment, heading, s[inside] - start)
-        place[:, inside] = origin[:, None] + offset
-        tangent[:, inside] = np.stack([np.cos(angle), np.sin(angle)])
-        origin = origin + _along(segment, heading, np.array([segment.length]))[0][:, 0]
-        start, heading = start + segment.length, heading + segment.turn
-    return place, tangent
-
-
-def _along(segment: Segment, heading: float, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Displacement from the segment's start, and heading."""
-    angle = heading + segment.turn * s / segment.length
-    # Chord of an arc: s sinc(half the turned angle), in the mean of both headings.
-    half = (angle - heading) / 2
-    chord = s * np.sinc(half / np.pi)
-    return np.stack([chord * np.cos(heading + half), chord * np.sin(heading + half)]), angle
+    place, tangent = np.zeros((2, arc_length.size), dtype=np.complex128)
+    start, origin, heading = 0.0, 0j, 0.0
+    for segment in segments:
+        reached = arc_length >= start
+        s = np.append(np.minimum(arc_length[reached] - start, segment.length), segment.length)
+        # Chord of an arc: s sinc(half the turned angle), in the mean of both headings.
+        half = segment.turn * s / segment.length / 2
+        points = origin + s * np.sinc(half / np.pi) * np.exp(1j * (heading + half))
+        place[reached], tangent[reached] = points[:-1], np.exp(1j * (heading + 2 * half[:-1]))
+        start, origin, heading = start + segment.length, points[-1], heading + segment.turn
+    return np.stack([place.real, place.imag]), np.stack([tangent.real, tangent.imag])
 
 
 def _straight_section(section: Any) -> FloatArray:

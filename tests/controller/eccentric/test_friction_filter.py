@@ -63,22 +63,22 @@ def drive(*, arm: float, seed: int, steps: int = 2000, stray: bool = False) -> n
     """The estimate of a mass kept near 0.4 rad/s; `stray` puts the arm into d/d mu once more."""
     random = np.random.default_rng(seed)
     rate = 0.4
-    known: np.void = np.array([(0.4, 0.0, 1e-4, 0.0, 0.02**2)], dtype=FRICTION_FILTER)[0]
+    estimate: np.void = np.array([(0.4, 0.0, 1e-4, 0.0, 0.02**2)], dtype=FRICTION_FILTER)[0]
     for _ in range(steps):
         torque = 0.8 * (0.5 - rate)
         friction = arm * TRACK.moment * (SPEED + rate) ** 2
         rate += STEP / TRACK.inertia * (torque - TRACK.damping * rate - friction)
         seen = rate + 0.01 * random.standard_normal()
         if stray:
-            _printed_step(known, seen, torque)
+            _printed_step(estimate, seen, torque)
         else:
-            friction_step(known, TRACK, NOISE, seen, SPEED, torque, STEP, False)
-    return known
+            friction_step(estimate, TRACK, NOISE, seen, SPEED, torque, STEP, False)
+    return estimate
 
 
-def _printed_step(known: np.void, seen: float, torque: float) -> None:
+def _printed_step(estimate: np.void, seen: float, torque: float) -> None:
     """One step with the printed f_13 = -dt chi (W + w)^2 sgn(w)/r_b, with chi in excess."""
-    rate, arm, p11, p12, p22 = known.tolist()
+    rate, arm, p11, p12, p22 = estimate.tolist()
     later, by_rate, _ = friction_flow(TRACK, rate, arm, SPEED, torque, STEP, False)
     by_arm = -STEP * arm * (SPEED + rate) ** 2 / 0.23
     jacobian = np.array([[by_rate, by_arm], [0.0, 1.0]])
@@ -87,21 +87,23 @@ def _printed_step(known: np.void, seen: float, torque: float) -> None:
     gain = covariance[:, 0] / (covariance[0, 0] + NOISE.rate_variance)
     state = np.array([later, arm]) + gain * (seen - later)
     covariance = covariance - np.outer(gain, covariance[0])
-    known["rate"], known["arm"] = state
-    known["rate_variance"], known["covariance"], known["arm_variance"] = covariance[np.triu_indices(2)]
+    estimate["rate"], estimate["arm"] = state
+    estimate["rate_variance"], estimate["covariance"], estimate["arm_variance"] = covariance[
+        np.triu_indices(2)
+    ]
 
 
 @pytest.mark.parametrize("arm", [0.0, 0.002, 0.01])
 def test_the_arm_is_found_within_what_the_filter_claims(arm: float) -> None:
-    known = drive(arm=arm, seed=1)
-    assert abs(known["arm"] - arm) < 4 * math.sqrt(known["arm_variance"])
-    assert math.sqrt(known["arm_variance"]) < 2e-4
+    estimate = drive(arm=arm, seed=1)
+    assert abs(estimate["arm"] - arm) < 4 * math.sqrt(estimate["arm_variance"])
+    assert math.sqrt(estimate["arm_variance"]) < 2e-4
 
 
 def test_errors_are_as_large_as_the_covariance_says() -> None:
     nees = [
-        (known["arm"] - 0.01) ** 2 / known["arm_variance"]
-        for known in (drive(arm=0.01, seed=seed, steps=400) for seed in range(40))
+        (estimate["arm"] - 0.01) ** 2 / estimate["arm_variance"]
+        for estimate in (drive(arm=0.01, seed=seed, steps=400) for seed in range(40))
     ]
     # The plant has none of the process noise that the filter allows for, so the mean is at most about one.
     assert 0.1 < np.mean(nees) < 1.9
@@ -126,9 +128,9 @@ def test_the_printed_transition_is_not_the_flow() -> None:
 
 
 def test_a_resting_mass_teaches_nothing() -> None:
-    known = np.array([(0.3, 0.01, 1e-4, 1e-6, 1e-6)], dtype=FRICTION_FILTER)[0]
-    friction_restart(known, NOISE, 0.0)
-    assert (known["arm"], known["arm_variance"], known["covariance"]) == (0.01, 1e-6, 0.0)
+    estimate = np.array([(0.3, 0.01, 1e-4, 1e-6, 1e-6)], dtype=FRICTION_FILTER)[0]
+    friction_restart(estimate, NOISE, 0.0)
+    assert (estimate["arm"], estimate["arm_variance"], estimate["covariance"]) == (0.01, 1e-6, 0.0)
 
 
 def test_euler_is_close_for_short_steps_and_unstable_for_long_ones() -> None:

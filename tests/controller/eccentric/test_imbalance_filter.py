@@ -12,7 +12,6 @@ from scipy.linalg import expm
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
     FilterSettings,
     MassInput,
-    Records,
     WhirlModel,
     correct,
     imbalance_deviation,
@@ -23,7 +22,7 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     predict,
     whirl_transition,
 )
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Records
 
 MODEL = WhirlModel(5.36, 10.0, 1000.0)
 SPEED = 100 * math.pi / 30
@@ -66,25 +65,25 @@ def begun(settings: FilterSettings = SETTINGS, speed: float = SPEED) -> Records:
     return imbalance_filter(settings, speed=speed)
 
 
-def matrix(known: Records, name: str) -> FloatArray:
-    return np.asarray(known[name][0])
+def matrix(estimate: Records, name: str) -> FloatArray:
+    return np.asarray(estimate[name][0])
 
 
 def record(
     *, steps: int, seed: int, settings: FilterSettings, prior: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """States and samples drawn from the filter's own model; from its prior when asked."""
-    random, known = np.random.default_rng(seed), begun(settings)
+    random, estimate = np.random.default_rng(seed), begun(settings)
     state = np.concatenate([np.zeros(4), TRUE])
     if prior:
-        state = random.multivariate_normal(np.zeros(6), matrix(known, "covariance"))
+        state = random.multivariate_normal(np.zeros(6), matrix(estimate, "covariance"))
     states, samples = np.zeros((steps, 6)), np.zeros((steps, 4))
     for i in range(steps):
         noisy = settings.acceleration_noise > 0
-        push = random.multivariate_normal(np.zeros(6), matrix(known, "process")) if noisy else 0.0
-        state = matrix(known, "transition") @ state + push
+        push = random.multivariate_normal(np.zeros(6), matrix(estimate, "process")) if noisy else 0.0
+        state = matrix(estimate, "transition") @ state + push
         states[i] = state
-        samples[i] = matrix(known, "observation") @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
+        samples[i] = matrix(estimate, "observation") @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
     return states, samples
 
 
@@ -134,14 +133,14 @@ def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
 
 def test_covariance_history_is_the_information_filters() -> None:
     """Sums of inverses in place of gains: another arithmetic for the same numbers."""
-    known = begun()
+    estimate = begun()
     _, samples = record(steps=60, seed=1, settings=SETTINGS)
-    states, covariances = imbalance_history(known, samples=samples, variance=VARIANCE)
-    transition, observation = matrix(known, "transition"), matrix(known, "observation")
-    state, covariance = matrix(known, "state"), matrix(known, "covariance")
+    states, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
+    transition, observation = matrix(estimate, "transition"), matrix(estimate, "observation")
+    state, covariance = matrix(estimate, "state"), matrix(estimate, "covariance")
     for i in range(60):
         state = transition @ state
-        covariance = transition @ covariance @ transition.T + matrix(known, "process")
+        covariance = transition @ covariance @ transition.T + matrix(estimate, "process")
         information = np.linalg.inv(covariance)
         seen = information + observation.T @ (observation / VARIANCE[:, None])
         covariance = np.linalg.inv(seen)
@@ -152,11 +151,11 @@ def test_covariance_history_is_the_information_filters() -> None:
 
 def test_last_estimate_is_the_batch_least_squares_solution() -> None:
     """Without process noise all samples hang on the first state: one weighted least-squares problem."""
-    known = begun(QUIET)
+    estimate = begun(QUIET)
     _, samples = record(steps=300, seed=2, settings=QUIET)
-    states, covariances = imbalance_history(known, samples=samples, variance=VARIANCE)
-    transition, observation = matrix(known, "transition"), matrix(known, "observation")
-    rows, power = [np.diag(1 / np.sqrt(np.diag(matrix(known, "covariance"))))], np.eye(6)
+    states, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
+    transition, observation = matrix(estimate, "transition"), matrix(estimate, "observation")
+    rows, power = [np.diag(1 / np.sqrt(np.diag(matrix(estimate, "covariance"))))], np.eye(6)
     sides = [np.zeros(6)]
     for sample in samples:
         power = transition @ power
@@ -183,11 +182,11 @@ def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
 
 
 def test_josephs_form_stays_symmetric_and_positive() -> None:
-    known = begun(QUIET)
+    estimate = begun(QUIET)
     for _ in range(200):
-        predict(known[0], locked_masses(0.0j))
-        correct(known[0], np.zeros(4), np.full(4, 1e-14))
-        covariance = matrix(known, "covariance")
+        predict(estimate[0], locked_masses(0.0j))
+        correct(estimate[0], np.zeros(4), np.full(4, 1e-14))
+        covariance = matrix(estimate, "covariance")
         assert np.array_equal(covariance, covariance.T)
         assert np.min(np.linalg.eigvalsh(covariance)) >= 0
 
@@ -200,8 +199,8 @@ def test_both_frames_know_the_imbalance() -> None:
     seen = v + 1j * SPEED * z
     outside = np.column_stack([z.real, z.imag, seen.real, seen.imag])
     for laboratory, samples in ((False, states[:, :4] + noise), (True, outside + noise)):
-        known = begun(SETTINGS._replace(laboratory=laboratory))
-        found, covariances = imbalance_history(known, samples=samples, variance=VARIANCE)
+        estimate = begun(SETTINGS._replace(laboratory=laboratory))
+        found, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
         error = np.hypot(*(found[-1, 4:] - TRUE))
         assert error < 4 * imbalance_deviation(covariances[-1])
         assert error < 2e-3 * np.hypot(*TRUE)
@@ -209,14 +208,14 @@ def test_both_frames_know_the_imbalance() -> None:
 
 def test_masses_that_are_not_opposite_are_taken_out() -> None:
     place, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
-    own, known = np.array([place.real, place.imag]), begun(QUIET)
+    own, estimate = np.array([place.real, place.imag]), begun(QUIET)
     state, samples = np.concatenate([np.zeros(4), TRUE + own]), []
     for _ in range(3000):
-        state = matrix(known, "transition") @ state
+        state = matrix(estimate, "transition") @ state
         samples.append(state[:4].copy())
     for given, expected in ((place, TRUE), (0.0j, TRUE + own)):
         found, _ = imbalance_history(
-            known, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(given)
+            estimate, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(given)
         )
         np.testing.assert_allclose(found[-1, 4:], expected, rtol=1e-3)
 
@@ -240,7 +239,7 @@ def test_moving_masses_are_taken_out() -> None:
     run = solve_ivp(slope, (0, 3), [0j, 0j], t_eval=time, rtol=1e-10, atol=1e-13, method="DOP853")
     back = np.exp(-1j * SPEED * time)
     z, v = run.y[0] * back, (run.y[1] - 1j * SPEED * run.y[0]) * back
-    known = begun(QUIET)
+    estimate = begun(QUIET)
     before = mass_vector(moment, *angles(0.0))
     for i in range(1, time.size):
         now = mass_vector(moment, *angles(float(time[i])))
@@ -249,11 +248,11 @@ def test_moving_masses_are_taken_out() -> None:
         masses = MassInput(p + damped * pace, pace * STEP / MODEL.mass, (0.0, 0.0, 0.0), 0.0)
         seen = v[i] + now[1] / MODEL.mass
         sample = np.array([z[i].real, z[i].imag, seen.real, seen.imag])
-        predict(known[0], masses)
-        correct(known[0], sample, 1e-4 * VARIANCE)
+        predict(estimate[0], masses)
+        correct(estimate[0], sample, 1e-4 * VARIANCE)
         before = now
     # Of second order in the step: (3 rad/s * 1 ms)^2 of 0.04 kg m at most.
-    np.testing.assert_allclose(known["state"][0, 4:], TRUE, atol=4e-7)
+    np.testing.assert_allclose(estimate["state"][0, 4:], TRUE, atol=4e-7)
 
 
 def test_a_resting_rotor_is_refused() -> None:
@@ -262,12 +261,12 @@ def test_a_resting_rotor_is_refused() -> None:
 
 
 def test_a_sample_that_is_not_a_number_is_passed_over() -> None:
-    known = begun()
-    predict(known[0], locked_masses(0.0j))
-    before = known.copy()
-    assert correct(known[0], np.full(4, np.nan), VARIANCE) == 0.0
-    np.testing.assert_array_equal(known["state"], before["state"])
-    np.testing.assert_array_equal(known["covariance"], before["covariance"])
+    estimate = begun()
+    predict(estimate[0], locked_masses(0.0j))
+    before = estimate.copy()
+    assert correct(estimate[0], np.full(4, np.nan), VARIANCE) == 0.0
+    np.testing.assert_array_equal(estimate["state"], before["state"])
+    np.testing.assert_array_equal(estimate["covariance"], before["covariance"])
 
 
 def test_the_printed_observation_lets_the_imbalance_into_the_velocity() -> None:
@@ -275,20 +274,20 @@ def test_the_printed_observation_lets_the_imbalance_into_the_velocity() -> None:
     _, samples = record(steps=4000, seed=5, settings=QUIET)
     right, printed = begun(), begun()
     printed["observation"][0, 3, 4:] = 1.0
-    for known, good in ((right, True), (printed, False)):
-        found, _ = imbalance_history(known, samples=samples, variance=VARIANCE)
+    for estimate, good in ((right, True), (printed, False)):
+        found, _ = imbalance_history(estimate, samples=samples, variance=VARIANCE)
         error = np.hypot(*(found[-1, 4:] - TRUE)) / np.hypot(*TRUE)
         assert (error < 0.01) == good
 
 
 def test_the_printed_process_noise_is_no_covariance() -> None:
     """diag(O randn) with normal numbers is negative half of the time, and takes the covariance along."""
-    random, known, lowest = np.random.default_rng(0), begun(), 0.0
+    random, estimate, lowest = np.random.default_rng(0), begun(), 0.0
     for _ in range(200):
-        known["process"][0] = np.diag(1e-6 * random.standard_normal(6))
-        predict(known[0], locked_masses(0.0j))
-        correct(known[0], np.zeros(4), VARIANCE)
-        covariance = matrix(known, "covariance")
+        estimate["process"][0] = np.diag(1e-6 * random.standard_normal(6))
+        predict(estimate[0], locked_masses(0.0j))
+        correct(estimate[0], np.zeros(4), VARIANCE)
+        covariance = matrix(estimate, "covariance")
         lowest = min(lowest, float(np.min(np.linalg.eigvalsh(covariance))))
         if not np.all(np.isfinite(covariance)):
             break

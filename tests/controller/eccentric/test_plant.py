@@ -15,7 +15,6 @@ from ringbalance.controller.eccentric_mass import integration
 from ringbalance.controller.eccentric_mass.plant import (
     LOCKED,
     SLIDING,
-    STUCK,
     PlantParameters,
     drive_of,
     electrical_energy,
@@ -230,15 +229,3 @@ def test_speed_profile(paper: EccentricScene) -> None:
     late = np.array([2.0, 4.0]), np.array([3.0, 5.0])
     assert turned(*late, 1.0) == pytest.approx(3.0)
     assert turned(*late, 3.0) == pytest.approx(6.0 + 3.5)
-
-
-def test_python_and_compiled_agree(parameters: PlantParameters) -> None:
-    """The plain functions do the same to the last digits."""
-    state, stuck = rest_state(ANGLES), stuck_flags(STUCK)
-    command = np.array([2.0, -0.3])
-    for place in range(20):
-        given = (parameters, state, stuck, command, 12.0 + 0.01 * place, 2.0, 1e-2)
-        plain_state, plain_stuck = integration.plant_step.py_func(*given)  # type: ignore[attr-defined]
-        state, stuck = integration.plant_step(*given)
-        np.testing.assert_allclose(plain_state, state, rtol=1e-11, atol=1e-13)
-        np.testing.assert_array_equal(plain_stuck, stuck)

@@ -13,7 +13,7 @@ from ringbalance.controller.balancer import Outcomes, settles_within
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.ranking import first_order_index, ranked
 from ringbalance.controller.liquid_ring.devices import CAVITY, LOSS, PHASE
-from ringbalance.controller.liquid_ring.remedies import drawn_input
+from ringbalance.controller.liquid_ring.offers import drawn_input
 from ringbalance.controller.trials import DrawnInput
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles

@@ -13,7 +13,7 @@ import pytest
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
 from ringbalance.controller.judging.judge import Judgement, judged, judged_all
 from ringbalance.controller.judging.remedies import Remedied, amplitude_reached, tried_choices, tried_remedies
-from ringbalance.controller.liquid_ring.remedies import remedies_of
+from ringbalance.controller.liquid_ring.offers import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.loader import bundled_scene, load_scene

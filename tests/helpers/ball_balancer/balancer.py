@@ -23,7 +23,7 @@ from ringbalance.controller.balancer import (
     Settings,
 )
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.trials import Trials, scaled
+from ringbalance.controller.trials import Axis, Trials, rounded
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
@@ -128,8 +128,12 @@ class BallBalancer(Balancer):
 
     def trials(self) -> tuple[Trials, ...]:
         """The drag between its bounds."""
-        drag = {each.path: each.value for each in self.settings()}
-        return (scaled("drag", drag, tuple(np.geomspace(1 / 30, 30, 9).tolist()), first=(0, 2, 4, 6, 8)),)
+        drag = Axis(
+            name="balls.drag", levels=tuple(np.geomspace(1 / 30, 30, 9).tolist()), first=(0, 2, 4, 6, 8)
+        )
+        value = self.scene.balls.drag
+        settings = lambda point: {drag.name: rounded(point[drag.name] * value)}  # noqa: E731
+        return (Trials(kind="drag", axes=(drag,), settings=settings),)
 
     def remedies(self) -> tuple[Remedy, ...]:
         """More oil."""

@@ -80,9 +80,9 @@ def test_damage_is_an_error_of_the_scene(name: str, tmp_path: Path) -> None:
 
 def test_a_pipe_a_folder_and_no_file(tmp_path: Path) -> None:
     (tmp_path / "chamber.msh").mkdir()
-    with pytest.raises(SceneError, match="cannot be read"):
+    with pytest.raises(SceneError, match="a folder or a device"):
         loaded_again(tmp_path, "chamber.msh")
-    with pytest.raises(SceneError, match="there is no file"):
+    with pytest.raises(SceneError, match="there is no such file"):
         loaded_again(tmp_path, "chambers.msh")
 
 

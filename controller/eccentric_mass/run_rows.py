@@ -1,0 +1,190 @@
+"""A run with two eccentric masses as a JSON document, as a table of its history, and for a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import RunResult
+from ringbalance.controller.document import amplitude_line
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.results.numbers import given
+from ringbalance.results.result import Rows, Table
+from ringbalance.results.rows import Quantity, around
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.uncertain import NORMAL_95
+
+_MOST_ROWS: Final = 2500
+"""Instants in the document; a run has a hundred times as many."""
+
+
+def eccentric_document(run: EccentricRun) -> dict[str, Any]:
+    """Turn a run into plain numbers, lists and text, all in SI.
+
+    Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
+    the largest vibration among them.
+    Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
+    """
+    kept = _thinned(run)
+    return {
+        "balancer": run.balancer,
+        "scene": {"name": run.scene.name, "source": run.scene.source, "sha256": run.scene.sha256},
+        "settled": run.settled,
+        "settling_time_s": run.settling_time,
+        "outcome": run.outcome.value,
+        "status": run.status,
+        "warnings": list(run.warnings),
+        "innovation": run.innovation,
+        "limit_m": run.limit,
+        "residual_ratio": run.residual_ratio,
+        "final_amplitude_m": run.final_amplitude,
+        "worst_amplitude_m": run.worst_amplitude,
+        "energy_J": run.electrical_energy,
+        "peak_voltage_V": float(np.abs(run.voltage).max()),
+        "stages": [{"name": s.name, "start_s": s.start, "end_s": s.end} for s in run.stages],
+        "targets": None if run.targets is None else _targets(run),
+        "time_s": run.time[kept].tolist(),
+        "speed_rad_s": run.speed[kept].tolist(),
+        "amplitude_m": run.amplitude[kept].tolist(),
+        "phase_rad": run.phase[kept].tolist(),
+        "mass_angle_rad": run.mass_angle[:, kept].tolist(),
+        "goal_rad": run.goal[:, kept].tolist(),
+        "voltage_V": run.voltage[:, kept].tolist(),
+        "drive_off": run.drive_off[kept].tolist(),
+        "estimates": {
+            "imbalance_kg_m": run.history["imbalance"][kept].T.tolist(),
+            "imbalance_covariance": run.history["imbalance_covariance"][kept].tolist(),
+            "imbalance_rotor_covariance": run.rotor_covariance.tolist(),
+            "imbalance_half_width_kg_m": (NORMAL_95 * np.sqrt(np.diag(run.imbalance_covariance))).tolist(),
+            "friction_arm_m": run.history["friction_arm"][kept].T.tolist(),
+            "friction_variance": run.history["friction_variance"][kept].T.tolist(),
+        },
+        **run.rows().document(),
+    }
+
+
+def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
+    """Every sample of a run by name of its column: rotor-fixed vectors, angles not wrapped."""
+    history = run.history
+    stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
+    columns: dict[str, FloatArray] = {
+        "time_s": run.time,
+        "speed_rad_s": run.speed,
+        "whirl_x_m": run.whirl.real,
+        "whirl_y_m": run.whirl.imag,
+        "amplitude_m": run.amplitude,
+        "phase_rad": run.phase,
+        **_each("mass_angle_{}_rad", run.mass_angle),
+        **_each("mass_rate_{}_rad_s", run.mass_rate),
+        **_each("goal_{}_rad", run.goal),
+        **_each("voltage_{}_V", run.voltage),
+        "energy_J": run.history["energy"],
+        "imbalance_x_kg_m": history["imbalance"][:, 0],
+        "imbalance_y_kg_m": history["imbalance"][:, 1],
+        "imbalance_variance_xx_kg2_m2": history["imbalance_covariance"][:, 0, 0],
+        "imbalance_variance_xy_kg2_m2": history["imbalance_covariance"][:, 0, 1],
+        "imbalance_variance_yy_kg2_m2": history["imbalance_covariance"][:, 1, 1],
+        **_each("friction_arm_{}_m", history["friction_arm"].T),
+        **_each("friction_variance_{}_m2", history["friction_variance"].T),
+    }
+    return {
+        **{name: values.tolist() for name, values in columns.items()},
+        "drive_off": run.drive_off.astype(int).tolist(),
+        "stage": [run.stages[place].name for place in stages],
+    }
+
+
+def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
+    return {name.format(mass): row for mass, row in enumerate(values, start=1)}
+
+
+def _thinned(run: EccentricRun) -> IntArray:
+    """Numbers of samples to show: equally spaced, with the stages' edges and the largest vibration."""
+    last = run.time.size - 1
+    even = np.linspace(0, last, min(_MOST_ROWS, run.time.size)).round().astype(np.int64)
+    edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])
+    extra = np.array([int(np.argmax(run.amplitude)), last], dtype=np.int64)
+    return np.unique(np.concatenate([even, np.minimum(edges, last), extra]))
+
+
+def _targets(run: EccentricRun) -> dict[str, Any]:
+    found = {} if run.targets is None else run.targets._asdict()
+    return {
+        "angle_rad": [found["first"], found["second"]],
+        "half_angle_rad": found["half_angle"],
+        "residual_kg_m": found["residual"],
+        "saturated": bool(found["saturated"]),
+    }
+
+
+def eccentric_rows(run: EccentricRun) -> Rows:
+    """Quantities, findings and stages of the run."""
+    at = np.searchsorted(run.time, [stage.end for stage in run.stages])
+    stages = [
+        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
+        for stage, amplitude in zip(run.stages, run.amplitude[at], strict=True)
+    ]
+    return Rows(
+        title=f"Run of {run.scene.name} ({run.scene.source}), eccentric masses",
+        quantities=tuple(_quantities(run)),
+        findings=(run.ended, *run.warned),
+        facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
+        tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
+    )
+
+
+def _quantities(run: EccentricRun) -> Iterator[Quantity]:
+    x, y = (float(each) for each in run.history["imbalance"][-1])
+    width = NORMAL_95 * math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
+    size = math.hypot(x, y)
+    rows: list[tuple[str, str, str, float | None, float]] = [
+        ("settling_time", "settling time", "s", run.settling_time, 0.0),
+        ("final_amplitude", "amplitude at the end", "m", run.final_amplitude, 0.0),
+        ("worst_amplitude", "amplitude at worst", "m", run.worst_amplitude, 0.0),
+        ("limit", "limit", "m", run.limit, 0.0),
+        ("residual_ratio", "of the vibration without balancing", "1", run.residual_ratio, 0.0),
+        ("imbalance", "imbalance", "kg m", size, width),
+        ("imbalance_angle", "angle of the imbalance", "rad", math.atan2(y, x) % math.tau, 0.0),
+        ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
+    ]
+    for number, arm in enumerate(run.history["friction_arm"][-1], start=1):
+        wide = NORMAL_95 * math.sqrt(run.history["friction_variance"][-1][number - 1])
+        rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), wide))
+    for number, angle in enumerate(run.mass_angle[:, -1], start=1):
+        place = float(angle) % math.tau
+        rows.append((f"mass_angle_{number}", f"mass {number} at", "rad", place, 0.0))
+    for key, name, unit, value, half in rows:
+        low, high = (None, None) if value is None else around(value, half)
+        origin = "given" if key == "limit" else "simulated"
+        yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)
+
+
+_INSTANTS = 600
+
+
+def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
+    """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
+    one, so that no peak is lost.
+
+    Args: `end`: of the times, s. Returns: For JSON, SI; a run that ended before has its last value.
+    """
+    time = np.linspace(0.0, end, _INSTANTS)
+    peaks = np.array([_peaks(run.run, time) for run in runs])
+    low, middle, high = (row.tolist() for row in np.quantile(peaks, [0.0, 0.5, 1.0], axis=0))
+    return {
+        "time_s": time.tolist(),
+        "low_m": low,
+        "middle_m": middle,
+        "high_m": high,
+        "runs": len(runs),
+        "settled": sum(each.settled for each in runs),
+    }
+
+
+def _peaks(run: Any, time: Any) -> Any:
+    edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
+    since = np.concatenate([edges[:1], edges[:-1]])
+    return [float(run.amplitude[a : max(b, a) + 1].max()) for a, b in zip(since, edges, strict=True)]

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from ringbalance.verification.extremes.study import Extremes as Extremes
     from ringbalance.verification.trade import TradeStudy as TradeStudy
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # The balancers, each one line; a third is one more.
 register(

@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance import cli, streams
+from ringbalance import __version__, cli, streams
 from ringbalance.scene import Fault, SceneError, bundled_scene
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
@@ -235,7 +235,8 @@ def test_a_fault_of_the_program_is_not_hidden(command: Callable[[BaseException |
 
 def test_the_package_runs_as_a_module() -> None:
     command = [sys.executable, "-m", "ringbalance", "--version"]
-    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "0.1.0"
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert printed.strip() == __version__
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from ringbalance.export.fmu import fmu_bytes
 from ringbalance.export.grid import csv_files
 from ringbalance.export.hosts import c_files, identifier, python_files, st_files
 from ringbalance.export.libraries import EXTRA, Version
-from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
@@ -91,7 +91,7 @@ def _made(scene: Scene, block: Kind) -> tuple[Block, CompactLaw | None]:
     if block == "controller":
         return controller_block(scene), None
     with activity("export", "calibrating ..."):
-        law = calibrate(scene).flow_law
+        law = chamber_and_law(scene)[1]
         compact = compact_law(scene=scene, law=law)
     return law_block(compact) if block == "law" else disc_block(scene, law, compact), compact
 

@@ -64,13 +64,13 @@ def smaller(a: float, b: float) -> float:
 def knot_before(c: Law, table: int, x: float) -> int:
     """Place of the first knot of the piece that holds x, or of the nearest piece."""
     low = int(c[table])
-    high = low + int(c[table + 1]) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if x < c[middle]:
-            high = middle
-        else:
-            low = middle
+    count = int(c[table + 1]) - 1
+    while count > 1:
+        half = count // 2
+        # Without a branch to guess wrong, where a compiler moves by condition.
+        if x >= c[low + half]:
+            low = low + half
+        count = count - half
     return low
 
 
@@ -231,20 +231,15 @@ def width_of(c: Law, w: Query, at: int, driven: float, gas: float, levels: float
     blown = w[UP_GAS] - w[DOWN_GAS]
     if at == BROKEN:
         blown = w[UP_GAS]
+    square = w[UP_WIDTH] * w[UP_WIDTH] + w[DOWN_WIDTH] * w[DOWN_WIDTH] + crest * crest
+    part = c[OF_DENSITY] * gas
+    square = square + part * part
+    part = c[OF_SPEED] * 2.0 * levels
+    square = square + part * part
+    part = c[OF_GAS] * blown
+    square = square + part * part
     loss = w[at + LOSS]
-    square = loss * loss
-    part = w[UP_WIDTH] / pressure
-    square = square + part * part
-    part = w[DOWN_WIDTH] / pressure
-    square = square + part * part
-    part = c[OF_DENSITY] * gas / pressure
-    square = square + part * part
-    part = c[OF_SPEED] * 2.0 * levels / pressure
-    square = square + part * part
-    part = c[OF_GAS] * blown / pressure
-    square = square + part * part
-    part = crest / pressure
-    return w[at] * w[at + EXPONENT] * sqrt(square + part * part)
+    return w[at] * w[at + EXPONENT] * sqrt(loss * loss + square / (pressure * pressure))
 
 
 def undecided(c: Law, w: Query, share_at: int, held: float, spread: float) -> bool:

@@ -48,7 +48,17 @@ _EXAMPLE: Final = '# vibration = "zero-to-peak"'
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class InfluenceTable:
-    """Vibration per unbalance over speed, in one plane."""
+    """Vibration per unbalance over speed, in one plane.
+
+    Example:
+        >>> lines = ['# vibration = "zero-to-peak"', '# angle = "lag"']
+        >>> lines += ["speed [rpm],amplitude [um/(g*mm)],angle [deg]", "5000,0.0191,4.1"]
+        >>> lines += ["6000,0.0312,8.9", "7000,0.0518,31.0", "8000,0.0367,140.2"]
+        >>> characters = Path("influence.csv").write_text("\\n".join(lines))
+        >>> table: rb.InfluenceTable = rb.read_influence("influence.csv")
+        >>> "rotor.lag_angle" in table.rotor(6500 * math.pi / 30)
+        True
+    """
 
     source: str
     speed: FloatArray
@@ -91,6 +101,15 @@ def read_influence(path: Path | str) -> InfluenceTable:
     part) or "exp(-jwt)". Columns carry their units: `speed [rpm]`, `amplitude [um/(g*mm)]`, `angle [deg]`.
 
     Raises: SceneError: every error of the file.
+
+    Example:
+        >>> lines = ['# vibration = "zero-to-peak"', '# angle = "lag"']
+        >>> lines += ["speed [rpm],amplitude [um/(g*mm)],angle [deg]", "5000,0.0191,4.1"]
+        >>> lines += ["6000,0.0312,8.9", "7000,0.0518,31.0", "8000,0.0367,140.2"]
+        >>> characters = Path("influence.csv").write_text("\\n".join(lines))
+        >>> table = rb.read_influence("influence.csv")
+        >>> sorted(table.rotor(6500 * math.pi / 30))
+        ['rotor.influence_coefficient', 'rotor.lag_angle']
     """
     file = file_name(Path(path))
     content, faults = read_content(Path(path))

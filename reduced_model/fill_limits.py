@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import liquid_area
 from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Disc, Scene
 
 NEARLY_EMPTY: Final = 1e-6
 """Share of a pair's liquid with which a chamber's last liquid is looked at."""
@@ -32,9 +32,8 @@ Drawn = Callable[[IntArray, FloatArray], FloatArray]
 """Fill down to which the flow at a fill draws gas, of some rows."""
 
 
-def _fill_at(scene: Scene, radius: npt.ArrayLike) -> FloatArray:
+def _fill_at(disc: Disc, radius: npt.ArrayLike) -> FloatArray:
     """Fill ratio whose surface lies at a radius, or nearest to it."""
-    disc = scene.disc
     level = np.clip(radius, disc.inner_radius, disc.outer_radius)
     whole = liquid_area(disc=disc, surface_radius=disc.inner_radius)
     return np.clip(liquid_area(disc=disc, surface_radius=level) / whole, 0.0, 1.0)
@@ -43,7 +42,7 @@ def _fill_at(scene: Scene, radius: npt.ArrayLike) -> FloatArray:
 def drawn_fill(scene: Scene, *, flow_rate: FloatArray, factor: npt.ArrayLike = 1.0) -> FloatArray:
     """Fill at which the layer over the port is as deep as `port_depth` for a flow, with a factor on that."""
     depth = np.asarray(factor) * port_depth(scene, flow_rate=flow_rate)
-    return np.minimum(_fill_at(scene, scene.tube.port_radius - depth), scene.disc.max_fill_ratio)
+    return np.minimum(_fill_at(scene.disc, scene.tube.port_radius - depth), scene.disc.max_fill_ratio)
 
 
 def first_gas(scene: Scene, drawn: Drawn, *, top: FloatArray, about: Drawn | None = None) -> FloatArray:
@@ -55,7 +54,7 @@ def first_gas(scene: Scene, drawn: Drawn, *, top: FloatArray, about: Drawn | Non
     Returns: x from 0 (no gas before the chamber is empty, or no flow) to `top` (gas at any fill).
     """
     # Above, the opposite chamber leaves its port open, and its gas over the crest lets less liquid flow.
-    covered = top - _fill_at(scene, scene.tube.port_radius)
+    covered = top - _fill_at(scene.disc, scene.tube.port_radius)
     covered = np.where(covered < top, covered * (1 - _ROUNDING), top)
     start = top if about is None else _fixed_point(about, top, covered, start=top)
     x = _fixed_point(drawn, top, covered, start=start)

@@ -109,13 +109,6 @@ def _holds(model: BalancerModel) -> bool:
     return not isinstance(law, CalibratedLaw | PaperLaw) or law.holds(law.max_fill_ratio / 2)
 
 
-def _vibration(scene: Scene, model: BalancerModel, moved: float) -> float:
-    """By which a fill ratio that has moved between equal fills changes the vibration, m."""
-    fill = model.flow.max_fill_ratio / 2
-    moment = model.moment.pair_moment(fill_ratio=fill - moved, opposite_fill_ratio=fill + moved)
-    return abs(float(moment)) * scene.rotor.influence_coefficient
-
-
 def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
     line, limit, holds = end.line, scene.controller.limit, _holds(model)
     volume = (1 - model.flow.max_fill_ratio / 2) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
@@ -124,7 +117,9 @@ def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
     if injections is not None and injections.shortest is not None:
         opening = max(injections.shortest, end.valve_lag)
         moved = injections.moved(opening)
-        correction = _vibration(scene, model, moved)
+        fill = model.flow.max_fill_ratio / 2
+        moment = model.moment.pair_moment(fill_ratio=fill - moved, opposite_fill_ratio=fill + moved)
+        correction = abs(float(moment)) * scene.rotor.influence_coefficient
         # Under extreme laws the shortest injection may move nothing: then no vibration belongs to a way.
         if correction > 0:
             dead = injections.dead_time(limit * moved / correction)

@@ -17,8 +17,8 @@ from ringbalance.scene.platform.terminal import activity, print_message, since_s
 from ringbalance.verification.evidence import Level
 
 DONE: Final = 0
-NOT_SOUND: Final = 1
-MOST_WORKERS: Final = 2
+_NOT_SOUND: Final = 1
+_MOST_WORKERS: Final = 2
 
 
 def report(
@@ -47,7 +47,7 @@ def report(
         OSError: the folder cannot be written.
     """
     told, text = read_scene(scene)
-    workers = min(MOST_WORKERS, os.cpu_count() or 1)
+    workers = min(_MOST_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
         finished = write_report(
             with_tolerance(told, tolerance=tolerance, models=models),
@@ -61,7 +61,7 @@ def report(
         print_message(line)
     print_message(f"took {since_start():.0f} s")
     print(finished.page)
-    return DONE if finished.sound else NOT_SOUND
+    return DONE if finished.sound else _NOT_SOUND
 
 
 def _load() -> bool:
@@ -89,7 +89,7 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
     if not pictures["drawn"]:
         print_message(pictures["text"])
     print(out)
-    return DONE if pictures["drawn"] else NOT_SOUND
+    return DONE if pictures["drawn"] else _NOT_SOUND
 
 
 def draw_pictures(
@@ -100,12 +100,6 @@ def draw_pictures(
     Returns: `drawn`, and `text` with the reason where this machine cannot draw.
     Raises: OSError: the folder cannot be written.
     """
-    with staged(out, folders=process.FOLDERS) as stage:
-        fields = process.write_fields(scene=scene, folder=stage)
-        drawing = process.start_drawing(scene=scene, fields=fields, folder=stage)
-        try:
-            progress("pictures")
-            pictures: dict[str, Any] = drawing.finish()
-        finally:
-            drawing.stop()
-    return pictures
+    with staged(out, folders=process.FOLDERS) as stage, process.drawn(scene, stage) as pictures:
+        progress("pictures")
+        return pictures()

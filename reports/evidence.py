@@ -54,7 +54,7 @@ Progress = Callable[[str], None]
 FORMAT: Final = 1
 _TRACED: Final = 16
 """Drawn devices of the band of their vibration, the first of the verdict's."""
-LAW_POINTS: Final = 51
+_LAW_POINTS: Final = 51
 """Fill ratios at which the flow law is drawn."""
 
 
@@ -217,7 +217,7 @@ def _flow_law(scene: Scene, calibration: Calibration) -> Record:
     """Both laws over the fill, at the pressures of Fig. 4, or at the scene's own and at twice that."""
     drawn = [papers.LOW_PRESSURE, papers.HIGH_PRESSURE]
     pressures = drawn if scene.gas.pressure in drawn else [scene.gas.pressure, 2 * scene.gas.pressure]
-    fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
+    fill = np.linspace(0.0, scene.disc.max_fill_ratio, _LAW_POINTS)
 
     found, printed = (
         law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])

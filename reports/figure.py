@@ -355,7 +355,7 @@ def draw(
         _in_unit(axes.xaxis, axes.get_xlim(), x)
         _in_unit(axes.yaxis, axes.get_ylim(), y)
         if columns:
-            legend_above(axes, columns=columns)
+            _legend_above(axes, columns=columns)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return Drawing(name=name, svg=_to_page(buffer.getvalue(), name), wide=wide)
@@ -403,7 +403,7 @@ def figure_of(axes: Axes) -> Figure:
     return cast(Figure, axes.get_figure())
 
 
-def legend_above(axes: Axes, *, columns: int) -> None:
+def _legend_above(axes: Axes, *, columns: int) -> None:
     """Puts the legend above the axes, in columns that fit, and gives these the height left; call it last."""
     figure = figure_of(axes)
     handles, labels = axes.get_legend_handles_labels()

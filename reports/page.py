@@ -51,13 +51,13 @@ from ringbalance.results.numbers import (
 )
 from ringbalance.scene.describe import usual_name
 
-Facts = tuple[tuple[str, str], ...]
+_Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
 
-ANNEX: Final = "annex.html"
+_ANNEX: Final = "annex.html"
 DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
     {
-        ANNEX: {
+        _ANNEX: {
             "place": "annex",
             "kind": "Annex",
             "other": {"file": "report.html", "title": "The report"},
@@ -65,7 +65,7 @@ DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
         "report.html": {
             "place": "report",
             "kind": "Design report",
-            "other": {"file": ANNEX, "title": "Annex: evidence and details"},
+            "other": {"file": _ANNEX, "title": "Annex: evidence and details"},
         },
     }
 )
@@ -155,7 +155,7 @@ def _frame(evidence: Record) -> Record:
     }
 
 
-def _stamp(evidence: Record) -> Facts:
+def _stamp(evidence: Record) -> _Facts:
     return (
         ("Scene", evidence["scene"]["file"]),
         ("Hash", evidence["scene"]["sha256"][:12]),
@@ -260,7 +260,7 @@ def _page(content: _PageContent, file: str) -> str:
             content.context,
             document=document,
             numbered=_Numbers(PREFIXES[document["place"]]),
-            annex_file=ANNEX,
+            annex_file=_ANNEX,
             sections=[s for s in content.context["sections"] if s["place"] == document["place"]],
             style=Markup(_style(content.context["running_head"])),
             glyphs=Markup(GLYPHS),

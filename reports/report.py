@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
@@ -19,7 +19,7 @@ from ringbalance.reports.page import DOCUMENTS, page_content, render_pages, term
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
-from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
+from ringbalance.reports.pictures.process import FOLDERS, drawn
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record, ring_of
 from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of, views_of
@@ -121,22 +121,14 @@ def write_report(
     return Report(page=folder / "report.html", evidence=evidence)
 
 
-@contextmanager
-def _pictures(scene: AnyScene, stage: Path, opengl: OpenGL | None) -> Iterator[Callable[[], Record]]:
-    """Draws while the body runs; called, what is given waits for the record of the pictures.
-
-    Only a liquid ring has fields and pictures.
-    """
+def _pictures(
+    scene: AnyScene, stage: Path, opengl: OpenGL | None
+) -> AbstractContextManager[Callable[[], Record]]:
+    """Draws while the body runs: only a liquid ring has fields and pictures."""
     ring = ring_of(scene)
     if ring is None:
-        yield lambda: {"drawn": True, "text": "", "files": []}
-        return
-    fields = write_fields(scene=ring, folder=stage)
-    drawing = start_drawing(scene=ring, fields=fields, folder=stage, opengl=opengl)
-    try:
-        yield drawing.finish
-    finally:
-        drawing.stop()
+        return nullcontext(lambda: {"drawn": True, "text": "", "files": []})
+    return drawn(ring, stage, opengl)
 
 
 def _tell(progress: Progress | None, stage: str) -> None:

@@ -41,7 +41,7 @@ UNITS: Final = MappingProxyType(
     }
 )
 """Units by the endings of the evidence's keys, the longest first."""
-EXACT: Final = 1e-6
+_EXACT: Final = 1e-6
 """Relative total below which a number is a closed form of inputs that are taken as exact."""
 _SYMBOL: Final = re.compile(r"(?<![\w.])([A-Za-zα-ωΑ-Ω])_([A-Za-zΩ]{1,3})(?!\w)")
 
@@ -253,7 +253,7 @@ def known_width(value: float | None, width: float | None, *, stated: bool) -> fl
     Args: `stated`: whether the scene states the uncertainty of any input.
     """
     total = believed(value, width, stated=stated)
-    return None if value is None or total is None or total < EXACT * abs(value) else total
+    return None if value is None or total is None or total < _EXACT * abs(value) else total
 
 
 def _part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str:

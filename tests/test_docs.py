@@ -59,6 +59,14 @@ def test_the_commands_are_those_registered(page: str) -> None:
     assert sorted(told) == sorted(COMMANDS)
 
 
+def test_the_readme_opens_with_two_small_pictures_that_pages_draw() -> None:
+    pictures = re.findall(r"^!\[[^\]]+\]\(([^)]+)\)$", text("README.md"), re.MULTILINE)
+    assert len(pictures) == 2
+    assert sum((ROOT / each).stat().st_size for each in pictures) < 300_000
+    drawn = text("docs/gallery.md") + text("docs/tutorials/first-report.md")
+    assert all(Path(each).name in drawn for each in pictures)
+
+
 def test_the_readme_s_scene_is_one(tmp_path: Path) -> None:
     (tmp_path / "my_disc.toml").write_text(fenced("README.md", "toml"))
     assert liquid_ring_scene(rb.load_scene(tmp_path / "my_disc.toml")).disc.chambers == 4

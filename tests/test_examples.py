@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import doctest
 import inspect
+import math
 import pydoc
 from pathlib import Path
 from typing import Final
@@ -26,7 +27,7 @@ NAMES: Final = [
 def examples(name: str) -> list[doctest.DocTest]:
     """The examples in a public name's own docstring."""
     text = inspect.getdoc(getattr(rb, name)) or ""
-    names = {"rb": rb, "cmath": cmath}
+    names = {"rb": rb, "cmath": cmath, "math": math, "Path": Path}
     test = doctest.DocTestParser().get_doctest(text, names, f"rb.{name}", None, None)
     return [test] if test.examples else []
 

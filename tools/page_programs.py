@@ -127,7 +127,7 @@ def fresh_page(page: str, folder: Path) -> str:
         between = page[place : block.start()]
         pieces.append(between)
         before = between.rstrip().rpartition("\n")[2]
-        name = _FILE.search(before)
+        name = _FILE.search(before) if language != "sh" else None
         if language == "text" and printed is not None and not between.strip():
             shown = shown_lines(body.splitlines(), [line.rstrip() for line in printed.splitlines()])
             body, printed = "".join(f"{line}\n" for line in shown), None

@@ -70,8 +70,10 @@ class Controller(Protocol[StateT]):
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
         >>> class Nothing:
         ...     rises_tolerated = 3
+        ...
         ...     def start(self):
         ...         return None
+        ...
         ...     def step(self, state, measurement):
         ...         return state, rb.Command(resting=True)
         >>> nothing: rb.Controller = Nothing()

@@ -57,7 +57,14 @@ class StateSpace:
 
 @dataclass(frozen=True, kw_only=True)
 class LinearLoop:
-    """Plant and controller about the balanced state."""
+    """Plant and controller about the balanced state.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("six_chamber"))
+        >>> loop: rb.LinearLoop = rb.linear_loop(scene, flow_law=rb.calibrate(scene).flow_law)
+        >>> loop.disk_margin > 0.5
+        True
+    """
 
     plant: StateSpace
     """air_time_x, air_time_y (s) to vibration_x, vibration_y (m)."""
@@ -133,6 +140,12 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     Args: `flow_law`: such as `calibrate(scene).flow_law`; what one second of gas removes is the mean of a
         pair's two chambers, of all pairs the largest.
     Raises: SceneError: another controller, which has no linear loop.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("six_chamber"))
+        >>> loop = rb.linear_loop(scene, flow_law=rb.calibrate(scene).flow_law)
+        >>> loop.stable
+        True
     """
     if scene.controller.kind != "target_vector":
         problem = f"the controller {scene.controller.kind!r} has no linear loop"

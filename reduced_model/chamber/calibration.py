@@ -174,7 +174,7 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True) -> ChamberCalibrati
     check = ElementCheck.of(scene, values=compared, gravity=held) if checked else None
     unmodelled = unmodelled_fractions(scene, fills)
     effects = _input_effects(scene, fills)
-    ring = _as_measured(scene, ring)
+    ring = _as_measured(scene.disc.moment_factor, ring)
     waves = chamber_status(scene)
 
     def excess_of(quantity: str) -> float:
@@ -185,11 +185,11 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True) -> ChamberCalibrati
 
     def curve(quantity: str, share: str) -> Curve:
         value: Estimate = getattr(ring, quantity)
+        at_nodes = value.value[: nodes.size]
+        level = quantity == "hydrostatic_pressure"
         return _curve(
-            scene,
-            nodes,
             replace(value, status=_first(ring.status, status_of(quantity), waves)),
-            quantity,
+            *(pressure_table(scene, nodes, at_nodes) if level else _even_table(nodes, at_nodes)),
             excess=excess_of(quantity),
             unmodelled=unmodelled[share],
             inputs=[getattr(each, quantity) for each in effects.values()],
@@ -248,9 +248,8 @@ def _first(*statuses: Status) -> Status:
     return next((each for each in statuses if not each.ok), statuses[-1])
 
 
-def _as_measured(scene: Scene, ring: RingValues) -> RingValues:
-    """Moments times the scene's measured factor; finite elements check the geometry, so before it."""
-    factor = scene.disc.moment_factor
+def _as_measured(factor: float, ring: RingValues) -> RingValues:
+    """Moments times a measured factor; finite elements check the geometry, so before it."""
     moment, slope = (
         replace(each, value=factor * each.value, uncertainty=factor * each.uncertainty)
         for each in (ring.moment, ring.moment_per_volume)
@@ -259,19 +258,15 @@ def _as_measured(scene: Scene, ring: RingValues) -> RingValues:
 
 
 def _curve(
-    scene: Scene,
-    nodes: FloatArray,
     estimate: Estimate,
-    quantity: str,
+    table: HermiteTable,
+    missed: FloatArray,
     *,
     excess: float,
     unmodelled: FloatArray,
     inputs: list[FloatArray],
 ) -> Curve:
-    value, n = estimate.value, nodes.size
-    table, missed = _even_table(nodes, value[:n])
-    if quantity == "hydrostatic_pressure":
-        table, missed = pressure_table(scene, nodes, value[:n])
+    value = estimate.value
     return Curve(
         value=value,
         numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),

@@ -88,13 +88,13 @@ _CORIOLIS: Final = 2.0
 which a free particle follows gravity however thin the ring."""
 
 
-def _surface_tension(scene: Scene) -> float:
-    """Surface tension to include; the scene gives none.
+def _surface_tension(density: float) -> float:
+    """Surface tension to include; no scene gives one.
 
     Returns: N/m, an upper bound.
     Source: IAPWS R1-76(2014) for water; gallium near its melting point for metals.
     """
-    return METAL_SURFACE_TENSION if scene.liquid.density > METAL_DENSITY else SURFACE_TENSION
+    return METAL_SURFACE_TENSION if density > METAL_DENSITY else SURFACE_TENSION
 
 
 def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
@@ -104,13 +104,14 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]
     Returns: Shares by "pressures" and "moments", along the fills, which are above zero.
     Source: contact line over area of the free surface, contact angle zero, plus the ring's own curvature.
     """
-    disc, square = scene.disc, scene.rotor.speed**2
+    disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
     a = surface_radius(disc=disc, fill_ratio=fills)
     alpha = half_angle(disc=disc, radius=a)
-    pressure = scene.liquid.density * square * (disc.outer_radius**2 - a**2) / 2
-    jump = _surface_tension(scene) * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
+    pressure = density * square * (disc.outer_radius**2 - a**2) / 2
+    tension = _surface_tension(density)
+    jump = tension * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
     # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
-    length = np.sqrt(_surface_tension(scene) / (scene.liquid.density * square * a))
+    length = np.sqrt(tension / (density * square * a))
     depth = disc.outer_radius - a
     moved = length**2 * (1 / (a * alpha * depth) + 2 / (disc.axial_width * depth))
     return {"pressures": jump / pressure, "moments": moved}

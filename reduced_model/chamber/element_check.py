@@ -20,7 +20,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Disc, Scene
 
 CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume", "hydrostatic_pressure")
 """Of an imported chamber all but the third; of the built-in sector, whose wall has one radius, all but the
@@ -88,7 +88,12 @@ class ElementCheck:
             scene,
             fill_ratio=values.fill_ratio[at],
             gravity=held,
-            cells=_meshes(scene, float(values.fill_ratio[at].min()), 3 if _axial(scene, held) else 2),
+            cells=_meshes(
+                scene.disc,
+                scene.tolerance,
+                float(values.fill_ratio[at].min()),
+                dimension=3 if held and scene.environment.shaft == "vertical" else 2,
+            ),
         )
         closed_forms = {name: getattr(values, name) for name in CHECKED if hasattr(elements, name)}
         here = {
@@ -142,15 +147,10 @@ def _checked_fills(values: RingValues) -> np.ndarray:
     return np.array([int(np.argmin(np.abs(fills - x))) for x in (thinnest, fills.max())])
 
 
-def _axial(scene: Scene, gravity: bool) -> bool:
-    return gravity and scene.environment.shaft == "vertical"
-
-
-def _meshes(scene: Scene, thinnest: float, dimension: int) -> tuple[tuple[int, ...], ...]:
+def _meshes(disc: Disc, tolerance: float, thinnest: float, *, dimension: int) -> tuple[tuple[int, ...], ...]:
     """Cells of three meshes, finest first: an arc drawn by cells of angle h is off by (h/2)^4/32 R2/depth."""
-    disc = scene.disc
     depth = disc.outer_radius - float(surface_radius(disc=disc, fill_ratio=thinnest))
-    angle = 2 * (32 * _SHARE * scene.tolerance * depth / disc.outer_radius) ** 0.25
+    angle = 2 * (32 * _SHARE * tolerance * depth / disc.outer_radius) ** 0.25
     angular = 4 * math.ceil(disc.central_angle / max(angle, _MOST_ANGLE) / 4)
     finest = (_RADIAL_CELLS, max(8, angular), 4)[:dimension]
     return tuple(tuple(n // k for n in finest) for k in (1, 2, 4))

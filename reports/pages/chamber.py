@@ -122,10 +122,10 @@ def _waves(scene: Scene) -> Record:
     peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
     if imported:
         # Denser where the ring is thin, for there the frequencies rise fastest.
-        shown = (0.02 + 0.98 * np.linspace(0, 1, _CUT_POINTS) ** 2) * largest
+        drawn = (0.02 + 0.98 * np.linspace(0, 1, _CUT_POINTS) ** 2) * largest
     else:
-        shown = np.unique([*(np.linspace(0.02, 1.0, _POINTS) * largest), *peaks])
-    fills = np.append(shown, scene.disc.initial_fill)
+        drawn = np.unique([*(np.linspace(0.02, 1.0, _POINTS) * largest), *peaks])
+    fills = np.append(drawn, scene.disc.initial_fill)
     modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
     answer = sloshing_response(
         disc=scene.disc,
@@ -138,6 +138,14 @@ def _waves(scene: Scene) -> Record:
     ratios, swing = modes.frequency_ratio.value.T, answer.amplification.value[:-1]
     depth = scene.disc.outer_radius - answer.surface_radius[:-1]
     near = abs(ratios[0][-1] - 1) <= _NEAR
+    shown = {
+        "amplification": answer.amplification.value,
+        "amplification_interval": answer.amplification_interval,
+        "pressure_amplification": answer.pressure_amplification.value,
+        "pressure_amplification_interval": answer.pressure_amplification_interval,
+        "surface_amplitude_m": answer.surface_amplitude.value,
+    }
+    tilt = scene.environment.gravity / (scene.rotor.speed**2 * answer.surface_radius[-1])
     return {
         "fill_ratio": fills[:-1].tolist(),
         "avoid": _to_avoid(ratios, fills[:-1], [mode for mode, _ in met], imported=imported),
@@ -145,24 +153,13 @@ def _waves(scene: Scene) -> Record:
         "frequency_uncertainty": FREQUENCY_UNCERTAINTY,
         "largest_wave_over_depth": float(np.max(answer.surface_amplitude_interval[:-1, 1] / depth)),
         "frequency_ratio": ratios.tolist(),
-        "amplification": swing.tolist(),
-        "amplification_interval": answer.amplification_interval[:-1].tolist(),
-        "pressure_amplification": answer.pressure_amplification.value[:-1].tolist(),
-        "pressure_amplification_interval": answer.pressure_amplification_interval[:-1].tolist(),
-        "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
-        "depth_m": depth.tolist(),
+        **{name: values[:-1].tolist() for name, values in shown.items()},
         "imported": imported,
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
             "fill_ratio": scene.disc.initial_fill,
-            "amplification": float(answer.amplification.value[-1]),
-            "amplification_interval": answer.amplification_interval[-1].tolist(),
-            "pressure_amplification": float(answer.pressure_amplification.value[-1]),
-            "pressure_amplification_interval": answer.pressure_amplification_interval[-1].tolist(),
-            "surface_amplitude_m": float(answer.surface_amplitude.value[-1]),
-            "tilt_ratio": float(
-                scene.environment.gravity / (scene.rotor.speed**2 * answer.surface_radius[-1])
-            ),
+            **{name: values[-1].tolist() for name, values in shown.items()},
+            "tilt_ratio": float(tilt),
         },
         "status": {"code": str(answer.status.code), "text": answer.status.text},
     }

@@ -15,7 +15,7 @@ from ringbalance.reports.judged import judgement_record
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.models import Scene
 
-SMALL_FILL: Final = 1e-3
+_SMALL_FILL: Final = 1e-3
 """Change of fill over which a loop counts as linear."""
 
 
@@ -48,9 +48,9 @@ def loop_gain(scene: Scene, model: BalancerModel) -> LoopGain | None:
     u = float(flow.velocity)
     if u <= 0 or pressure <= 0:
         return None
-    ends = np.array([x - SMALL_FILL, x + SMALL_FILL])
+    ends = np.array([x - _SMALL_FILL, x + _SMALL_FILL])
     moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
-    per_fill = float(abs(moments[1] - moments[0])) / (2 * SMALL_FILL)
+    per_fill = float(abs(moments[1] - moments[0])) / (2 * _SMALL_FILL)
     slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
     return LoopGain(
         law=model.name,

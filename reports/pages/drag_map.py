@@ -31,10 +31,10 @@ from ringbalance.scene.models import HumpGas, Liquid, Scene
 
 BORES: Final = (0.2e-3, 5e-3)
 """m: the map's range, widened when the scene's own bore lies near its edge."""
-VISCOSITIES: Final = (2e-7, 5e-4)
+_VISCOSITIES: Final = (2e-7, 5e-4)
 """m^2/s: the same, from below liquid gallium to above silicone oil of 350 cSt."""
-BORE_POINTS: Final = 41
-VISCOSITY_POINTS: Final = 49
+_BORE_POINTS: Final = 41
+_VISCOSITY_POINTS: Final = 49
 _ROOM: Final = 1.5
 _ROOM_TEMPERATURE: Final = 293.15
 _FIFTY: Final = paper.PAPER_DRAG_COEFFICIENT
@@ -69,9 +69,9 @@ class DragMap:
         Range: as `tube_loss`; `point.in_range` says where a correlation is stretched.
         """
         scene, law = calibration.scene, calibration.flow_law
-        d = _axis(bore, BORES, BORE_POINTS, scene.tube.bore)
+        d = _axis(bore, BORES, _BORE_POINTS, scene.tube.bore)
         own = scene.liquid.kinematic_viscosity
-        nu = _axis(kinematic_viscosity, VISCOSITIES, VISCOSITY_POINTS, own)
+        nu = _axis(kinematic_viscosity, _VISCOSITIES, _VISCOSITY_POINTS, own)
         varied = {
             "tube.bore": np.repeat(d, nu.size),
             "liquid.kinematic_viscosity": np.tile(nu, d.size),
@@ -113,7 +113,7 @@ def liquids_in_tube(
     chosen = (scene.liquid, *(q for q in asked if q.name != scene.liquid.name))
     density = np.array([q.density for q in chosen])
     equal = scene.gas.pressure * density / scene.liquid.density
-    bores = np.geomspace(*BORES, BORE_POINTS)
+    bores = np.geomspace(*BORES, _BORE_POINTS)
     at_scene = _in_tube(calibration, chosen, np.full(density.shape, scene.gas.pressure))
     at_equal = _in_tube(calibration, chosen, equal)
     over_bores = _in_tube(calibration, chosen, equal, bores)

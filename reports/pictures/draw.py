@@ -278,7 +278,7 @@ def _add_arrow(plotter: Any, radius: float, theme: Theme) -> _Label:
 def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[_Label]:
     outer, crest = disc["outer_radius"], disc["hump_radius"]
     height, reach = 0.09 * outer, disc["port_radius"] - 0.04 * outer
-    path = tube_path(port=reach, crest=crest, height=height, bend=0.06 * outer)
+    path = _tube_path(port=reach, crest=crest, height=height, bend=0.06 * outer)
     radius = max(disc["bore"], 0.045 * outer) / 2
     tube = pv.MultipleLines(path).tube(radius=radius, n_sides=32, capping=True)
     shine = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3}
@@ -293,7 +293,7 @@ def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[_Label]:
     ]
 
 
-def tube_path(*, port: float, crest: float | None, height: float, bend: float) -> FloatArray:
+def _tube_path(*, port: float, crest: float | None, height: float, bend: float) -> FloatArray:
     """Schematic centre line from the first chamber's port over the crest to the opposite one's, mm, (n, 3).
 
     Out of the chamber, inward to the crest's radius, along that radius half-way round, outward and in again;

@@ -6,7 +6,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -90,6 +91,20 @@ def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     path = folder / _FIELDS / "chamber.vtu"
     whole = write_cells(path, kind=geometry.kind, points=geometry.points, cells=geometry.cells)
     return {**written, _WHOLE: whole}
+
+
+@contextmanager
+def drawn(scene: Scene, folder: Path, opengl: OpenGL | None = None) -> Iterator[Callable[[], Record]]:
+    """Fields and pictures of a scene, drawn while the body runs; what is given waits for their record.
+
+    Raises: OSError: the folder cannot be written.
+    """
+    fields = write_fields(scene=scene, folder=folder)
+    drawing = start_drawing(scene=scene, fields=fields, folder=folder, opengl=opengl)
+    try:
+        yield drawing.finish
+    finally:
+        drawing.stop()
 
 
 def start_drawing(

@@ -154,7 +154,7 @@ class Extremes(Result):
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
         >>> study = rb.extremes(scene)
-        >>> len(study.to_dict()["findings"]) > 0
+        >>> study.to_dict()["points"] > 0
         True
     """
 

@@ -7,6 +7,7 @@ Texts are typographic (thin spaces, a true minus sign, µm); `plain` writes them
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Final
@@ -24,9 +25,9 @@ _INPUT_ROUNDING: Final = 5e-4
 """Relative half-width of an input of three digits, the fewest that scene files have."""
 _LOPSIDED: Final = 0.1
 """By which the two sides of an interval differ, of the larger, before they are printed apart."""
-_TYPEWRITER: Final = str.maketrans(
-    {"\u202f": " ", "\u00a0": " ", "\u2212": "-", "µ": "u", "²": "^2", "³": "^3"}
-)
+_TYPEWRITER: Final = str.maketrans({"\u202f": " ", "\u00a0": " ", "\u2212": "-", "µ": "u"})
+_POWER: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
+_TYPED_POWER: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _SMALLEST_PLAIN: Final = -4
 _LARGEST_PLAIN: Final = 6
 
@@ -260,5 +261,6 @@ def given(value: float | None, unit: str, *, digits: int = 6) -> str:
 
 
 def plain(text: str) -> str:
-    """A text as it is typed: "-" for the minus sign, um for µm, one kind of space."""
-    return text.translate(_TYPEWRITER)
+    """A text as it is typed: "-" for the minus sign, um for µm, 10^-3 for 10⁻³, one kind of space."""
+    powers = _POWER.sub(lambda power: "^" + power[0].translate(_TYPED_POWER), text)
+    return powers.translate(_TYPEWRITER)

@@ -146,7 +146,7 @@ def test_a_value_is_printed_to_two_digits_of_its_total(value: float, total: floa
 @pytest.mark.parametrize(
     ("value", "total", "stated", "text"),
     [
-        (75.3982237, 7.5e-11, True, "75.3982 ± 8 × 10⁻¹¹"),
+        (75.3982237, 7.5e-11, True, "75.3982 ± 8 × 10^-11"),
         (75.3982237, 7.5e-11, False, "75.40"),
         (99.5917, 0.0047, False, "99.59"),
         (99.5917, 0.051, False, "99.592 ± 0.051"),
@@ -174,3 +174,8 @@ def test_an_interval_finer_than_unstated_inputs_leaves_four_digits(
 def test_a_lopsided_interval_is_printed_as_one(value: float, sides: tuple[float, float], text: str) -> None:
     unit = "m" if value == 0 else "Pa"
     assert plain(shown(value, unit, sides)) == text
+
+
+@pytest.mark.parametrize(("text", "typed"), [("3 × 10⁻¹³ m³", "3 × 10^-13 m^3"), ("−2 µm²", "-2 um^2")])
+def test_powers_are_typed_whole(text: str, typed: str) -> None:
+    assert plain(text) == typed

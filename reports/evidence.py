@@ -79,8 +79,7 @@ def collect_evidence(
     apart = begun(work, pool)
     with _cases_of_report(scene, level=level, pool=pool) as judged_cases:
         study = _STUDIES.get(scene.balancer, _plain_study)(scene, tell)
-        tell("sections")
-        sections = collected_beside(work, apart)
+        sections = collected_beside(work, apart, tell)
         tell("verification")
         verification, kept = judged_cases(tell)
     sections = completed(sections, apart, work, pool)
@@ -154,7 +153,7 @@ def _cases_of_report(
     wanted = [name for name in ids if name not in kept]
 
     def finished(under_way: Iterator[CaseResult], tell: Progress) -> tuple[list[Record], dict[str, str]]:
-        ran = {case["id"]: case for case in _finished(under_way, tell)}
+        ran = {case["id"]: case for case in _finished(under_way, len(wanted), tell)}
         if level == "light":
             _keep(ran, kept)
         records = [ran[name] if name in ran else kept[name]["record"] for name in ids]
@@ -168,10 +167,10 @@ def _cases_of_report(
         yield partial(finished, under_way)
 
 
-def _finished(under_way: Iterator[CaseResult], tell: Progress) -> Iterator[Record]:
+def _finished(under_way: Iterator[CaseResult], count: int, tell: Progress) -> Iterator[Record]:
     """Records of the cases as they come; wall time does not reproduce, and no verdict hangs on it."""
-    for result in under_way:
-        tell(f"verification: {result.definition.title}")
+    for number, result in enumerate(under_way, start=1):
+        tell(f"case {number} of {count}: {result.definition.title}")
         yield {key: value for key, value in result.to_dict().items() if key != "time_s"}
 
 

@@ -5,7 +5,7 @@ A new one is a module with its `SECTION`, a template of its name, and a line in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from functools import partial
 from itertools import count
@@ -88,10 +88,14 @@ def collected(name: str, work: Work) -> Record | None:
     return sections_of(work.scene.balancer)[name].collect(work)
 
 
-def collected_beside(work: Work, apart: Begun) -> Record:
+def collected_beside(work: Work, apart: Begun, progress: Callable[[str], None]) -> Record:
     """The evidence of the sections that no worker has begun."""
-    names = [name for name in sections_of(work.scene.balancer) if name not in apart]
-    return {name: collected(name, work) for name in names}
+    sections = {name: one for name, one in sections_of(work.scene.balancer).items() if name not in apart}
+    records: Record = {}
+    for number, (name, section) in enumerate(sections.items(), start=1):
+        progress(f"section {number} of {len(sections)}: {section.title}")
+        records[name] = collected(name, work)
+    return records
 
 
 def completed(records: Record, apart: Begun, work: Work, pool: Workers | None) -> Record:

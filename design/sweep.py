@@ -311,7 +311,7 @@ def run_sweep(
     batches = [points[start : start + size] for start in range(0, len(points), size)]
     calls = [partial(static_rows, scene, each, intervals=intervals) for each in batches]
     static = [row for rows in everywhere("static", tasks_of(content, calls)) for row in rows]
-    driven: list[Mapping[str, Any]] = [EMPTY for _ in points]
+    driven: list[Mapping[str, Any]] = [dict(EMPTY) for _ in points]
     places = [i for i, row in enumerate(static) if row["sha256"]] if runs else []
     if places:
         run_row = registered("function", "run_row")

@@ -28,7 +28,7 @@ _LEAST: Final = 1e-12
 """Error at which a model that equals the finest is drawn."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class ResultFigures:
     """Figures of a result, which a notebook shows below each other."""
 
@@ -44,6 +44,10 @@ class ResultFigures:
 
     def _repr_svg_(self) -> str:
         return self.svg()
+
+    def __repr__(self) -> str:
+        """Short: the notebook shows the figures, a terminal cannot."""
+        return f"<{len(self.drawings)} figures; .save(path) writes them as one SVG file>"
 
 
 def figures_of_result(result: Result) -> ResultFigures:

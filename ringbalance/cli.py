@@ -86,7 +86,7 @@ COMMANDS = {
         "ringbalance.reports.simulate_cli:simulate",
         "One closed-loop balancing run.",
         "SCENE --plot run.svg",
-        "the run did not settle",
+        "the run did not settle, or misses what the scene requires",
     ),
     "tune": (
         "ringbalance.controller.cli:tune",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, Literal
 
-from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.scene import AnyScene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden, widened
@@ -92,7 +92,7 @@ def _judged(
     prescribed = {} if mutation is None else mutation.scene
     built_in = None if mutation is None or prescribed else mutation.id
     try:
-        mutated = overridden(scene, prescribed)
+        mutated = _mutated(scene, prescribed)
         evidence = code.compute(mutated, level, built_in)
         rests = [one for one in definition.rests_on if one.path not in prescribed]
         assumptions = assumptions_of(rests, mutated)
@@ -120,6 +120,18 @@ def _judged(
         assumptions=assumptions,
         time_s=time.perf_counter() - start,
     )
+
+
+def _mutated(scene: AnyScene, values: Mapping[str, float | Literal["absent"]]) -> Any:
+    """The scene with a mutation's values: as a file would give them, where a file may."""
+    if not values:
+        return scene
+    try:
+        return scene.with_values(
+            {path: None if value == "absent" else value for path, value in values.items()}
+        )
+    except SceneError:
+        return overridden(scene, values)
 
 
 def _evidence_at(

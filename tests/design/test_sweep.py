@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import pickle
 from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -54,6 +55,11 @@ def test_runs_are_those_of_the_balancer(paper_scene: Scene) -> None:
         assert run["fraction"] == np.mean(met)
     assert found.driven[0]["fraction"] < found.driven[1]["fraction"]
     assert found.verdicts[0] == "not met"
+
+
+def test_a_sweep_can_be_pickled(paper_scene: Scene) -> None:
+    table = rb.sweep(paper_scene, {"tube.bore": [1e-3, 2e-3]}, intervals=False)
+    assert pickle.loads(pickle.dumps(table)).to_dict() == table.to_dict()
 
 
 def test_one_design_is_answered_as_a_row_of_a_sweep(paper_scene: Scene) -> None:

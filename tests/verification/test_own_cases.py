@@ -91,6 +91,26 @@ def test_own_cases_join_the_program_s(folder: Path, capsys: pytest.CaptureFixtur
     assert len(listed) > 40
 
 
+def test_a_changed_scene_is_one_that_the_program_calibrates(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = """
+import ringbalance as rb
+
+def compute(scene, level):
+    wide = rb.calibrate(scene).to_dict()["chamber"]["volume_m3"] > 67e-6
+    return {"total": 4 if wide else 3}
+
+def reference(scene):
+    return {"total": 4}
+"""
+    changed = 'scene = {{ "disc.axial_width" = 0.05 }}\nwhat = "one is added"'
+    _write(tmp_path, "narrow", code, TEXT.replace('what = "one is added"', changed))
+    assert verify("narrow", cases=tmp_path, mutations=True, json=True) == 0
+    (result,) = json.loads(capsys.readouterr().out)
+    assert [mutation["verdict"] for mutation in result["mutations"]] == ["failed"]
+
+
 def test_a_case_that_fails_or_misses_its_mutation_ends_with_one(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

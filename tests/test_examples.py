@@ -52,7 +52,9 @@ def test_an_example_gives_what_it_shows(name: str, tmp_path: Path, monkeypatch: 
         "Tuning",
     }
     report: list[str] = []
-    doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(test, out=report.append)
+    # Its own default reads the command line of pytest.
+    runner = doctest.DocTestRunner(verbose=False, optionflags=doctest.NORMALIZE_WHITESPACE)
+    runner.run(test, out=report.append)
     assert "".join(report) == ""
 
 

@@ -25,6 +25,7 @@ from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
 from ringbalance.scene.chamber_file.body import Contents, Mark, MeshFileError
 from ringbalance.scene.chamber_file.elements import MOST_NODES, dimension
 from ringbalance.scene.chamber_file.record import KNOWN_NAMES, VOLUME
+from ringbalance.scene.platform.memory import bounded_memory
 
 FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 _GMSH: Final = (
@@ -35,6 +36,10 @@ _VTU: Final = "a .vtu file of an UnstructuredGrid, compressed by zlib, lzma or n
 _FLUENT: Final = (b"(0", b"(1", b"(2")
 _MOST_UNPACKED: Final = 8 * 12 * MOST_NODES
 """Bytes of one array: the connectivity of cells of ten nodes and their facets, which share most nodes."""
+_SPARE_MEMORY: Final = 300_000_000
+_MEMORY_PER_BYTE: Final = 100
+"""Bytes that reading may take in all, and for each of the file: text of a few digits becomes numbers, copied
+some times, and lists of them."""
 _COMPRESSED: Final = re.compile(rb"<VTKFile[^>]*\bcompressor=")
 _INLINE: Final = re.compile(rb"<DataArray[^>]*\bformat=.binary.[^>]*>\s*")
 _APPENDED: Final = re.compile(rb"<AppendedData\s+encoding=.(raw|base64).\s*>\s*_")
@@ -58,8 +63,10 @@ def _by_meshio(content: bytes, read: Callable[[str], meshio.Mesh], allowed: str)
             with warnings.catch_warnings(), redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
                 warnings.simplefilter("error", DeprecationWarning)
                 warnings.simplefilter("ignore", ResourceWarning)
-                mesh = read(str(path))
+                with bounded_memory(_SPARE_MEMORY + _MEMORY_PER_BYTE * len(content)):
+                    mesh = read(str(path))
         except (Exception, SystemExit) as error:
+            # A damaged count asks for all memory that there is.
             reason = " ".join(str(error).split())[:200]
             problem = f"meshio cannot read it, it is damaged or cut off ({type(error).__name__} {reason}"
             raise MeshFileError.of(f"{problem.rstrip()})", allowed) from error

@@ -259,5 +259,5 @@ def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None
 def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
     page = generated_docs.text_of("docs/measurements.md")
     assert generated_docs.fresh(page, generated_docs.PARTS["docs/measurements.md"]()) == page
-    example = page.split("```")[1]
-    assert len(compare(parsed(example.lstrip("\n"))).measured) == 3
+    example = page.split("```text\n")[1].split("```")[0]
+    assert len(compare(parsed(example)).measured) == 3

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import struct
+import sys
 import tracemalloc
 import zlib
 from collections.abc import Callable
@@ -76,6 +78,16 @@ def test_damage_is_an_error_of_the_scene(name: str, tmp_path: Path) -> None:
         except SceneError as error:
             refused += "mesh" in str(error)
     assert refused > 20
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")
+def test_a_damaged_count_does_not_take_all_memory(tmp_path: Path) -> None:
+    file, write = FILES["binary 4.1"]
+    content = bytearray(write(tmp_path))
+    at = content.index(b"$Elements\n") + len(b"$Elements\n")
+    content[at : at + 8] = struct.pack("<Q", 2**31)
+    with pytest.raises(SceneError, match=r"it is damaged or cut off \(MemoryError"):
+        loaded(tmp_path, bytes(content), file)
 
 
 def test_a_pipe_a_folder_and_no_file(tmp_path: Path) -> None:

@@ -66,7 +66,9 @@ bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps t
 	$(PYTHON_IN_VENV) benchmarks/openfoam.py --keep
 
 docs: env ## the site of the documentation into build/site/, with every warning an error
-	$(PYTHON_IN_VENV) -m sphinx -q -W --keep-going -c docs . build/site
+	@# From nothing, so that two builds are the same: what an earlier one has kept would show in the next.
+	@rm -rf build/site build/doctrees
+	$(PYTHON_IN_VENV) -m sphinx -q -W --keep-going -c docs -d build/doctrees . build/site
 	@echo "open build/site/index.html"
 
 dist: env ## source distribution and wheel of the last commit into dist/, the same bytes every time

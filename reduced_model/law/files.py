@@ -167,7 +167,7 @@ def load_law(path: Path | str) -> CompleteLaw:
         >>> path = law.save("law.json")
         >>> again = rb.load_law(path)
         >>> conditions = {"fill_ratio": 0.25, "gas_pressure": 0.7e6}
-        >>> again.evaluate(**conditions) == law.evaluate(**conditions)
+        >>> bool(again.evaluate(**conditions) == law.evaluate(**conditions))
         True
     """
     file = Path(path)

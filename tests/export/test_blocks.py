@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+from c_warnings import WARNINGS
 
 import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
@@ -19,16 +20,6 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
-WARNINGS = [
-    "-std=c99",
-    "-pedantic",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wdouble-promotion",
-    "-Wshadow",
-    "-Werror",
-]
 SANITIZERS = ["-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 IN_A_STEP = 10.0
 """s, longer than any wait for a sample: the disc goes from sample to sample."""

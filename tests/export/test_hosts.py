@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_warnings import WARNINGS
 from law_queries import answers, queries
 
 from ringbalance.export.blocks import law_block
@@ -18,16 +19,6 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.arrays import FloatArray
 
 Both = tuple[CalibratedLaw, CompactLaw]
-WARNINGS = [
-    "-std=c99",
-    "-pedantic",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wdouble-promotion",
-    "-Wshadow",
-    "-Werror",
-]
 HARNESS = """
 #include <stdio.h>
 #include "disc.h"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,12 +81,15 @@ def test_six_chambers_work_with_settings_of_their_own() -> None:
 
 
 def test_a_limit_follows_from_the_grade() -> None:
-    """G = U omega/m, and kappa U is the vibration."""
-    scene = bundled("liquid_ring_paper", rotor__mass="25 kg", requirement__grade="0.4 mm/s")
+    """G = U omega/m, and kappa U is the vibration; a limit that the scene states stays that of its runs."""
+    grade = {"rotor__mass": "25 kg", "requirement__grade": "0.4 mm/s"}
+    scene = bundled("liquid_ring_paper", **grade, controller__limit=None)
     rotor = scene.rotor
     expected = 0.4e-3 * 25.0 / rotor.speed * rotor.influence_coefficient
-    assert LiquidRingBalancer(scene).limit == pytest.approx(expected)
-    strict = replace(scene, requirement=replace(scene.requirement, residual=0.02e-6))
+    assert LiquidRingBalancer(scene).limit == scene.controller.limit == pytest.approx(expected)
+    assert scene.with_values({"requirement.grade": None}).controller.limit == pytest.approx(0.05e-6)
+    assert bundled("liquid_ring_paper", **grade).controller.limit == pytest.approx(0.05e-6)
+    strict = scene.with_values({"requirement.residual": "0.02 um", "controller.limit": "0.05 um"})
     balancer = LiquidRingBalancer(strict)
     assert balancer.limit == 0.02e-6
     point = {axis.name: axis.levels[3] for axis in balancer.trials()[0].axes}

@@ -29,7 +29,7 @@ class _ValveAtHand:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """What `ringbalance design` may choose; nothing else depends on it."""
+    """What `ringbalance design` may choose; of it `tune` looks at the pressure alone."""
 
     outer_radius: Annotated[
         PositiveLength | None,
@@ -43,7 +43,9 @@ class DesignSettings:
     ] = None
     pressure: Annotated[
         PositivePressure | None,
-        unused("the gas keeps its pressure", "highest gauge pressure that is available"),
+        unused(
+            "the gas keeps its pressure", "highest gauge pressure that is available, for `design` and `tune`"
+        ),
         Shown("gas pressure available", "MPa", note="gauge"),
     ] = None
     valves: Annotated[

@@ -122,6 +122,12 @@ def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, messag
     assert str(file) in str(caught.value)
 
 
+def test_a_given_disc_is_for_tune() -> None:
+    with pytest.raises(rb.SceneError, match=r"outer_radius.*vary.*`ringbalance tune` recommends") as caught:
+        rb.find_design(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
+    assert len(caught.value.faults) == 1
+
+
 def test_only_a_disc_with_liquid_is_designed() -> None:
     with pytest.raises(rb.SceneError, match="eccentric_mass"):
         rb.find_design(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))

@@ -1,0 +1,101 @@
+"""The work of the command `ringbalance fit`, which draws too: `reports.fit_cli`."""
+
+from __future__ import annotations
+
+import json as json_format
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ringbalance.identification.criticism import Review
+from ringbalance.identification.documents import fit_document, fit_rows
+from ringbalance.identification.fitting import FitResult, Loss, problem_of
+from ringbalance.identification.fitting import fit as fit_scene
+from ringbalance.identification.next_measurement import next_measurement
+from ringbalance.identification.parameters import FitError
+from ringbalance.identification.reading import read_observations
+from ringbalance.identification.saving import save_result
+from ringbalance.results.result import print_rows
+from ringbalance.scene.faults import SceneError, did_you_mean
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.platform.files import check_file
+from ringbalance.scene.platform.terminal import activity, print_message
+
+DONE, FAILED = 0, 1
+_USAGE = (
+    "ringbalance fit SCENE DATA.csv [DATA.csv ...], for example ringbalance fit my_disc.toml injections.csv; "
+    "ringbalance fit --template KIND prints an empty file of measurements"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitRequest:
+    """What `ringbalance fit` is asked for, see `reports.fit_cli.fit`."""
+
+    parameters: str | None
+    loss: Loss
+    next: str | None
+    save: Path | None
+    json: bool
+
+
+def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tuple[int, FitResult]:
+    """Fit, print and save. Returns: Exit code, and what was found. Raises: SceneError, OSError."""
+    if scene is None or not data:
+        raise _usage("command line", f"{'SCENE' if scene is None else 'DATA'} is missing")
+    if asked.save is not None:
+        keep_inputs(asked.save, (scene, *data))
+        check_file(asked.save)
+    if scene.suffix.lower() == ".csv":
+        raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
+    given = load_scene(scene)
+    observations = read_observations(data, scene=given)
+    names = None if asked.parameters is None else _names(asked.parameters)
+    try:
+        fitted = [each.name for each in problem_of(given, observations, names).parameters]
+        chosen = _fitted_name(asked.next, fitted)
+        with activity("fit", "several starts, profiles of the likelihood ..."):
+            result = fit_scene(given, data=observations, parameters=names, loss=asked.loss)
+    except FitError as error:
+        raise SceneError.of_file(given.file, str(error)) from error
+    told, following = Review.of(result), next_measurement(result, chosen)
+    if asked.json:
+        document = fit_document(result, data=observations, told=told, following=following)
+        print(json_format.dumps(document, allow_nan=False))
+    else:
+        rows = fit_rows(result, data=observations, told=told, following=following)
+        print_rows(rows, headline=False)
+    if asked.save is not None:
+        save_result(asked.save, scene=given, result=result, data=observations, said=told.sentences)
+        print_message(f"fitted scene written to {asked.save}")
+    return (DONE if told.holds else FAILED), result
+
+
+def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
+    if name is not None and name not in fitted:
+        problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
+        raise SceneError.of_option(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
+    return name
+
+
+def keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
+    """Raises: SceneError: a file that is written would take the place of one that is read."""
+    for each in inputs:
+        if save.exists() and each.exists() and save.samefile(each):
+            problem = "the fitted scene would replace a file that is read here"
+            raise SceneError.of_option(
+                option="--save", value=str(save), problem=problem, allowed="another file"
+            )
+
+
+def _usage(file: str, problem: str) -> SceneError:
+    return SceneError.of_file(file, f"{problem}: {_USAGE}")
+
+
+def _names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",")]
+    if not all(names) or len(set(names)) < len(names):
+        problem = "it is not a list of different names with commas between"
+        allowed = 'such as "bore,extra_loss"'
+        raise SceneError.of_option(option="--parameters", value=text, problem=problem, allowed=allowed)
+    return names

@@ -75,4 +75,5 @@ KIND: Final = SceneKind(
         ("gas.pressure", "rotor.speed", "rotor.influence_coefficient"),
         ("controller.kind", "controller.limit", "run.seed"),
     ),
+    arrays=True,
 )

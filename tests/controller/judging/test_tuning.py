@@ -16,9 +16,10 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.judging.judge import judged
-from ringbalance.controller.judging.search import search, searched
+from ringbalance.controller.judging.search import _outwards, search, searched
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
+from ringbalance.controller.trials import Axis
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -78,6 +79,27 @@ def test_six_chambers_work_with_settings_of_their_own() -> None:
     assert found.recommended.fraction.value >= 0.99
     assert found.along == ()
     assert found.recommended.settings["controller.gas_time_offset"]
+
+
+def test_no_pressure_above_the_one_that_is_available_is_searched() -> None:
+    """[design] states it; the highest one itself is a level, and settings start at the scene's own."""
+    free = LiquidRingBalancer(bundled("liquid_ring_paper")).trials()[0].along
+    capped = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.6 MPa")).trials()[0].along
+    below = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.1 MPa")).trials()[0].along
+    assert free is not None
+    assert capped is not None
+    assert below is not None
+    assert max(free.levels) > 2 * max(capped.levels)
+    assert max(capped.levels) == 0.6e6
+    assert set(capped.levels) - {0.6e6} == {each for each in free.levels if each < 0.6e6}
+    assert list(capped.first) == [at for at in free.first if at < len(capped.levels)]
+    assert (below.levels, below.first) == ((0.1e6,), (0,))
+
+
+def test_levels_follow_each_other_from_the_start() -> None:
+    axis = Axis(name="gas.pressure", levels=(1.0, 2.0, 3.0, 4.0), first=(0, 1, 2, 3))
+    assert _outwards(axis, axis.first, 3.9) == [3, 2, 1, 0]
+    assert _outwards(axis, axis.first, 2.1) == [1, 0, 2, 3]
 
 
 def test_a_limit_follows_from_the_grade() -> None:

@@ -42,37 +42,6 @@ def _system(around: int = 8, wall_ratio: float = 15.0) -> FlowSystem:
     return SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio).system()
 
 
-def _still(system: FlowSystem) -> float:
-    return friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
-
-
-def test_tube_at_rest_has_hagen_and_poiseuilles_friction() -> None:
-    assert _still(_system()) == pytest.approx(1.0, abs=5e-7)
-
-
-def test_slow_rotation_without_inertia_follows_the_series() -> None:
-    flow = solve_section_without_inertia(system=_system(), rotation_reynolds=1.0)
-    assert friction_ratio(flow) - _still(_system()) == pytest.approx(1 / 9216, rel=1e-3)
-
-
-@pytest.mark.parametrize("kl", [20.0, 60.0])
-def test_slow_rotation_with_inertia_follows_the_series(kl: float) -> None:
-    flow = solve_section(system=_system(), kl=kl, s=0.0)
-    expected = kl**2 / 16515072
-    # The next term of the series is of the order of the square of this one.
-    assert friction_ratio(flow) - _still(_system()) == pytest.approx(expected, rel=0.002 + 20 * expected)
-
-
-def test_fast_rotation_without_inertia_tends_to_the_exact_limit() -> None:
-    gaps = []
-    for rotation in (1e3, 1e4, 1e5):
-        flow = solve_section_without_inertia(system=_system(10), rotation_reynolds=rotation)
-        gaps.append(friction_ratio(flow) / (0.07863 * np.sqrt(rotation)) - 1)
-    # The gap falls as the thickness of the Ekman layer, R^(-1/2).
-    assert gaps[0] / gaps[1] == pytest.approx(np.sqrt(10), rel=0.15)
-    assert gaps[2] == pytest.approx(gaps[1] / np.sqrt(10), abs=0.005)
-
-
 def _followed(kl: float, s: float, around: int) -> float:
     """F at a point, followed from slow rotation."""
     system = _system(around)

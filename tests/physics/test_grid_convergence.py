@@ -1,4 +1,4 @@
-"""Grid convergence: sequences whose limit is known, and those with no order; the published ones are a case."""
+"""Grid convergence: sequences whose limit is known, and those with no order; a case has published ones."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
-from ringbalance.physics.pressure.surface import find_surface, refined_surface, solve_with_gravity
+from ringbalance.physics.pressure.surface import _find_surface, refined_surface, solve_with_gravity
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
@@ -95,10 +95,10 @@ def test_axial_gravity_that_empties_one_end_is_no_ring(disc: Disc) -> None:
 
 def test_a_start_from_the_coarser_mesh_leads_to_the_same_surface(disc: Disc) -> None:
     liquid = across(500.0, 1.0)
-    coarse = find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(4, 12))
-    cold = find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24))
+    coarse = _find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(4, 12))
+    cold = _find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24))
     start = refined_surface(coarse.chamber.surface_radius)
-    warm = find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24), start=start)
+    warm = _find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24), start=start)
     assert warm.statistics.iterations < cold.statistics.iterations
     np.testing.assert_allclose(
         warm.chamber.surface_radius, cold.chamber.surface_radius, atol=1e-9 * disc.outer_radius
@@ -118,7 +118,7 @@ def test_opposite_angles_give_mirror_images(fill: float, angle: float, speed: fl
         initial_fill=0.25,
     )
     first, second = (
-        find_surface(disc=disc, liquid=across(speed, sign * angle), fill_ratio=fill, cells=(2, 6))
+        _find_surface(disc=disc, liquid=across(speed, sign * angle), fill_ratio=fill, cells=(2, 6))
         for sign in (1, -1)
     )
     assert first.status.ok

@@ -17,8 +17,8 @@ from rotating_friction_table import columns, run_column, settings_hash, table_se
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.rotation_table import (
-    friction_table,
-    ito_nanbu_laminar,
+    _friction_table,
+    _ito_nanbu_laminar,
     rotating_friction_ratio,
     rotation_table_covers,
     slow_first,
@@ -94,7 +94,7 @@ def test_the_committed_table_is_whole() -> None:
 
 
 def test_the_table_is_fine_enough() -> None:
-    table = friction_table()
+    table = _friction_table()
     inner = [r for r in table.rows if r["table"] == "slow" and float(r["a"]) <= slow_first(1e6)]
     assert max(float(r["uncertainty"]) / float(r["fine"]) for r in inner) < 1e-3
     assert table.interpolation_error < 2e-3
@@ -103,7 +103,7 @@ def test_the_table_is_fine_enough() -> None:
 
 @pytest.mark.parametrize(("a", "b"), [(3, 4), (9, 10)])
 def test_points_of_the_table_come_out_again(a: int, b: int) -> None:
-    settings, table = table_settings(), friction_table()
+    settings, table = table_settings(), _friction_table()
     place = (settings.slow_a[a], settings.slow_b[b])
     row = next(r for r in table.rows if r["table"] == "slow" and (float(r["a"]), float(r["b"])) == place)
     kl, s = 300 * np.expm1(place[0]), place[1] / (1 - place[1])
@@ -113,7 +113,7 @@ def test_points_of_the_table_come_out_again(a: int, b: int) -> None:
 @pytest.mark.heavy
 @pytest.mark.parametrize("index", range(len(columns(table_settings()))))
 def test_every_point_of_the_table_comes_out_again(index: int, tmp_path: Path) -> None:
-    settings, table = table_settings(), friction_table()
+    settings, table = table_settings(), _friction_table()
     column = columns(settings)[index]
     assert run_column(column=column, folder=tmp_path, settings=settings) == len(column.points)
     assert run_column(column=column, folder=tmp_path, settings=settings) == 0
@@ -208,7 +208,7 @@ def test_ito_and_nanbus_formula_holds_for_slow_rotation_only() -> None:
 
     def gap(s: float) -> float:
         value = rotating_friction_ratio(reynolds=np.sqrt(kl / s), rotation_reynolds=np.sqrt(kl * s)).value
-        return float(np.abs(ito_nanbu_laminar(kl=kl) / value - 1).max())
+        return float(np.abs(_ito_nanbu_laminar(kl=kl) / value - 1).max())
 
     assert gap(0.05) < 0.03
     assert gap(0.5) < 0.08

@@ -71,7 +71,8 @@ def calibrate(scene: AnyScene) -> Calibration:
 def calibrated_model(scene: Scene, *, checked: bool = True) -> BalancerModel:
     """The balancer that `calibrate` finds, without what it reports beside: half the work.
 
-    Args: `checked`: whether finite elements check the chamber, which takes half of the rest.
+    Args: `checked`: whether finite elements check the chamber, and the law knows what the scene's uncertain
+        inputs do to it: three quarters of the rest.
     Raises: SceneError, ValueError: as `calibrate`.
     """
     return BalancerModel.of(chamber_and_law(scene, checked=checked)[1])
@@ -94,4 +95,5 @@ def chamber_and_law(scene: Scene, *, checked: bool = True) -> tuple[ChamberCalib
     """
     check_ring(scene)
     chamber = calibrate_chamber(scene, checked=checked)
-    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=TubeHeads.of(scene))
+    heads = TubeHeads.of(scene) if checked else TubeHeads.bare(scene)
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=heads, varied=checked)

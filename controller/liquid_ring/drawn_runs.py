@@ -22,6 +22,7 @@ from ringbalance.controller.rotor import Rotors
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import compression_work
+from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import PLANT, Dynamics
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
@@ -70,6 +71,13 @@ class DrawnRuns:
     """Amplitude to come below, m, whatever the controller rests at."""
     rotors: Rotors | None = None
     """Of the devices; None: their own, drawn."""
+    bare: bool = False
+    """Whether the model's law does not know what the scene's uncertain inputs do to it."""
+
+    @cached_property
+    def informed(self) -> BalancerModel:
+        """The model with that, which the law-based algorithm asks for."""
+        return calibrated_model(self.scene, checked=False) if self.bare else self.model
 
     @cached_property
     def terms(self) -> tuple[str, ...]:
@@ -106,7 +114,8 @@ class DrawnRuns:
 
     def _setting(self, place: int, setting: Settings) -> _Setting:
         scene = with_values_at(self.scene, setting)
-        controller = controller_of(scene, self.model, relative_error=RELATIVE_ERROR)
+        model = self.informed if scene.controller.kind == "law_based" else self.model
+        controller = controller_of(scene, model, relative_error=RELATIVE_ERROR)
         return _Setting(place=place, scene=scene, controller=controller)
 
     def _runs(

@@ -235,14 +235,3 @@ def assumed_rotor(scene: SceneFile) -> Iterator[Finding]:
 
 def _plain(default: object) -> str:
     return " at ".join(map(str, default.values())) if isinstance(default, Mapping) else str(default)
-
-
-def _required(run: Simulation) -> Iterator[Finding]:
-    """What the scene requires and a settled run does not show."""
-    scene, time = run.scene, run.settling_time
-    asked, allowed = scene.requirement.settling_time, scene.required_amplitude
-    if time is not None and asked is not None and time > asked:
-        yield Finding(code="settled_too_late", values={"settling_time": time, "required": asked})
-    if allowed is not None and scene.controller.limit > allowed:
-        values = {"limit": scene.controller.limit, "allowed": allowed}
-        yield Finding(code="limit_above_requirement", values=values)

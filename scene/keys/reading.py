@@ -99,10 +99,8 @@ class Reading:
 
     def _needed(self, path: str) -> Fault:
         """An error about a missing value, with what it would follow from."""
-        others = self.schema.key_at(tuple(path.split("."))).presence.needs
-        return self.missing(
-            path, " or ".join(["every scene needs it", *(each.split(".")[1] for each in others)])
-        )
+        others = (need.split(".")[1] for need in self.schema.key_at(tuple(path.split("."))).presence.needs)
+        return self.missing(path, " or ".join(["every scene needs it", *others]))
 
     def _table(self, table: str) -> Mapping[str, Any]:
         content = self.document.get(table, {}) if table else self.document
@@ -115,7 +113,8 @@ class Reading:
     def completed(self) -> Reading:
         """Fill in the defaults that follow from other values, as far as those are known.
 
-        What a default follows from is there already, because a key is declared after it.
+        What a default follows from is there already, because a key is declared after it; a needed key follows
+        from what the file gives.
         """
         unnamed = self.lacks("name")
         known = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self

@@ -165,7 +165,8 @@ def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
 
 def _written(value: Any, path: str) -> Any:
     if isinstance(value, tuple):
-        return [_written(each, path) for each in value]
+        # One time for all chambers is written as it is read, and not as a list of one.
+        return _written(value[0], path) if len(value) == 1 else [_written(each, path) for each in value]
     if isinstance(value, str | bool | int):
         return value
     unit = usual_unit(path)

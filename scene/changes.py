@@ -251,7 +251,9 @@ def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> 
         keys = takes.keys if isinstance(takes, Entries) else takes if isinstance(takes, Mapping) else {}
         return {key: _written(each, keys[key].takes if key in keys else None) for key, each in value.items()}
     if isinstance(value, list | tuple):
-        return [_written(each, takes) for each in value]
+        each_written = [_written(each, takes) for each in value]
+        single = isinstance(takes, Reader) and takes.one_for_all and len(value) == 1
+        return each_written[0] if single else each_written
     dimension = takes.dimension if isinstance(takes, Reader) else None
     if dimension is None or isinstance(value, bool) or not isinstance(value, int | float):
         return value

@@ -9,7 +9,7 @@ import csv
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from types import MappingProxyType
 from typing import Any
@@ -201,6 +201,7 @@ def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, F
     return liquid, rows
 
 
+@lru_cache(maxsize=256)
 def _water_properties(*, temperature: float) -> tuple[float, float, float]:
     """Properties of water at atmospheric pressure.
 

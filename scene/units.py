@@ -262,8 +262,11 @@ def _in_si(number: str, unit: _Unit, kind: _Dimension) -> float:
     scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
     if not abs(rough) * scale <= 10 * kind.largest:
         raise FieldError(_too_large(kind), _allowed(kind))
-    exact = Fraction(number) if rough != 0 else Fraction(0)
-    value = float((exact + unit.offset) * unit.factor) * (math.pi if unit.pi else 1.0)
+    value = rough + 0.0  # no negative zero
+    if unit.factor != 1 or unit.offset != 0:
+        exact = Fraction(number) if rough != 0 else Fraction(0)
+        value = float((exact + unit.offset) * unit.factor)
+    value *= math.pi if unit.pi else 1.0
     if abs(value) > kind.largest:
         raise FieldError(_too_large(kind), _allowed(kind))
     return value

@@ -115,9 +115,14 @@ UNKNOWN = _Uncertain(common=True)
 """All devices have it alike, and it is not known exactly."""
 
 
-def needed(meaning: str) -> Presence:
-    """Declare a key that every scene must have."""
-    return Presence(kind="needed", meaning=meaning, otherwise="needed")
+def needed(
+    meaning: str, *needs: str, otherwise: str = "**needed**", rule: Callable[..., Any] | None = None
+) -> Presence:
+    """Declare a key that every scene must have.
+
+    Args: `needs`, `otherwise`, `rule`: as of `derived`, of one that follows where those others are there.
+    """
+    return Presence(kind="needed", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs)
 
 
 def standard(default: object, meaning: str) -> Presence:

@@ -33,6 +33,8 @@ class Reader:
     """What is written there, for the reference of the scene file."""
     dimension: str | None = None
     """A key of `DIMENSIONS`; None without unit."""
+    one_for_all: bool = False
+    """Whether a list of one value is written as that value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,6 +231,7 @@ def _one_or_each(reader: Reader, *, example: str) -> Reader:
         read=read,
         allowed=f"{reader.allowed}; {more}, such as {example}",
         summary=f"{reader.summary}, {more}",
+        one_for_all=True,
     )
 
 

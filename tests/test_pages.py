@@ -102,7 +102,11 @@ def test_commands_of_a_page_are_run_and_written(tmp_path: Path) -> None:
     """A page that fails does not keep others from being written."""
     good, bad = tmp_path / "good.md", tmp_path / "bad.md"
     scene = "scenes/six_chamber.toml"
-    lines = f"ringbalance --version\nringbalance calibrate {scene} --brief > brief.txt\ngrep -c Calibration brief.txt"
+    lines = (
+        "ringbalance --version\n"
+        f"ringbalance calibrate {scene} --brief > brief.txt\n"
+        "grep -c Calibration brief.txt"
+    )
     good.write_text(f"```sh\n{lines}\n```\n\n```text\n```\n")
     bad.write_text("```sh\nringbalance calibrate \\\n  absent.toml\n```\n")
     done = generate("--write", "pages", good, bad)

@@ -24,6 +24,7 @@ from ringbalance.scene.models import Liquid
 from ringbalance.scene.units import FieldError
 
 _ZERO_CELSIUS = 273.15
+_ROOM = 293.15
 _SAME_TEMPERATURE = 0.01
 _WATER = "water"
 _COLUMNS = ("T_C", "rho_kg_m3", "nu_m2_s", "vapour_pressure_Pa")
@@ -124,6 +125,14 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
         density_uncertainty=liquid.density_uncertainty,
         viscosity_uncertainty=liquid.viscosity_uncertainty,
         source=liquid.source,
+    )
+
+
+def liquids_at_room_temperature() -> tuple[Liquid, ...]:
+    """Every known liquid at 20 degC, or at the nearest temperature for which there are data."""
+    return tuple(
+        liquid_at(name=each.name, temperature=min(max(_ROOM, each.temperatures[0]), each.temperatures[-1]))
+        for each in known_liquids()
     )
 
 

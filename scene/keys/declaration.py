@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, is_dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from ringbalance.scene.keys.fields import Reader, choice
 
@@ -53,6 +53,7 @@ class Entries:
     keys: Mapping[str, Key]
     example: str
     """The list as one would write it; empty for one table."""
+    dimension: ClassVar[str | None] = None
 
     @property
     def allowed(self) -> str:

@@ -84,8 +84,9 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
         if not limits.holds(number):
             raise FieldError(f"it must be {limits}", allowed)
         if limits.above == 0 and number < kind.smallest:
-            si_unit = next(iter(kind.units))
-            raise FieldError(f"it must be at least {kind.smallest:g} {si_unit} to mean anything", allowed)
+            raise FieldError(
+                f"it must be at least {kind.smallest:g} {kind.si_unit} to mean anything", allowed
+            )
         return number
 
     return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)

@@ -7,18 +7,18 @@ decides on regime, status and uncertainty.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from ringbalance.export import point
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tables import HermiteTable
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.reduced_model.law.table import Column, Table, knots_of, largest_error, table_at
+from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -118,230 +118,101 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    row = [0.0] * point.PLACES
-    level_error = _append_levels(row, law)
-    _append_chamber(row, scene, law)
-    missed = _append_tube(row, law)
-    for at, value in _scalars(law, missed).items():
-        row[at] = float(value)
-    made = CompactLaw(scene=scene.file, constants=tuple(row), head_error=missed, level_error=level_error)
-    return replace(made, departure=_departure(made, law))
+    heads, missed = _heads(law.heads)
+    levels, level_error = _levels(law)
+    compact = replace(law, heads=heads, levels=levels)
+    row = compact.constants_with({point.CHAMBER: _chamber(scene, law)})
+    return CompactLaw(
+        scene=scene.file,
+        constants=tuple(row.tolist()),
+        head_error=missed,
+        level_error=level_error,
+        departure=_departure(compact, law),
+    )
 
 
-def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
+def _departure(compact: CalibratedLaw, law: CalibratedLaw) -> float:
     """Over fills of both chambers, pressures of six decades and both states of the tube."""
     drawn, top = np.random.default_rng(0), law.max_fill_ratio
     fill, opposite = drawn.uniform(0.0, top, (2, _DRAWN))
-    pressure, worst = 10 ** drawn.uniform(2, 8, _DRAWN), 0.0
-    for primed in (False, True):
-        right = law.evaluate(
+    pressure, primed = 10 ** drawn.uniform(2, 8, _DRAWN), drawn.integers(0, 2, _DRAWN) > 0
+    right, found = (
+        each.evaluate(
             fill_ratio=fill, opposite_fill_ratio=opposite, gas_pressure=pressure, primed=primed
         ).velocity
-        for at in np.flatnonzero((np.abs(right) > VELOCITIES[0]) & (np.abs(right) < VELOCITIES[1])):
-            answer = made.answer(
-                fill_ratio=float(fill[at]),
-                opposite_fill_ratio=float(opposite[at]),
-                gas_pressure=float(pressure[at]),
-                primed=primed,
-            )
-            worst = max(worst, abs(answer.velocity / float(right[at]) - 1.0))
-    return worst
+        for each in (law, compact)
+    )
+    inside = (np.abs(right) > VELOCITIES[0]) & (np.abs(right) < VELOCITIES[1])
+    return float(np.max(np.abs(found[inside] / right[inside] - 1.0), initial=0.0))
 
 
-def _scalars(law: CalibratedLaw, missed: float) -> dict[int, float]:
-    path, inputs = law.path, law.inputs
-    return {
-        point.LARGEST_FILL: law.max_fill_ratio,
-        point.AMBIENT: law.ambient_pressure,
-        point.GAS_FACTOR: law.gas_factor,
-        point.DENSITY: law.density,
-        point.PORT: path.port_pressure,
-        point.CREST: path.crest,
-        point.COLUMN: path.column_pressure,
-        point.TRAPPED: path.trapped,
-        point.VAPOUR: path.vapour_pressure,
-        point.RELEASED: path.released,
-        point.CAVITY_KNOWN: path.cavity_fitted,
-        point.FROUDE: path.froude_velocity,
-        point.STAYS: path.clearing_velocities[0],
-        point.CLEARS: path.clearing_velocities[1],
-        point.OF_DENSITY: inputs.relative_density,
-        point.OF_SPEED: inputs.relative_speed,
-        point.OF_GAS: inputs.relative_gas_pressure,
-        point.OF_CREST: float(np.hypot(inputs.hump_pressure, inputs.vapour_pressure)),
-        point.TABULATION: _AT_CREST * missed,
-        point.LOWEST: VELOCITIES[0],
-        point.HIGHEST: VELOCITIES[1],
-    }
+def _heads(heads: TubeHeads) -> tuple[TubeHeads, float]:
+    """On fewer knots. Returns: also the largest relative error of a velocity for a given head."""
+    ways = [table for table in (heads.siphon, heads.hump, heads.return_hump) if table is not None]
+    made = [_coarser(table) for table in ways]
+    missed = max(error for _, error in made) + heads.interpolation_error / 2
+    return TubeHeads.with_ways(*(table for table, _ in made), error=_AT_CREST * missed), missed
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Column:
-    """A quantity over samples, with derivatives by the table's x as far as its pieces need them."""
-
-    value: FloatArray
-    """Shape (samples,)."""
-    allowed: FloatArray | float
-    """Largest error."""
-    slope: FloatArray | None = None
-    """None: straight between the knots."""
-    curvature: FloatArray | None = None
-
-    @property
-    def stored(self) -> tuple[FloatArray, ...]:
-        return tuple(each for each in (self.value, self.slope, self.curvature) if each is not None)
-
-    def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
-        """Of one piece between two samples, at the samples that it spans."""
-        ends, inside = [first, last], slice(first, last + 1)
-        width = float(x[last] - x[first])
-        t, y = (x[inside] - x[first]) / width, self.value[ends]
-        if self.slope is None:
-            return np.asarray(y[0] + t * (y[1] - y[0]) - self.value[inside])
-        slope = width * self.slope[ends]
-        if self.curvature is None:
-            bend = 3 * (y[1] - y[0]) - 2 * slope[0] - slope[1]
-            piece = slope[0] + t * (bend + t * (y[1] - y[0] - slope[0] - bend))
-        else:
-            half = width * width * self.curvature[ends] / 2
-            rise = y[1] - y[0] - slope[0] - half[0]
-            turn, bend = slope[1] - slope[0] - 2 * half[0], half[1] - half[0]
-            third, fourth = 10 * rise - 4 * turn + bend, 7 * turn - 15 * rise - 2 * bend
-            piece = slope[0] + t * (half[0] + t * (third + t * (fourth + t * (6 * rise - 3 * turn + bend))))
-        return np.asarray(y[0] + t * piece - self.value[inside])
+def _coarser(table: Table) -> tuple[Table, float]:
+    """A table over the eighth root of a head, and its largest error of a velocity."""
+    slowest, fastest = roots_of(table, VELOCITIES)
+    s = np.geomspace(slowest, fastest, _SAMPLES)
+    columns = [_smooth(table, 1, s, _OF_HEADS), _half_width(table.straight(s, point.LOSS_COLUMN))]
+    shares = range(point.SHARE_COLUMN, table.columns.size // table.knots.size, 2)
+    if shares:
+        columns.append(_half_width(table.straight(s, point.SHARE_WIDTH_COLUMN) + _OF_SHARE))
+        columns += [_smooth(table, number, s, _OF_SHARE) for number in shares]
+    knots = knots_of(s, columns)
+    return table_at(s, knots, columns), largest_error(s, columns[0], knots, relative=True)
 
 
-def _append_levels(row: list[float], law: CalibratedLaw) -> float:
-    """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
-    table = law.hydrostatic_pressure
-    # Every node of the law's table is a sample, so that a table with few nodes is met exactly.
-    parts = max(1, round(_SAMPLES / (table.value.size - 1)))
-    x = np.linspace(0.0, law.max_fill_ratio, parts * (table.value.size - 1) + 1)
-    slowest = float(np.exp(law.heads.head(np.log(VELOCITIES[0])))) * law.density
-    value, slope = table.with_slope(x)
-    level = _Column(
-        value=value,
-        allowed=_OF_LEVELS * slowest,
-        slope=slope,
-        curvature=_curvature(table, x),
+def _smooth(table: Table, number: int, s: FloatArray, allowed: float) -> Column:
+    """Args: `allowed`: relative error."""
+    curve = CubicHermiteSpline(table.knots, table.column(number), table.column(number + 1))
+    return Column(value=curve(s), allowed=allowed * curve(s), slope=curve(s, nu=1))
+
+
+def _levels(law: CalibratedLaw) -> tuple[Table, float]:
+    """The hydrostatic pressure over the fill ratio, and its largest error, Pa."""
+    table, curve = law.levels, _quintic(law.levels)
+    # Every knot of the law's table is a sample, so that a table with few knots is met exactly.
+    parts = max(1, round(_SAMPLES / (table.knots.size - 1)))
+    x = np.linspace(0.0, law.max_fill_ratio, parts * (table.knots.size - 1) + 1)
+    slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
+    level = Column(
+        value=curve(x), allowed=_OF_LEVELS * slowest, slope=curve(x, nu=1), curvature=curve(x, nu=2)
     )
     width = np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0)
-    while (knots := _knots(x, [level, _half_width(width)])).size > _MOST_LEVELS:
+    while (knots := knots_of(x, [level, _half_width(width)])).size > _MOST_LEVELS:
         level = replace(level, allowed=2 * np.asarray(level.allowed))
-    error = _largest(x, level, knots)
-    _append(row, point.FILLS, x, knots, [level, replace(_half_width(width), value=np.hypot(width, error))])
-    return error
+    error = largest_error(x, level, knots)
+    widened = replace(_half_width(width), value=np.hypot(width, error))
+    return table_at(x, knots, [level, widened]), error
 
 
-def _curvature(table: HermiteTable, x: FloatArray) -> FloatArray:
-    cell = np.clip(np.floor((x - table.start) / table.step), 0, table.value.size - 2).astype(int)
-    t = (x - table.start) / table.step - cell
-    c = table.coefficients[:, cell]
-    return np.asarray((2 * c[2] + t * (6 * c[3] + t * (12 * c[4] + t * 20 * c[5]))) / table.step**2)
+def _quintic(table: Table) -> BPoly:
+    """The first three columns."""
+    return BPoly.from_derivatives(table.knots, np.stack([table.column(i) for i in (1, 2, 3)], axis=1))
 
 
-def _append_chamber(row: list[float], scene: Scene, law: CalibratedLaw) -> None:
+def _chamber(scene: Scene, law: CalibratedLaw) -> Table:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
     x = np.linspace(0.0, law.max_fill_ratio, _SAMPLES)
-    square = surface_radius(disc=scene.disc, fill_ratio=x) ** 2
-    moment, slope = law.moment.chamber_moment.with_slope(x)
+    square, moment = surface_radius(disc=scene.disc, fill_ratio=x) ** 2, _quintic(law.moment.along)
     columns = [
-        _Column(
+        Column(
             value=square,
             allowed=_OF_CHAMBER * float(np.max(square)),
             slope=np.gradient(square, x, edge_order=2),
         ),
-        _Column(value=moment, allowed=_OF_CHAMBER * float(np.max(np.abs(moment))), slope=slope),
+        Column(
+            value=moment(x), allowed=_OF_CHAMBER * float(np.max(np.abs(moment(x)))), slope=moment(x, nu=1)
+        ),
         _half_width(np.maximum(law.moment.half_width(x), 0.0)),
     ]
-    _append(row, point.CHAMBER, x, _knots(x, columns), columns)
+    return table_at(x, knots_of(x, columns), columns)
 
 
-def _append_tube(row: list[float], law: CalibratedLaw) -> float:
-    """Velocities over heads. Returns: their largest relative error."""
-    heads, log_u = law.heads, np.log(np.geomspace(*VELOCITIES, _SAMPLES))
-    ways = [way for way in (heads.hump_head, heads.return_hump_head) if way is not None]
-    alike = len(ways) == 2 and np.array_equal(ways[0].value, ways[1].value)
-    ways = ways[:1] if alike else ways
-    s, ratio, by_s = _velocities(heads.head, log_u)
-    columns = [ratio, _half_width(heads.uncertainty(log_u))]
-    if ways:
-        columns.append(_half_width(heads.fraction_uncertainty(log_u) + _OF_SHARE))
-        columns += [_share(heads.head, way, log_u, by_s) for way in ways]
-    tables = [(point.SIPHON, s, columns)]
-    for at, way in zip((point.THERE, point.BACK), ways, strict=False):
-        s, ratio, _ = _velocities(way, log_u)
-        tables.append((at, s, [ratio, _half_width(heads.hump_uncertainty(log_u))]))
-    missed = []
-    for at, x, each in tables:
-        knots = _knots(x, each)
-        _append(row, at, x, knots, each)
-        missed.append(_largest(x, each[0], knots, relative=True))
-    row[point.BACK_SHARE] = point.SHARE_COLUMN + (0 if alike else 2)
-    if alike:
-        row[point.BACK : point.BACK + 2] = row[point.THERE : point.THERE + 2]
-    return max(missed)
-
-
-def _velocities(head: HermiteTable, log_u: FloatArray) -> tuple[FloatArray, _Column, FloatArray]:
-    """Eighth root of the head, u/sqrt(head) over it, and d(ln u)/d(eighth root)."""
-    value, slope = head.with_slope(log_u)
-    s, ratio = np.exp(value / 8), np.exp(log_u - value / 2)
-    by_s = 8 / (s * slope)
-    column = _Column(value=ratio, allowed=_OF_HEADS * ratio, slope=ratio * (1 - slope / 2) * by_s)
-    return s, column, by_s
-
-
-def _share(head: HermiteTable, way: HermiteTable, log_u: FloatArray, by_s: FloatArray) -> _Column:
-    """Part of the head that is lost up to the crest, over the eighth root of the head."""
-    (whole, slope), (part, part_slope) = head.with_slope(log_u), way.with_slope(log_u)
-    share = np.exp(part - whole)
-    return _Column(value=share, allowed=_OF_SHARE * share, slope=share * (part_slope - slope) * by_s)
-
-
-def _half_width(value: FloatArray) -> _Column:
-    return _Column(value=value, allowed=_OF_WIDTHS * (value + 0.1 * float(np.max(value))) + 1e-300)
-
-
-def _knots(x: FloatArray, columns: list[_Column]) -> IntArray:
-    """Samples at which pieces meet, each piece as long as its errors allow."""
-
-    def fits(first: int, last: int) -> bool:
-        return all(
-            bool(np.all(np.abs(column.errors(x, first, last)) <= _inside(column.allowed, first, last)))
-            for column in columns
-        )
-
-    knots = [0]
-    while knots[-1] < x.size - 1:
-        knots.append(_furthest(lambda last: fits(knots[-1], last), knots[-1] + 1, x.size - 1))
-    return np.array(knots)
-
-
-def _inside(allowed: FloatArray | float, first: int, last: int) -> FloatArray | float:
-    return allowed[first : last + 1] if isinstance(allowed, np.ndarray) and allowed.ndim else allowed
-
-
-def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:
-    """By halving; the lowest is taken to fit."""
-    while low < high:
-        middle = (low + high + 1) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle - 1)
-    return low
-
-
-def _largest(x: FloatArray, column: _Column, knots: IntArray, *, relative: bool = False) -> float:
-    """Error of a column between its knots."""
-    return max(
-        float(np.max(np.abs(column.errors(x, a, b) / (column.value[a : b + 1] if relative else 1.0))))
-        for a, b in pairwise(knots.tolist())
-    )
-
-
-def _append(row: list[float], at: int, x: FloatArray, knots: IntArray, columns: list[_Column]) -> None:
-    """Put a table behind a row, and where it begins, with its number of knots, into its places."""
-    row[at], row[at + 1] = float(len(row)), float(knots.size)
-    row += x[knots].tolist()
-    for column in columns:
-        for values in column.stored:
-            row += values[knots].tolist()
+def _half_width(value: FloatArray) -> Column:
+    return Column(value=value, allowed=_OF_WIDTHS * (value + 0.1 * float(np.max(value))) + 1e-300)

@@ -9,7 +9,7 @@ method.  Source: `physics.gas` for the line, whose equations and names these are
 
 from math import sqrt
 
-from ringbalance.export.point import (
+from ringbalance.reduced_model.law.point import (
     AMBIENT,
     BLOCK,
     BLOCKED,

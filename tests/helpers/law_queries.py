@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ringbalance.export import point
+from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.arrays import FloatArray
 

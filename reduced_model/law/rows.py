@@ -1,0 +1,93 @@
+"""Tables as the numbers and pieces that `point` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.reduced_model.law import point
+from ringbalance.reduced_model.law.table import Table
+from ringbalance.scene.arrays import FloatArray
+
+WIDTH_OF_ROW: Final = point.WIDTH_SLOPE + 1
+_EDGE: Final = 1e-9
+"""Of a cell, by which what lies next to the edge of a cell is taken to be in the next one."""
+
+
+CELLS: Final = 512
+"""Of a law inside the program."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawRows:
+    """The law's numbers and rows of pieces, as far as they are."""
+
+    cells: int = CELLS
+    """Of equal length, that say at which piece to begin looking."""
+    numbers: list[float] = field(default_factory=lambda: [0.0] * point.PLACES)
+    rows: list[list[float]] = field(default_factory=list)
+
+    def add(self, *columns: npt.ArrayLike) -> None:
+        """Pieces as columns of what stands in a row, each of shape (pieces,) or (powers, pieces)."""
+        whole = np.concatenate([np.atleast_2d(np.asarray(each, dtype=np.float64)) for each in columns])
+        padded = np.zeros((whole.shape[1], WIDTH_OF_ROW))
+        padded[:, : len(whole)] = whole.T
+        self.rows.extend(padded.tolist())
+
+    def add_cells(self, knots: FloatArray) -> tuple[float, float]:
+        """Cells for the pieces that are added next. Returns: cells for one of x, and the place of x = 0."""
+        start, place, first = float(knots[0]), len(self.numbers), len(self.rows)
+        edges = np.linspace(start, float(knots[-1]), self.cells + 1)[:-1]
+        pieces = first + np.searchsorted(knots[1:], edges, side="right")
+        self.numbers.extend([*pieces.astype(float).tolist(), float(first + knots.size - 2)])
+        scale = self.cells / (float(knots[-1]) - start)
+        return scale, place - start * scale + _EDGE
+
+    def add_ratios(
+        self, way: int, knots: FloatArray, ratios: FloatArray, squares: FloatArray, more: Sequence[float]
+    ) -> None:
+        """Pieces of a way: velocity over the root of a pressure, along the eighth root of that.
+
+        Args: `ratios`: shape (6, pieces). `squares`: of half-widths of the loss, shape (2, pieces). `more`:
+            behind the rest in the way's own row.
+        """
+        first = float(knots[0])
+        cells = self.add_cells(knots)
+        slowest = ratios[:, 0] @ (first - float(knots[1])) ** np.arange(6)
+        row = [first**8, float(slowest) / first**4, float(knots[-1]), *cells, *more]
+        self.rows[way] = row + [0.0] * (WIDTH_OF_ROW - len(row))
+        self.add(knots[1:], ratios, squares)
+
+    def add_levels(self, levels: Table) -> None:
+        """Hydrostatic pressure over the fill, with its half-width in column 3."""
+        cells = self.add_cells(levels.knots)
+        self.numbers[point.LEVEL_SCALE], self.numbers[point.LEVEL_CELLS] = cells
+        self.add(levels.knots[1:], levels.quintics, levels.lines(levels.column(3)))
+
+    def add_way(self, way: int, table: Table, density: float, *more: float) -> None:
+        """A table over the eighth root of a head, of a liquid's density, kg/m^3; its loss in column 3."""
+        root = density**0.125
+        ratios = table.quintics / density**0.5 / root ** np.arange(6)[:, None]
+        squares = table.lines(table.column(3) ** 2) / np.array([[1.0], [root]])
+        self.add_ratios(way, root * table.knots, ratios, squares, more)
+
+    def add_shares(self, table: Table, density: float) -> None:
+        """Beside the pieces of the whole tube: from column 4 on, see `TubeHeads`."""
+        powers = density ** (0.125 * np.arange(4))[:, None]
+        off = table.lines(table.column(4)) / powers[:2]
+        back = table.cubics(7) if table.count > 7 else np.zeros((4, table.knots.size - 1))
+        # Through the middle of a cubic piece and both its ends.
+        length = np.diff(table.knots)
+        back = np.array([back[0], back[1] - back[3] * length**2 / 2, back[2] - back[3] * length * 1.5])
+        self.add(table.cubics(5) / powers, off, back / powers[:3])
+
+    def arrays(self, scalars: Mapping[int, float]) -> tuple[FloatArray, FloatArray]:
+        """Numbers, with those of the law at their places, and pieces, shape (rows, `WIDTH_OF_ROW`)."""
+        numbers = np.array(self.numbers)
+        for place, value in scalars.items():
+            numbers[place] = value
+        return numbers, np.array(self.rows)

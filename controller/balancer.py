@@ -216,6 +216,8 @@ class Demand:
     unit: str
     stated: bool
     """Whether the scene states it; else what every run is asked for."""
+    amplitude: float | None = None
+    """Vibration at or below which a device counts as settled, m zero-to-peak, where [requirement] says so."""
 
     def met(self, outcomes: Outcomes) -> BoolArray:
         """By each device."""
@@ -442,8 +444,8 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
     return tuple(found)
 
 
-def settles_within(time: float, *, stated: bool) -> Demand:
-    """That a device settles within a time, s."""
+def settles_within(time: float, *, stated: bool, amplitude: float | None = None) -> Demand:
+    """That a device settles within a time, s. Args: `amplitude`: see `Demand`."""
     return Demand(
         code="settling_time",
         outcome="settling_time",
@@ -451,4 +453,5 @@ def settles_within(time: float, *, stated: bool) -> Demand:
         required=time,
         unit="s",
         stated=stated,
+        amplitude=amplitude,
     )

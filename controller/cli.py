@@ -24,7 +24,7 @@ def tune(
     law: str = "calibrated",
     json: bool = False,
     pressure: bool = False,
-    remedies: bool = False,
+    remedies: bool | None = None,
     save: Path | None = None,
     tolerance: str | None = None,
     models: Models | None = None,
@@ -36,8 +36,8 @@ def tune(
         law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
         json: print one JSON document instead of tables.
         pressure: search the gas pressure of a liquid ring even where the scene's meets what is required.
-        remedies: try valves that can be bought, too, for a scene that gives none; changes of the scene are
-            tried wherever what is required is not met.
+        remedies: try valves that can be bought, too, for a scene that gives none. Default: where what is
+            required is not met, changes of the scene; --no-remedies tries nothing but settings.
         save: write the scene with the recommended settings.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
@@ -54,7 +54,7 @@ def tune(
         check_file(save, apart_from=scene)
     balancer = balancer_under(law, with_tolerance(load_scene(scene), tolerance=tolerance, models=models))
     with activity("tune", "runs ...") as shown:
-        found = tuned(balancer, along=pressure, remedies=remedies or None, progress=shown.show)
+        found = tuned(balancer, along=pressure, remedies=remedies, progress=shown.show)
     if save is not None:
         write_whole(save, file_text(found.recommended_scene, to=save.parent))
     if json:

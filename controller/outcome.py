@@ -34,7 +34,18 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
         code = unmoved.get(outcome, code)
     numbers = _numbers(run)
     ended = Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
-    return (ended, *_causes(run), *_shortened(run))
+    return (ended, *_required(run), *_causes(run), *_shortened(run))
+
+
+def _required(run: Simulation) -> Iterator[Finding]:
+    """What the scene requires and a settled run does not show."""
+    scene, time = run.scene, run.settling_time
+    asked, allowed = scene.requirement.settling_time, scene.required_amplitude
+    if time is not None and asked is not None and time > asked:
+        yield Finding(code="settled_too_late", values={"settling_time": time, "required": asked})
+    if allowed is not None and scene.controller.limit > allowed:
+        values = {"limit": scene.controller.limit, "allowed": allowed}
+        yield Finding(code="limit_above_requirement", values=values)
 
 
 def _moves(run: Simulation) -> bool:

@@ -25,8 +25,7 @@ from ringbalance.design.axes import Axis, Point, Range
 from ringbalance.design.racing import BLOCK, DEVICES, SURE, Place, Race, near, race, raced_longer
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, static_rows
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET
+from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.registry import registered
 

@@ -46,7 +46,10 @@ class Space:
             if path not in taken:
                 axes.append(Axis(ranges={path: Range(low=low, high=high, log=log)}))
         if not any((wanted.outer_radius, wanted.axial_width, wanted.pressure, taken)):
-            allowed = "outer_radius, axial_width, pressure, valves, valve_file or vary in the table [design]"
+            allowed = (
+                "a table [design] with the space (outer_radius, axial_width), the highest pressure, valves, "
+                "valve_file or vary; for a given disc, `ringbalance tune` recommends pressure and controller"
+            )
             raise SceneError.of_file(scene.file, "[design] leaves nothing to choose", allowed)
         return cls(scene=scene, axes=tuple(axes))
 

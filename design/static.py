@@ -24,7 +24,9 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of, nameless
 from ringbalance.scene.designs import Designs, in_batches
 from ringbalance.scene.faults import SceneError
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.uncertain import combined, input_sides
 
@@ -85,12 +87,13 @@ def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = 
     """
     rows: list[Record] = []
     scenes: list[Scene] = []
+    by_core = scene_kind(scene.balancer).arrays
     for point in points:
         try:
-            if not isinstance(scene, Scene):
+            if not by_core:
                 rows.append(_of_balancer(point_scene(scene, point)))
                 continue
-            made, digest = nameless(scene, point)
+            made, digest = nameless(liquid_ring_scene(scene), point)
             check_ring(made)
             scenes.append(made)
             rows.append({"sha256": digest})

@@ -26,7 +26,7 @@ from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of, views
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene

@@ -16,7 +16,6 @@ from ringbalance.reports import summary
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
     chamber,
-    consequences,
     drag_coefficient,
     eccentric,
     first_page,
@@ -52,7 +51,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     tube.CREST,
     drag_coefficient.SECTION,
     loop.INJECTIONS,
-    consequences.SECTION,
+    loop.CONSEQUENCES,
     CASES,
     Section(name="numerics", title="Numerical verification"),
     studies.EXTREMES,

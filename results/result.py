@@ -207,11 +207,12 @@ class Rows:
         return Group(Text(self.title, style="bold"), *first, *more, sentences, *tables)
 
     def lines(self) -> Iterator[str]:
-        """About five lines: what it is, its main numbers with units, and the verdict."""
+        """About five lines: what it is, its main numbers with units, the verdict, and a warning behind it."""
         yield self.title
         for each in self.quantities[:_MAIN]:
             yield f"{each.name} {plain(each.text)}"
-        for finding in self.findings[:1]:
+        warnings = [each for each in self.findings[1:] if each.severity == "warning"]
+        for finding in (*self.findings[:1], *warnings[:1]):
             yield finding.text
 
     def html(self) -> str:

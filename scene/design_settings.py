@@ -18,7 +18,7 @@ from ringbalance.scene.keys.fields import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class ValveAtHand:
+class _ValveAtHand:
     """A valve with its line."""
 
     name: Annotated[OneLine, needed("as it is ordered")]
@@ -29,7 +29,7 @@ class ValveAtHand:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """What `ringbalance design` may choose; nothing else depends on it."""
+    """What `ringbalance design` may choose; of it `tune` looks at the pressure alone."""
 
     outer_radius: Annotated[
         PositiveLength | None,
@@ -43,11 +43,13 @@ class DesignSettings:
     ] = None
     pressure: Annotated[
         PositivePressure | None,
-        unused("the gas keeps its pressure", "highest gauge pressure that is available"),
+        unused(
+            "the gas keeps its pressure", "highest gauge pressure that is available, for `design` and `tune`"
+        ),
         Shown("gas pressure available", "MPa", note="gauge"),
     ] = None
     valves: Annotated[
-        tuple[ValveAtHand, ...],
+        tuple[_ValveAtHand, ...],
         standard([], "valves at hand; without any, and without `valve_file`, the scene's own stays"),
         Listed(
             '[{ name = "V1", conductance = "0.4 l/(s*bar)", critical_ratio = 0.3, valve_lag = "2 ms" }, ...]'

@@ -38,6 +38,8 @@ class SceneKind:
     """Paths of the values that stand for the scene in a terminal, line by line."""
     usual_units: Mapping[str, str] = field(default_factory=dict)
     """By dimension, of values whose declaration names no unit to show; else the SI unit."""
+    arrays: bool = False
+    """Whether its numbers may be arrays: many designs at once, as `ringbalance.scene.designs` has them."""
 
 
 def scene_kind(name: str) -> SceneKind:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -138,6 +138,40 @@ class Sensor:
     ]
 
 
+_UNASKED_LIMIT: Final = 0.05e-6
+"""m, to which a controller goes where nothing is required of it."""
+
+
+def required_amplitude(
+    *,
+    speed: float,
+    influence_coefficient: float,
+    mass: float | None,
+    residual: float | None,
+    grade: float | None,
+) -> float | None:
+    """Amplitude that may remain, m zero-to-peak: the smaller of the residual and of what the grade leaves.
+
+    kappa G m/w: the influence coefficient times the permissible unbalance.
+    Args: `mass`: m, kg, without which a grade G, m/s, asks for no amplitude.
+    Returns: None where nothing is asked.
+    Source: ISO 21940-11:2016, U = G m/w.
+    """
+    asked = [] if residual is None else [residual]
+    if grade is not None and mass is not None:
+        asked.append(grade * mass / speed * influence_coefficient)
+    return min(asked, default=None)
+
+
+def _limit(
+    speed: float, influence: float, mass: float | None, residual: float | None, grade: float | None
+) -> float:
+    asked = required_amplitude(
+        speed=speed, influence_coefficient=influence, mass=mass, residual=residual, grade=grade
+    )
+    return _UNASKED_LIMIT if asked is None else asked
+
+
 @dataclass(frozen=True, kw_only=True)
 class ControllerSettings:
     """What the scene says of the control algorithm."""
@@ -151,7 +185,14 @@ class ControllerSettings:
     ]
     limit: Annotated[
         PositiveLength,
-        standard("0.05 um", "amplitude below which the controller rests"),
+        derived(
+            "what requirement.residual or requirement.grade leaves; 0.05 um without them",
+            "amplitude (zero-to-peak) below which the controller rests",
+            "rotor.speed",
+            "rotor.influence_coefficient",
+            also=("rotor.mass", "requirement.residual", "requirement.grade"),
+            rule=_limit,
+        ),
         Shown("limit", "um"),
     ]
     period: Annotated[

@@ -40,7 +40,14 @@ from ringbalance.scene.keys.fields import (
     number,
     quantity,
 )
-from ringbalance.scene.loop_models import ControllerSettings, Environment, RequirementSettings, Rotor, Sensor
+from ringbalance.scene.loop_models import (
+    ControllerSettings,
+    Environment,
+    RequirementSettings,
+    Rotor,
+    Sensor,
+    required_amplitude,
+)
 from ringbalance.scene.origins import SceneFile
 
 HumpGas = Literal["vented", "trapped"]
@@ -389,6 +396,17 @@ class Scene(SceneFile):
     design: DesignSettings = field(default_factory=DesignSettings)
 
     balancer: ClassVar[str] = "liquid_ring"
+
+    @property
+    def required_amplitude(self) -> float | None:
+        """Amplitude that [requirement] lets remain, m zero-to-peak; None where it states none."""
+        return required_amplitude(
+            speed=self.rotor.speed,
+            influence_coefficient=self.rotor.influence_coefficient,
+            mass=self.rotor.mass,
+            residual=self.requirement.residual,
+            grade=self.requirement.grade,
+        )
 
     @property
     def mesh_digest(self) -> str:

@@ -20,8 +20,9 @@ import numpy as np
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.trials import Axis, Trials
-from ringbalance.results.paired import Paired
+from ringbalance.results.requirements import Paired
 from ringbalance.scene.arrays import BoolArray
+from ringbalance.scene.origins import value_at
 
 Progress = Callable[[str], None]
 
@@ -259,12 +260,13 @@ def searched_along(balancer: Balancer, best: Tried, *, progress: Progress) -> tu
     axis = best.candidate.trials.along
     if axis is None:
         return ()
+    own = float(value_at(balancer.scene, axis.name))
     chosen_at: dict[int, Tried] = {}
     found: dict[int, Along] = {}
     places: Sequence[int] = axis.first
     while places:
         progress(f"{len(places)} levels of {axis.name}")
-        for at in _outwards(axis, places, best.candidate.along):
+        for at in _outwards(axis, places, own if best.candidate.along is None else best.candidate.along):
             chosen_at[at] = _beside(balancer, best, chosen_at, at=at, axis=axis)
         found |= _answered(balancer, {at: chosen_at[at].candidate for at in places}, axis)
         top = _top(found)
@@ -272,10 +274,9 @@ def searched_along(balancer: Balancer, best: Tried, *, progress: Progress) -> tu
     return tuple(found[at] for at in sorted(found))
 
 
-def _outwards(axis: Axis, places: Sequence[int], along: float | None) -> list[int]:
-    """Places of levels from that of the best settings on; in the middle where it is the scene's."""
-    whole = range(len(axis.levels))
-    start = len(whole) // 2 if along is None else min(whole, key=lambda at: abs(axis.levels[at] - along))
+def _outwards(axis: Axis, places: Sequence[int], along: float) -> list[int]:
+    """Places of levels from that of the best settings on."""
+    start = min(range(len(axis.levels)), key=lambda at: abs(axis.levels[at] - along))
     return sorted(places, key=lambda at: abs(at - start))
 
 

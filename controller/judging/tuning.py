@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from ringbalance.controller.balancer import FURTHER, Settings
+from ringbalance.controller.balancer import FURTHER, Demand, Settings
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied, amplitude_reached
@@ -168,6 +168,7 @@ def required_document(judgement: Judgement) -> list[dict[str, Any]]:
             "required": each.required,
             "unit": each.unit,
             "stated": each.stated,
+            "amplitude_m": each.amplitude,
             "fraction": judgement.fraction_of(each).document(),
         }
         for each in judgement.demands
@@ -354,13 +355,18 @@ def required_table(judgement: Judgement) -> Table:
     """What is asked of every device, and how many meet it."""
     rows = [
         (
-            each.code.replace("_", " "),
+            _demand_text(each),
             f"{each.sense} {given(each.required, each.unit, digits=4)}",
             percent(judgement.fraction_of(each).value),
         )
         for each in judgement.demands
     ]
     return Table(caption="Required of every device", heads=("what", "required", "met by"), rows=rows)
+
+
+def _demand_text(demand: Demand) -> str:
+    what = demand.code.replace("_", " ")
+    return what if demand.amplitude is None else f"{what} to {given(demand.amplitude, 'm', digits=4)}"
 
 
 def _along_table(tuning: Tuning) -> Table:

@@ -165,7 +165,8 @@ class LiquidRingBalancer(Balancer):
         """Settled in time, and the unbalance that must be corrected."""
         wanted = self.scene.requirement
         time = self.span() if wanted.settling_time is None else wanted.settling_time
-        settles = settles_within(time, stated=wanted.settling_time is not None)
+        stated, allowed = wanted.settling_time is not None, self.scene.required_amplitude
+        settles = settles_within(time, stated=stated, amplitude=allowed)
         if wanted.correction_moment is None:
             return (settles,)
         moment = Demand(
@@ -200,16 +201,9 @@ class LiquidRingBalancer(Balancer):
 
     @property
     def limit(self) -> float:
-        """Amplitude that may remain, m: the residual required, or what the grade leaves, else the
-        controller's limit.
-
-        Source: ISO 21940-11:2016 for the grade, U = G m/w.
-        """
-        wanted, rotor = self.scene.requirement, self.scene.rotor
-        asked = [] if wanted.residual is None else [wanted.residual]
-        if wanted.grade is not None and rotor.mass is not None:
-            asked.append(wanted.grade * rotor.mass / rotor.speed * rotor.influence_coefficient)
-        return min(asked, default=self.scene.controller.limit)
+        """Amplitude that may remain, m: the one required, else the controller's limit."""
+        asked = self.scene.required_amplitude
+        return self.scene.controller.limit if asked is None else asked
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:

@@ -108,9 +108,14 @@ def _settings(
 
 
 def _pressures(scene: Scene) -> Axis:
-    levels = [rounded(factor * scene.gas.pressure) for factor in _PRESSURES]
-    levels[len(levels) // 2] = scene.gas.pressure
-    return Axis(name=PRESSURE, levels=tuple(levels), first=_FIRST, unit="Pa")
+    """Around the scene's, up to the highest that is available where [design] states one."""
+    own, available = scene.gas.pressure, scene.design.pressure
+    levels = [rounded(factor * own) for factor in _PRESSURES]
+    levels[len(levels) // 2] = own
+    if available is not None:
+        levels = [*(each for each in levels if each < available), available]
+    first = tuple(at for at in _FIRST if at < len(levels)) or (len(levels) - 1,)
+    return Axis(name=PRESSURE, levels=tuple(levels), first=first, unit="Pa")
 
 
 def _at(scene: Scene, pressure: float) -> Scene:

@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, clipped
-from ringbalance.scene.foreign import plain_number
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.units import plain_number
 
 CALIBRATED: Final = "calibrated"
 """Name of the law that `calibrate` makes, which is used where no other is asked for."""

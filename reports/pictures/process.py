@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.mesh.export import write_cells
-from ringbalance.reports.pictures.fields import chamber_field, shown_fill
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_cells
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.scene import Scene
 

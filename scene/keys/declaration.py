@@ -37,6 +37,8 @@ class Presence:
     """Value that follows from those of `needs`, or None; without a rule it is theirs."""
     needs: tuple[str, ...] = ()
     """Paths "table.key" of what the value follows from; empty when other code fills it in."""
+    also: tuple[str, ...] = ()
+    """Paths of what it follows from as well where that is there, else None."""
 
     def value(self, *given: Any) -> Any:
         """Value that follows from those of `needs`; None when there is none in this case."""
@@ -122,12 +124,19 @@ def standard(default: object, meaning: str) -> Presence:
     return Presence(kind="standard", meaning=meaning, default=default)
 
 
-def derived(otherwise: str, meaning: str, *needs: str, rule: Callable[..., Any] | None = None) -> Presence:
+def derived(
+    otherwise: str,
+    meaning: str,
+    *needs: str,
+    also: tuple[str, ...] = (),
+    rule: Callable[..., Any] | None = None,
+) -> Presence:
     """Declare a key whose default follows from those at the paths `needs`, as `otherwise` says in words.
 
-    `rule` is a function with a name: a lambda in an annotation does not see its module.
+    Args: `also`: paths of what comes after them, None where a file lacks it. `rule`: a function with a name:
+        a lambda in an annotation does not see its module.
     """
-    return Presence(kind="derived", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs)
+    return Presence(kind="derived", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs, also=also)
 
 
 def unused(otherwise: str, meaning: str) -> Presence:

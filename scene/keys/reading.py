@@ -114,7 +114,8 @@ class Reading:
         known = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
         for path, presence in self.schema.following:
             if known.lacks(path) and known.known(*presence.needs):
-                result = presence.value(*(known.values[need] for need in presence.needs))
+                needs = (*presence.needs, *presence.also)
+                result = presence.value(*(known.values.get(need) for need in needs))
                 known = known if result is None else known.adding({path: result})
         return known
 

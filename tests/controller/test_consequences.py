@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reports.pages.consequences import LoopGain, loop_gain
+from ringbalance.reports.pages.loop import LoopGain, loop_gain
 from ringbalance.scene.models import Scene
 
 

@@ -35,3 +35,18 @@ def test_a_run_without_injections_and_one_with_too_many(scene: Scene, model: Bal
 def test_bars_are_logarithmic_over_three_decades(values: list[float], bars: str) -> None:
     found = _sparkline(np.array(values))
     assert found == bars or (bars == "█▄" and found in {"█▄", "█▅"})
+
+
+def test_what_the_scene_requires_and_a_settled_run_does_not_show(scene: Scene, model: BalancerModel) -> None:
+    run = simulate(scene, model)
+    assert run.settling_time is not None
+    strict = replace(
+        scene.requirement, residual=scene.controller.limit / 2, settling_time=run.settling_time / 2
+    )
+    rows = simulate(replace(scene, requirement=strict), model).rows()
+    late, loose = rows.findings[1:3]
+    assert (late.code, late.values["required"]) == ("settled_too_late", run.settling_time / 2)
+    assert (loose.code, loose.values["allowed"]) == ("limit_above_requirement", strict.residual)
+    assert late.text in list(rows.lines())
+    kept = replace(strict, residual=scene.controller.limit, settling_time=run.settling_time)
+    assert len(simulate(replace(scene, requirement=kept), model).findings) == len(run.findings)

@@ -15,8 +15,7 @@ from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.judging.search import searched
 from ringbalance.design.hunt import _MOST, threshold
 from ringbalance.design.space import Space
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET, OPEN
+from ringbalance.results.requirements import MET, OPEN, Proportion
 from ringbalance.scene.models import Scene
 
 WIDTHS = ("disc.axial_width=14mm,26mm,38mm", "tube.bore=0.9mm", "gas.pressure=0.4MPa")
@@ -121,6 +120,12 @@ def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, messag
     with pytest.raises(rb.SceneError, match=message) as caught:
         rb.find_design(rb.load_scene(file))
     assert str(file) in str(caught.value)
+
+
+def test_a_given_disc_is_for_tune() -> None:
+    with pytest.raises(rb.SceneError, match=r"outer_radius.*vary.*`ringbalance tune` recommends") as caught:
+        rb.find_design(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
+    assert len(caught.value.faults) == 1
 
 
 def test_only_a_disc_with_liquid_is_designed() -> None:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import doc_tables
 import example_measurements
-import generated_docs
 import pytest
 
 from ringbalance.cli import main
@@ -234,8 +234,8 @@ def test_what_cannot_be_fitted_is_refused(words: list[str], told: str, run: Run)
 
 
 def test_the_page_has_every_kind_and_its_example_can_be_read(paper_scene: Scene) -> None:
-    page = generated_docs.text_of("docs/fit.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/fit.md"]()) == page
+    page = doc_tables.text_of("docs/fit.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/fit.md"]()) == page
     example = page.split("## Files of measurements")[1].split("```")[1].lstrip("\n")
     found, faults = observations_of(example.encode(), file="example", scene=paper_scene)
     assert faults == ()

@@ -11,8 +11,8 @@ import pyvista
 from skfem import Mesh
 
 from ringbalance.mesh.chamber import chamber_mesh
-from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import liquid_area
+from ringbalance.reports.pictures.fields import write_vtu
 from ringbalance.scene.models import Disc
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-import generated_docs
+import doc_tables
 import pytest
 
 from ringbalance.results import rows
@@ -27,8 +27,8 @@ def test_a_sentence_fills_its_numbers_in_units_that_exist(code: str) -> None:
 
 
 def test_the_documentation_lists_every_code_as_the_program_has_it() -> None:
-    page = generated_docs.text_of("docs/findings.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/findings.md"]()) == page
+    page = doc_tables.text_of("docs/findings.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/findings.md"]()) == page
 
 
 def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

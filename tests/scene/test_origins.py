@@ -75,8 +75,8 @@ def test_hash_of_the_values() -> None:
         text.replace("Six-chamber disc", "Another name"),
         text.replace('bore = "assumed"', 'bore = "measured"'),
         text.replace('bore = "1 mm"', 'bore = "0.1 cm"'),
-        text + '[requirement]\ngrade = "2.5 mm/s"\n',
-        text.replace('speed = "6000 rpm"', 'speed = "6000 rpm"\nmass = "20 kg"'),
+        text.replace('speed = "6000 rpm"', 'speed = "6000 rpm"\nmass = "20 kg"')
+        + '[requirement]\ngrade = "2.5 mm/s"\n',
         text.replace('roughness = "1.5 um"\n', "").replace('roughness = "assumed"\n', ""),
     )
     assert all(other != text for other in alike)

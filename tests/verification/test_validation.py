@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
-import generated_docs
+import doc_tables
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -257,7 +257,7 @@ def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None
 
 
 def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
-    page = generated_docs.text_of("docs/measurements.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/measurements.md"]()) == page
+    page = doc_tables.text_of("docs/measurements.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/measurements.md"]()) == page
     example = page.split("```text\n")[1].split("```")[0]
     assert len(compare(parsed(example)).measured) == 3

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,10 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.judging.judge import judged
-from ringbalance.controller.judging.search import search, searched
+from ringbalance.controller.judging.search import _outwards, search, searched
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
+from ringbalance.controller.trials import Axis
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -81,13 +81,37 @@ def test_six_chambers_work_with_settings_of_their_own() -> None:
     assert found.recommended.settings["controller.gas_time_offset"]
 
 
+def test_no_pressure_above_the_one_that_is_available_is_searched() -> None:
+    """[design] states it; the highest one itself is a level, and settings start at the scene's own."""
+    free = LiquidRingBalancer(bundled("liquid_ring_paper")).trials()[0].along
+    capped = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.6 MPa")).trials()[0].along
+    below = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.1 MPa")).trials()[0].along
+    assert free is not None
+    assert capped is not None
+    assert below is not None
+    assert max(free.levels) > 2 * max(capped.levels)
+    assert max(capped.levels) == 0.6e6
+    assert set(capped.levels) - {0.6e6} == {each for each in free.levels if each < 0.6e6}
+    assert list(capped.first) == [at for at in free.first if at < len(capped.levels)]
+    assert (below.levels, below.first) == ((0.1e6,), (0,))
+
+
+def test_levels_follow_each_other_from_the_start() -> None:
+    axis = Axis(name="gas.pressure", levels=(1.0, 2.0, 3.0, 4.0), first=(0, 1, 2, 3))
+    assert _outwards(axis, axis.first, 3.9) == [3, 2, 1, 0]
+    assert _outwards(axis, axis.first, 2.1) == [1, 0, 2, 3]
+
+
 def test_a_limit_follows_from_the_grade() -> None:
-    """G = U omega/m, and kappa U is the vibration."""
-    scene = bundled("liquid_ring_paper", rotor__mass="25 kg", requirement__grade="0.4 mm/s")
+    """G = U omega/m, and kappa U is the vibration; a limit that the scene states stays that of its runs."""
+    grade = {"rotor__mass": "25 kg", "requirement__grade": "0.4 mm/s"}
+    scene = bundled("liquid_ring_paper", **grade, controller__limit=None)
     rotor = scene.rotor
     expected = 0.4e-3 * 25.0 / rotor.speed * rotor.influence_coefficient
-    assert LiquidRingBalancer(scene).limit == pytest.approx(expected)
-    strict = replace(scene, requirement=replace(scene.requirement, residual=0.02e-6))
+    assert LiquidRingBalancer(scene).limit == scene.controller.limit == pytest.approx(expected)
+    assert scene.with_values({"requirement.grade": None}).controller.limit == pytest.approx(0.05e-6)
+    assert bundled("liquid_ring_paper", **grade).controller.limit == pytest.approx(0.05e-6)
+    strict = scene.with_values({"requirement.residual": "0.02 um", "controller.limit": "0.05 um"})
     balancer = LiquidRingBalancer(strict)
     assert balancer.limit == 0.02e-6
     point = {axis.name: axis.levels[3] for axis in balancer.trials()[0].axes}

@@ -42,7 +42,7 @@ def main() -> None:
     hermite = CubicHermiteSpline(table.knots, table.column(0), table.column(1))
     pchip = PchipInterpolator(np.log(table.knots), np.log(table.knots**4 * table.column(0)))
     x = np.random.default_rng(1).uniform(0.0, law.max_fill_ratio, MANY)
-    root = np.random.default_rng(2).uniform(*table.knots[[0, -1]], MANY)
+    root = np.random.default_rng(2).uniform(table.knots[0], table.knots[-1], MANY)
     ways: dict[str, Callable[..., object]] = {
         "evaluate": lambda fill, _: law.evaluate(fill_ratio=fill, gas_pressure=0.7e6),
         "CubicHermiteSpline": lambda _, s: s**4 * hermite(s),

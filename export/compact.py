@@ -1,24 +1,27 @@
 """The calibrated law as some four hundred numbers, from which every host answers with the same bits.
 
-Velocity over the square root of the head stands as cubic Hermite pieces along the head's eighth root, levels
-as quintic ones along the fill ratio, with knots where the tolerance asks for them; beside them is what
+Velocity over the square root of its pressure stands as polynomials of degree five along the pressure's eighth
+root, levels alike along the fill ratio, each piece as long as the tolerance allows; beside them is what
 decides on regime, status and uncertainty.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from scipy.interpolate import BPoly, CubicHermiteSpline
+from numpy.polynomial.polynomial import polyval
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law import point
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.table import Column, Table, knots_of, largest_error, table_at
-from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, carried_by
+from ringbalance.reduced_model.law.rows import LawRows
+from ringbalance.reduced_model.law.table import Table, knots_of, largest_error
+from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -33,13 +36,18 @@ _AT_CREST: Final = 2.0
 _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
 _MOST_LEVELS: Final = 26
-"""Knots; a level from a mesh that asks for more is less exact, and says so in its half-width."""
-_OF_SHARE: Final = 5e-4
-_OF_CHAMBER: Final = 1e-5
+"""Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
+_OF_SHARE: Final = 1e-3
+_OF_CHAMBER: Final = 2e-6
 """Of the largest squared radius and moment."""
-_OF_WIDTHS: Final = 0.05
+_OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
+_OF_MOMENT_WIDTH: Final = 0.1
 _SAMPLES: Final = 2001
+_SHARES: Final = ((SHARE, 3), (BACK_SHARE, 2))
+"""Column of a share there and back, and the degree of its pieces."""
+_CELLS: Final = 8
+"""Of equal length, each of which knows at which piece to begin looking."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""
 
@@ -68,12 +76,19 @@ class CompactLaw:
     """File that it was calibrated from."""
     constants: tuple[float, ...]
     """At the places that `point` names."""
+    pieces: tuple[tuple[float, ...], ...]
+    """Rows of nine numbers, likewise."""
     head_error: float
     """Largest relative error of a velocity for a given head against the calibrated law."""
     level_error: float
     """Largest error of a level's pressure, Pa; part of its half-width."""
     departure: float = 0.0
     """Largest relative difference of a velocity from the calibrated law's, in drawn conditions."""
+
+    @property
+    def size(self) -> int:
+        """Of all numbers, bytes."""
+        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
 
     @property
     def max_fill_ratio(self) -> float:
@@ -95,7 +110,7 @@ class CompactLaw:
         opposite = self.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         query = [0.0] * point.PLACES_OF_QUERY
         query[:4] = fill_ratio, opposite, gas_pressure, float(primed)
-        point.answer(self.constants, query)
+        point.answer(self.constants, self.pieces, query, True)
         velocity, width, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
         return Answer(
             velocity=velocity,
@@ -118,101 +133,131 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    heads, missed = _heads(law.heads)
-    levels, level_error = _levels(law)
-    compact = replace(law, heads=heads, levels=levels)
-    row = compact.constants_with({point.CHAMBER: _chamber(scene, law)})
-    return CompactLaw(
+    tables = law.heads.tables
+    rows = LawRows(cells=_CELLS, rows=[[] for _ in tables])
+    missed = max(_add_way(rows, law, way, table) for way, table in enumerate(tables))
+    level_error = _add_levels(rows, law)
+    _add_chamber(rows, scene, law)
+    error = _AT_CREST * missed + law.heads.interpolation_error
+    scalars = law.scalars() | {
+        point.TABULATION: error**2,
+        point.LOWEST: VELOCITIES[0],
+        point.HIGHEST: VELOCITIES[1],
+    }
+    numbers, pieces = rows.arrays(scalars)
+    made = CompactLaw(
         scene=scene.file,
-        constants=tuple(row.tolist()),
+        constants=tuple(numbers.tolist()),
+        pieces=tuple(map(tuple, pieces.tolist())),
         head_error=missed,
         level_error=level_error,
-        departure=_departure(compact, law),
     )
+    return replace(made, departure=_departure(made, law))
 
 
-def _departure(compact: CalibratedLaw, law: CalibratedLaw) -> float:
+def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
     """Over fills of both chambers, pressures of six decades and both states of the tube."""
-    drawn, top = np.random.default_rng(0), law.max_fill_ratio
-    fill, opposite = drawn.uniform(0.0, top, (2, _DRAWN))
-    pressure, primed = 10 ** drawn.uniform(2, 8, _DRAWN), drawn.integers(0, 2, _DRAWN) > 0
-    right, found = (
-        each.evaluate(
-            fill_ratio=fill, opposite_fill_ratio=opposite, gas_pressure=pressure, primed=primed
-        ).velocity
-        for each in (law, compact)
-    )
-    inside = (np.abs(right) > VELOCITIES[0]) & (np.abs(right) < VELOCITIES[1])
-    return float(np.max(np.abs(found[inside] / right[inside] - 1.0), initial=0.0))
+    drawn, worst = np.random.default_rng(0), 0.0
+    fills, pressures = drawn.uniform(0.0, law.max_fill_ratio, (_DRAWN, 2)), 10 ** drawn.uniform(2, 8, _DRAWN)
+    for at, ((fill, opposite), pressure) in enumerate(zip(fills.tolist(), pressures.tolist(), strict=True)):
+        asked = {"fill_ratio": fill, "opposite_fill_ratio": opposite, "gas_pressure": pressure}
+        right = float(law.evaluate(**asked, primed=at % 2 > 0).velocity)
+        if VELOCITIES[0] < abs(right) < VELOCITIES[1]:
+            worst = max(worst, abs(made.answer(**asked, primed=at % 2 > 0).velocity / right - 1.0))
+    return worst
 
 
-def _heads(heads: TubeHeads) -> tuple[TubeHeads, float]:
-    """On fewer knots. Returns: also the largest relative error of a velocity for a given head."""
-    ways = [table for table in (heads.siphon, heads.hump, heads.return_hump) if table is not None]
-    made = [_coarser(table) for table in ways]
-    missed = max(error for _, error in made) + heads.interpolation_error / 2
-    return TubeHeads.with_ways(*(table for table, _ in made), error=_AT_CREST * missed), missed
+@dataclass(frozen=True, kw_only=True)
+class _Column:
+    """A quantity over samples, as polynomials."""
+
+    value: FloatArray
+    """Shape (samples,)."""
+    allowed: FloatArray
+    """Largest error, shape (samples,)."""
+    degree: int = point.C5 - point.C0
+
+    def polynomial(self, x: FloatArray, first: int, last: int) -> FloatArray:
+        """Coefficients in (x - end)/length from the samples between two, both of which are met.
+
+        The samples are those next to the extrema of a Chebyshev polynomial.
+        """
+        extrema = (1 - np.cos(np.pi * np.arange(self.degree + 1) / self.degree)) / 2
+        at = np.unique(np.rint(first + (last - first) * extrema).astype(int))
+        t = (x[at] - x[last]) / (x[last] - x[first])
+        found = np.linalg.solve(np.vander(t, increasing=True), self.value[at])
+        return np.pad(found, (0, self.degree + 1 - at.size))
+
+    def errors(self, x: FloatArray, inside: slice) -> FloatArray:
+        """Of one piece, at the samples that it spans."""
+        first, last = inside.start, inside.stop - 1
+        t = (x[inside] - x[last]) / (x[last] - x[first])
+        return np.asarray(polyval(t, self.polynomial(x, first, last)) - self.value[inside])
+
+    def pieces(self, x: FloatArray, ends: IntArray) -> FloatArray:
+        """Coefficients in powers of x - end, shape (degree + 1, pieces)."""
+        found = [self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())]
+        return np.transpose(found) / np.diff(x[ends]) ** np.arange(self.degree + 1)[:, None]
 
 
-def _coarser(table: Table) -> tuple[Table, float]:
-    """A table over the eighth root of a head, and its largest error of a velocity."""
-    slowest, fastest = roots_of(table, VELOCITIES)
-    s = np.geomspace(slowest, fastest, _SAMPLES)
-    columns = [_smooth(table, 1, s, _OF_HEADS), _half_width(table.straight(s, point.LOSS_COLUMN))]
-    shares = range(point.SHARE_COLUMN, table.columns.size // table.knots.size, 2)
-    if shares:
-        columns.append(_half_width(table.straight(s, point.SHARE_WIDTH_COLUMN) + _OF_SHARE))
-        columns += [_smooth(table, number, s, _OF_SHARE) for number in shares]
-    knots = knots_of(s, columns)
-    return table_at(s, knots, columns), largest_error(s, columns[0], knots, relative=True)
-
-
-def _smooth(table: Table, number: int, s: FloatArray, allowed: float) -> Column:
-    """Args: `allowed`: relative error."""
-    curve = CubicHermiteSpline(table.knots, table.column(number), table.column(number + 1))
-    return Column(value=curve(s), allowed=allowed * curve(s), slope=curve(s, nu=1))
-
-
-def _levels(law: CalibratedLaw) -> tuple[Table, float]:
-    """The hydrostatic pressure over the fill ratio, and its largest error, Pa."""
-    table, curve = law.levels, _quintic(law.levels)
+def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
+    """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
     # Every knot of the law's table is a sample, so that a table with few knots is met exactly.
-    parts = max(1, round(_SAMPLES / (table.knots.size - 1)))
-    x = np.linspace(0.0, law.max_fill_ratio, parts * (table.knots.size - 1) + 1)
+    pieces = law.levels.knots.size - 1
+    x = np.linspace(0.0, law.max_fill_ratio, max(1, round(_SAMPLES / pieces)) * pieces + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
-    level = Column(
-        value=curve(x), allowed=_OF_LEVELS * slowest, slope=curve(x, nu=1), curvature=curve(x, nu=2)
-    )
-    width = np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0)
-    while (knots := knots_of(x, [level, _half_width(width)])).size > _MOST_LEVELS:
-        level = replace(level, allowed=2 * np.asarray(level.allowed))
-    error = largest_error(x, level, knots)
-    widened = replace(_half_width(width), value=np.hypot(width, error))
-    return table_at(x, knots, [level, widened]), error
+    level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
+    while (ends := knots_of(x, [level, width])).size > _MOST_LEVELS + 1:
+        level = replace(level, allowed=2 * level.allowed)
+    error = largest_error(x, level, ends, relative=False)
+    rows.numbers[point.LEVEL_SCALE], rows.numbers[point.LEVEL_CELLS] = rows.add_cells(x[ends])
+    widened = replace(width, value=np.hypot(width.value, error))
+    rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
+    return error
 
 
-def _quintic(table: Table) -> BPoly:
-    """The first three columns."""
-    return BPoly.from_derivatives(table.knots, np.stack([table.column(i) for i in (1, 2, 3)], axis=1))
-
-
-def _chamber(scene: Scene, law: CalibratedLaw) -> Table:
+def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
     x = np.linspace(0.0, law.max_fill_ratio, _SAMPLES)
-    square, moment = surface_radius(disc=scene.disc, fill_ratio=x) ** 2, _quintic(law.moment.along)
-    columns = [
-        Column(
-            value=square,
-            allowed=_OF_CHAMBER * float(np.max(square)),
-            slope=np.gradient(square, x, edge_order=2),
-        ),
-        Column(
-            value=moment(x), allowed=_OF_CHAMBER * float(np.max(np.abs(moment(x)))), slope=moment(x, nu=1)
-        ),
-        _half_width(np.maximum(law.moment.half_width(x), 0.0)),
-    ]
-    return table_at(x, knots_of(x, columns), columns)
+    columns = []
+    for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
+        allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
+        columns.append(_Column(value=value, allowed=allowed, degree=2))
+    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
+    ends = knots_of(x, columns)
+    rows.numbers[point.CHAMBER_SCALE], rows.numbers[point.CHAMBER_CELLS] = rows.add_cells(x[ends])
+    rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
-def _half_width(value: FloatArray) -> Column:
-    return Column(value=value, allowed=_OF_WIDTHS * (value + 0.1 * float(np.max(value))) + 1e-300)
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float:
+    """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
+    slowest, fastest = roots_of(table, VELOCITIES)
+    s, density = np.geomspace(slowest, fastest, _SAMPLES), law.density
+    x, value = density**0.125 * s, table.quintic(s) / density**0.5
+    ratio = _Column(value=value, allowed=_OF_HEADS * value)
+    loss = _half_width(table.straight(s, LOSS) ** 2)
+    beside = _shares(table, s) if way == point.SIPHON else []
+    ends = knots_of(x, [ratio, loss, *beside])
+    more = (*law.path.clearing_velocities, *carried_by(law.path)) if way else (ends.size - 1,)
+    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
+    if beside:
+        rows.add(*(each.pieces(x, ends) for each in beside))
+    return largest_error(x, ratio, ends)
+
+
+def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
+    """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
+    found = [_share(table.cubic(s, at), degree) for at, degree in _SHARES if at < table.count]
+    if found:
+        found.insert(1, _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)))
+    return found
+
+
+def _share(value: FloatArray, degree: int) -> _Column:
+    return _Column(value=value, allowed=_OF_SHARE * value, degree=degree)
+
+
+def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
+    allowed = of * (value + 0.1 * float(np.max(value))) + 1e-300
+    return _Column(value=value, allowed=allowed, degree=1)

@@ -139,19 +139,18 @@ class CalibratedLaw:
     @cached_property
     def constants(self) -> tuple[FloatArray, FloatArray]:
         """Numbers and pieces, all that `point` needs to answer a query."""
-        rows, heads, density = LawRows(), self.heads, self.density
-        ways = [way for way in (heads.hump, heads.return_hump) if way is not None]
-        rows.rows.extend([] for _ in range(1 + len(ways)))
+        (siphon, *ways), density = self.heads.tables, self.density
+        rows = LawRows(rows=[[] for _ in self.heads.tables])
         rows.add_levels(self.levels)
-        rows.add_way(point.SIPHON, heads.siphon, density, heads.siphon.knots.size - 1)
+        rows.add_way(point.SIPHON, siphon, density, siphon.knots.size - 1)
         if ways:
-            rows.add_shares(heads.siphon, density)
+            rows.add_shares(siphon, density)
         for at, way in enumerate(ways, start=point.THERE):
             rows.add_way(at, way, density, *self.path.clearing_velocities, *carried_by(self.path))
-        return rows.arrays(self.scalars(len(ways)))
+        return rows.arrays(self.scalars())
 
-    def scalars(self, ways: int) -> dict[int, float]:
-        """At the places of `point`, of a tube with one way to a crest, or one there and one back, or none."""
+    def scalars(self) -> dict[int, float]:
+        """What is no table, at the places of `point`."""
         path, inputs, heads = self.path, self.inputs, self.heads
         by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
         slowest, fastest = (heads.siphon.knots**4 * heads.siphon.column(0))[[0, -1]]
@@ -175,7 +174,7 @@ class CalibratedLaw:
             point.TABULATION: heads.interpolation_error**2,
             point.LOWEST: slowest,
             point.HIGHEST: fastest,
-            point.WAY_BACK: float(ways),
+            point.WAY_BACK: float(len(heads.tables) - 1),
         }
 
     @cached_property
@@ -332,13 +331,13 @@ class CalibratedLaw:
             point.turn(w)
         point.set_drive(c, w)
         point.set_crest(c, w)
-        w[point.HELD], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
+        w[point.HOLDS], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
         if w[point.DRIVING] > 0:
             point.velocity(c, p, w, point.SIPHON, w[point.DRIVING])
             row = int(w[point.ROW] + p[point.SIPHON][point.SHARES])
             way = int(c[point.WAY_BACK]) if reverse else point.THERE
-            lost = point.share(p, row, w[point.BEFORE], way)
-            off = point.share_width(p, row, w[point.BEFORE])
+            lost = point.lost_part(p, row, w[point.TO_END], way)
+            off = point.lost_width(p, row, w[point.TO_END])
         spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
         point.set_margin(c, w, lost, off, point.known_of(c, w, lost, spread))
         sides = [

@@ -5,7 +5,7 @@ keeps to numbers, rows of numbers, `if`, `while` and functions.  `c` holds the l
 `w` a query with its answer and all between; the names below are places in them.  A piece is a polynomial of
 degree five in the distance from its end; cells of equal length say at which piece to begin looking.  Gauge
 pressures in Pa, velocities in m/s, half-widths at 95 %; upstream is the chamber that gives liquid.  Source:
-`tube.regime` and `tube.directed_flow`, whose conditions and half-widths these are.
+`tube.regime`, whose conditions these are; half-widths by linear propagation.
 """
 
 from collections.abc import Sequence
@@ -45,10 +45,10 @@ VELOCITY, UNCERTAINTY, REGIME, STATUS, PRIMED_AFTER = 4, 5, 6, 7, 8
 UP_GAS, DOWN_GAS, UP_LEVEL, UP_WIDTH, DOWN_LEVEL, DOWN_WIDTH, LEVEL_WIDTH = 9, 10, 11, 12, 13, 14, 15
 DISCHARGE, DRIVING, ABOVE, RESTING, CAVITY, LEAST, MOST, GAS_THERE = 16, 17, 18, 19, 20, 21, 22, 23
 # Of the last velocity: eighth root of its pressure, its piece, the distance from its end, the value there.
-ROOT, ROW, BEFORE, RATIO = 24, 25, 26, 27
-FULL, FULL_ROOT, FULL_ROW, FULL_BEFORE, FULL_RATIO = 28, 29, 30, 31, 32
+ROOT, ROW, TO_END, VALUE = 24, 25, 26, 27
+FULL, FULL_ROOT, FULL_ROW, FULL_TO_END, FULL_VALUE = 28, 29, 30, 31, 32
 # Of the column up to the crest: pressure that holds it, at first before gas is carried out, and velocity.
-HELD, AT_FIRST, BROKEN, SLOWER, SWEPT = 33, 34, 35, 36, 37
+HOLDS, AT_FIRST, BROKEN, SLOWER, SWEPT = 33, 34, 35, 36, 37
 # Of the driven chamber, where these are asked for too.
 RADIUS, MOMENT = 38, 39
 # Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
@@ -162,20 +162,20 @@ def ratio(c: Law, p: Pieces, w: Query, way: int, s: float) -> float:
     row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
     w[ROOT] = s
     w[ROW] = float(row)
-    w[BEFORE] = s - p[row][END]
-    return quintic(p, row, w[BEFORE])
+    w[TO_END] = s - p[row][END]
+    return quintic(p, row, w[TO_END])
 
 
 @both_ways
 def velocity(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
     """Velocity that a pressure drives: its root times a tabulated ratio; creeping below the table."""
     if pressure < p[way][SLOWEST]:
-        w[RATIO] = ratio(c, p, w, way, sqrt(sqrt(sqrt(p[way][SLOWEST]))))
+        w[VALUE] = ratio(c, p, w, way, sqrt(sqrt(sqrt(p[way][SLOWEST]))))
         w[ROOT] = 0.0
         return larger(pressure, 0.0) * p[way][CREEP]
     root = sqrt(sqrt(pressure))
-    w[RATIO] = ratio(c, p, w, way, smaller(sqrt(root), p[way][LAST]))
-    return root * root * w[RATIO]
+    w[VALUE] = ratio(c, p, w, way, smaller(sqrt(root), p[way][LAST]))
+    return root * root * w[VALUE]
 
 
 @both_ways
@@ -185,14 +185,14 @@ def relative_square(p: Pieces, w: Query, driven: float, square: float) -> float:
     Args: `driven`: its pressure. `square`: squared half-width of that.
     """
     row = int(w[ROW])
-    t = w[BEFORE]
+    t = w[TO_END]
     if w[ROOT] == 0.0:
         pressure = larger(driven, NO_PRESSURE)
         return width(p, row, t) + square / (pressure * pressure)
     growth = p[row][C1] + t * (
         2.0 * p[row][C2] + t * (3.0 * p[row][C3] + t * (4.0 * p[row][C4] + t * (5.0 * p[row][C5])))
     )
-    exponent = 0.5 + 0.125 * w[ROOT] * growth / w[RATIO]
+    exponent = 0.5 + 0.125 * w[ROOT] * growth / w[VALUE]
     return exponent * exponent * (width(p, row, t) + square / (driven * driven))
 
 
@@ -267,13 +267,13 @@ def set_swept(c: Law, p: Pieces, w: Query, way: int) -> None:
         if w[BROKEN] < p[way][STAYS]:
             w[LEAST] = gas
     part = smaller(carried(p, way, w[BROKEN]), 1.0)
-    gain = w[RESTING] - w[CAVITY] - w[HELD]
+    gain = w[RESTING] - w[CAVITY] - w[HOLDS]
     if part > 0.0:
         if part > 0.5 and carried(p, way, w[FULL]) > 0.5:
             w[SWEPT] = 1.0
         if gain > 0.0:
-            w[HELD] = w[HELD] + part * part * (3.0 - 2.0 * part) * gain
-            w[BROKEN] = velocity(c, p, w, way, w[HELD])
+            w[HOLDS] = w[HOLDS] + part * part * (3.0 - 2.0 * part) * gain
+            w[BROKEN] = velocity(c, p, w, way, w[HOLDS])
 
 
 @both_ways
@@ -290,7 +290,7 @@ def set_slower(c: Law, w: Query) -> None:
 
 
 @both_ways
-def share(p: Pieces, row: int, t: float, way: int) -> float:
+def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
     """Part of the driving pressure that is lost up to the crest; `row`: beside a piece of the whole tube."""
     if way == THERE:
         return p[row][SHARE_0] + t * (p[row][SHARE_1] + t * (p[row][SHARE_2] + t * p[row][SHARE_3]))
@@ -306,39 +306,39 @@ def velocity_held(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> flo
 
 
 @both_ways
-def set_margin(c: Law, w: Query, lost: float, off: float, known: float) -> None:
-    """Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
-
-    p_m - p_c = p_A - p_c + P_A - D_m - R p_d,  R = (alpha + k_up)/(k + 1), p_d the driving pressure.
-    Args: `lost`: R. `off`: its half-width. `known`: squared half-width of the pressure over the crest by the
-        gas and the levels.
-    Source: energy balance from the upstream chamber to the crest; inputs by sensitivity, ASME V&V 20.
-    """
-    liquid = w[ABOVE] - lost * (w[UP_LEVEL] - w[DISCHARGE])
-    part = off * w[DRIVING]
-    w[MARGIN] = w[HELD] - lost * w[DRIVING]
-    w[MARGIN_SQUARE] = known + c[OF_CREST] + c[OF_LIQUID] * liquid * liquid + part * part
+def lost_width(p: Pieces, row: int, t: float) -> float:
+    """Half-width of `lost_part`."""
+    return p[row][OFF] + t * p[row][OFF_SLOPE]
 
 
 @both_ways
 def known_of(c: Law, w: Query, lost: float, spread: float) -> float:
-    """Squared half-width of the pressure over the crest by gas and levels, and by what it may be off."""
+    """Squared half-width of a full siphon's crest pressure by gas, levels and what else it may be off by."""
     up = w[UP_WIDTH] * w[UP_WIDTH] + c[OF_GAS] * w[UP_GAS] * w[UP_GAS]
+    down = w[DOWN_WIDTH] * w[DOWN_WIDTH]
     kept = 1.0 - lost
-    return spread * spread + kept * kept * up + lost * lost * w[DOWN_WIDTH] * w[DOWN_WIDTH]
+    return spread * spread + kept * kept * up + lost * lost * down
 
 
 @both_ways
-def share_width(p: Pieces, row: int, t: float) -> float:
-    """Half-width of `share`."""
-    return p[row][OFF] + t * p[row][OFF_SLOPE]
+def set_margin(c: Law, w: Query, lost: float, width: float, known: float) -> None:
+    """Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
+
+    p_m - p_c = p_A - p_c + P_A - D_m - R p_d,  R = (alpha + k_up)/(k + 1), p_d the driving pressure.
+    Args: `lost`: R. `width`: its half-width. `known`: as `known_of`.
+    Source: energy balance from the upstream chamber to the crest; inputs by sensitivity, ASME V&V 20.
+    """
+    liquid = w[ABOVE] - lost * (w[UP_LEVEL] - w[DISCHARGE])
+    part = width * w[DRIVING]
+    w[MARGIN] = w[HOLDS] - lost * w[DRIVING]
+    w[MARGIN_SQUARE] = known + c[OF_CREST] + c[OF_LIQUID] * liquid * liquid + part * part
 
 
 @both_ways
 def set_widths(c: Law, p: Pieces, w: Query, way: int) -> None:
     """Half-width of the answer over a crest, and whether it allows another regime."""
     row = int(w[FULL_ROW] + p[SIPHON][SHARES])
-    lost = share(p, row, w[FULL_BEFORE], way)
+    lost = lost_part(p, row, w[FULL_TO_END], way)
     up = w[UP_WIDTH] * w[UP_WIDTH] + c[OF_GAS] * w[UP_GAS] * w[UP_GAS]
     down = w[DOWN_WIDTH] * w[DOWN_WIDTH]
     lower = w[RESTING] - w[MOST]
@@ -347,23 +347,22 @@ def set_widths(c: Law, p: Pieces, w: Query, way: int) -> None:
     if w[REGIME] == SEPARATED:
         gas = w[UP_GAS] - w[CAVITY]
         square = up + down + c[OF_CREST] + c[OF_DENSITY] * gas * gas + c[OF_SPEED] * w[ABOVE] * w[ABOVE]
-        square = relative_square(p, w, w[HELD], square)
-        if lower < w[HELD]:
+        square = relative_square(p, w, w[HOLDS], square)
+        if lower < w[HOLDS]:
             part = w[VELOCITY] - velocity_held(c, p, w, way, lower)
-        if upper > w[HELD]:
+        if upper > w[HOLDS]:
             part = larger(part, smaller(velocity(c, p, w, way, upper), w[FULL]) - w[VELOCITY])
     else:
         w[ROOT] = w[FULL_ROOT]
         w[ROW] = w[FULL_ROW]
-        w[BEFORE] = w[FULL_BEFORE]
-        w[RATIO] = w[FULL_RATIO]
+        w[TO_END] = w[FULL_TO_END]
+        w[VALUE] = w[FULL_VALUE]
         square = full_square(c, p, w)
         if lower < lost * w[DRIVING]:
             part = larger(w[VELOCITY] - velocity_held(c, p, w, way, lower), 0.0)
     w[UNCERTAINTY] = sqrt(w[VELOCITY] * w[VELOCITY] * (square + c[TABULATION]) + part * part)
-    part = larger(w[HELD] - lower, upper - w[HELD])
-    known = known_of(c, w, lost, part)
-    set_margin(c, w, lost, share_width(p, row, w[FULL_BEFORE]), known)
+    part = larger(w[HOLDS] - lower, upper - w[HOLDS])
+    set_margin(c, w, lost, lost_width(p, row, w[FULL_TO_END]), known_of(c, w, lost, part))
     if w[MARGIN] * w[MARGIN] < w[MARGIN_SQUARE]:
         w[REGIME] = UNDECIDED
         w[STATUS] = UNSURE
@@ -373,16 +372,16 @@ def set_widths(c: Law, p: Pieces, w: Query, way: int) -> None:
 def over_crest(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
     """The answer of a tube with a crest, if liquid flows; `way`: row of the column up to the crest."""
     set_crest(c, w)
-    w[HELD] = crest_margin(w)
-    if w[HELD] <= 0.0:
+    w[HOLDS] = crest_margin(w)
+    if w[HOLDS] <= 0.0:
         return
     w[FULL] = velocity(c, p, w, SIPHON, w[DRIVING])
     w[FULL_ROOT] = w[ROOT]
     w[FULL_ROW] = w[ROW]
-    w[FULL_BEFORE] = w[BEFORE]
-    w[FULL_RATIO] = w[RATIO]
-    w[AT_FIRST] = w[HELD]
-    w[BROKEN] = velocity(c, p, w, way, w[HELD])
+    w[FULL_TO_END] = w[TO_END]
+    w[FULL_VALUE] = w[VALUE]
+    w[AT_FIRST] = w[HOLDS]
+    w[BROKEN] = velocity(c, p, w, way, w[HOLDS])
     w[SLOWER] = w[BROKEN]
     w[SWEPT] = w[PRIMED]
     if w[PRIMED] == 0.0:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -129,6 +129,24 @@ def smooth_tables(x: FloatArray, y: FloatArray) -> list[Table]:
     return [Table(knots=x, columns=each) for each in columns.T]
 
 
+class Sampled(Protocol):
+    """A quantity over samples, of which pieces are made."""
+
+    @property
+    def value(self) -> FloatArray:
+        """Shape (samples,)."""
+        ...
+
+    @property
+    def allowed(self) -> FloatArray:
+        """Largest error, shape (samples,)."""
+        ...
+
+    def errors(self, x: FloatArray, inside: slice) -> FloatArray:
+        """Of one piece, at the samples that it spans."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class Column:
     """A quantity over samples, with derivatives by the table's x as far as its pieces need them."""
@@ -152,7 +170,7 @@ class Column:
         return np.asarray(value - self.value[inside])
 
 
-def knots_of(x: FloatArray, columns: Sequence[Column], *, every: int = 1) -> IntArray:
+def knots_of(x: FloatArray, columns: Sequence[Sampled], *, every: int = 1) -> IntArray:
     """Samples at which pieces meet, each piece as long as its errors allow; `every`: of which samples."""
 
     def fits(first: int, last: int) -> bool:
@@ -177,10 +195,11 @@ def _furthest(fits: Callable[[int], bool], low: int, high: int, step: int) -> in
     return low
 
 
-def largest_error(x: FloatArray, column: Column, knots: IntArray) -> float:
-    """Of a column between its knots, at the samples, relative."""
+def largest_error(x: FloatArray, column: Sampled, knots: IntArray, *, relative: bool = True) -> float:
+    """Of a quantity between its knots, at the samples."""
     pieces = [slice(a, b + 1) for a, b in pairwise(knots.tolist())]
-    return max(float(np.max(np.abs(column.errors(x, each) / column.value[each]))) for each in pieces)
+    scale = column.value if relative else np.ones_like(x)
+    return max(float(np.max(np.abs(column.errors(x, each) / scale[each]))) for each in pieces)
 
 
 def table_at(x: FloatArray, knots: IntArray, columns: Sequence[Column]) -> Table:

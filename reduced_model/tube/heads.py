@@ -136,6 +136,11 @@ class TubeHeads:
         """The heads with what there is of ways to a crest."""
         return cls(siphon=siphon, hump=hump, return_hump=back, interpolation_error=error)
 
+    @property
+    def tables(self) -> tuple[Table, ...]:
+        """Of the whole tube, and of the ways to a crest, in the order of `point`."""
+        return tuple(each for each in (self.siphon, self.hump, self.return_hump) if each is not None)
+
     def to_crest(self, *, reverse: bool) -> Table | None:
         """From the chamber that gives liquid; None without a crest."""
         return self.return_hump or self.hump if reverse else self.hump

@@ -37,7 +37,7 @@ def test_what_is_not_of_the_subset_is_refused(line: str) -> None:
 def test_both_languages_have_the_same_statements() -> None:
     source = Source.of_text(f"{HEAD}    if not a > X:\n        return c[N + n // 2]\n    return -a\n")
     assert "if (!(a > X)) {\n        return c[N + (n / 2)];\n    }\n    return -a;" in c_functions(source)
-    text = st_functions(source, prefix="p", sizes={"Law": 4})
+    text = st_functions(source, prefix="p", sizes={"Law": "0..3"})
     assert "IF NOT (v_a > 0.5) THEN\n    p_f := v_c[2 + (v_n / 2)];\n    RETURN;\nEND_IF;" in text
 
 

@@ -134,7 +134,7 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "a scene without [fitted]",
         )
     tables = law.heads.tables
-    rows = LawRows(cells=_CELLS, rows=[[] for _ in tables])
+    rows = LawRows.of(len(tables), cells=_CELLS)
     missed = max(_add_way(rows, law, way, table) for way, table in enumerate(tables))
     level_error = _add_levels(rows, law)
     _add_chamber(rows, scene, law)
@@ -211,7 +211,7 @@ def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
     while (ends := knots_of(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
     error = largest_error(x, level, ends, relative=False)
-    rows.numbers[point.LEVEL_SCALE], rows.numbers[point.LEVEL_CELLS] = rows.add_cells(x[ends])
+    rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = rows.add_cells(x[ends])
     widened = replace(width, value=np.hypot(width.value, error))
     rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
     return error
@@ -226,7 +226,7 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
         columns.append(_Column(value=value, allowed=allowed, degree=2))
     columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
     ends = knots_of(x, columns)
-    rows.numbers[point.CHAMBER_SCALE], rows.numbers[point.CHAMBER_CELLS] = rows.add_cells(x[ends])
+    rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 

@@ -22,6 +22,7 @@ from ringbalance.physics.gas import (
 from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
+from ringbalance.reduced_model.law.inverse import ROOT_PLACES, root_cells
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.law.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.law.table import Table
@@ -52,10 +53,11 @@ Record = Any
 
 FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
 """Whether gas is on and the tube primed, in the tables of a law that gives velocities alone."""
-PIECES: Final = 4096
+PIECES: Final = 2048
 """Of each of these tables."""
 NUMBERS: Final = 2560
 """Room for the numbers of a law, fixed, so that compiled code serves every law."""
+WAYS: Final = 3
 ROWS: Final = len(FLOWS) * PIECES
 """Room for its pieces."""
 
@@ -107,6 +109,7 @@ PLANT: Final = np.dtype(
     + [(name, np.int64) for name in _PLANT_WHOLE]
     + [
         ("numbers", np.float64, (NUMBERS,)),  # of the law, as `point` reads it
+        ("roots", np.float64, (WAYS, ROOT_PLACES)),  # where to look for the root of a velocity
         ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # its pieces, or those of a law that is tabled
     ]
 )
@@ -348,7 +351,7 @@ def _fill_calibrated(plant: npt.NDArray[np.void], law: CalibratedLaw, tube: Tube
     plant["gas_factor"] = law.gas_factor
     start, end = crest_span(tube)
     plant["crest_end"], plant["return_crest_end"] = end, 1 - start
-    _fill_rows(plant, *law.constants)
+    _fill_rows(plant, len(law.heads.tables), *law.constants)
 
 
 def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
@@ -359,16 +362,18 @@ def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
     rise, ratio = law.pressure_per_fill_difference, math.sqrt(2 / (law.drag_coefficient + 1))
     level = Table(knots=np.array([0.0, 1.0]), columns=np.array([0.0, rise, rise, rise, 0.0, 0.0, 0.0, 0.0]))
     head = Table(knots=_NO_HEADS, columns=np.repeat([ratio, 0.0, 0.0, 0.0], 2))
-    rows = LawRows(rows=[[]])
+    rows = LawRows.of(1)
     rows.add_levels(level)
     rows.add_way(point.SIPHON, head, law.density)
-    _fill_rows(plant, *rows.arrays({point.LARGEST_FILL: law.max_fill_ratio}))
+    _fill_rows(plant, 1, *rows.arrays({point.LARGEST_FILL: law.max_fill_ratio}))
 
 
-def _fill_rows(plant: npt.NDArray[np.void], numbers: FloatArray, rows: FloatArray) -> None:
+def _fill_rows(plant: npt.NDArray[np.void], ways: int, numbers: FloatArray, rows: FloatArray) -> None:
     if numbers.size > NUMBERS or len(rows) > ROWS:
         raise ValueError(f"the law has {len(rows)} pieces, at most {ROWS} can be compiled")
     plant["numbers"][0, : numbers.size], plant["rows"][0, : len(rows)] = numbers, rows
+    for way in range(ways):
+        plant["roots"][0, way] = root_cells(numbers, rows, way)
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:

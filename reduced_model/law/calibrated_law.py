@@ -140,7 +140,7 @@ class CalibratedLaw:
     def constants(self) -> tuple[FloatArray, FloatArray]:
         """Numbers and pieces, all that `point` needs to answer a query."""
         (siphon, *ways), density = self.heads.tables, self.density
-        rows = LawRows(rows=[[] for _ in self.heads.tables])
+        rows = LawRows.of(len(self.heads.tables))
         rows.add_levels(self.levels)
         rows.add_way(point.SIPHON, siphon, density, siphon.knots.size - 1)
         if ways:

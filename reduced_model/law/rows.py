@@ -26,24 +26,32 @@ CELLS: Final = 512
 class LawRows:
     """The law's numbers and rows of pieces, as far as they are."""
 
+    ways: FloatArray
+    """Rows that say where velocities are found, shape (ways, `WIDTH_OF_ROW`)."""
     cells: int = CELLS
     """Of equal length, that say at which piece to begin looking."""
-    numbers: list[float] = field(default_factory=lambda: [0.0] * point.PLACES)
-    rows: list[list[float]] = field(default_factory=list)
+    numbers: list[FloatArray] = field(default_factory=lambda: [np.zeros(point.PLACES)])
+    pieces: list[FloatArray] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, ways: int, cells: int = CELLS) -> LawRows:
+        """With nothing but room for the whole tube and the ways to a crest."""
+        return cls(ways=np.zeros((ways, WIDTH_OF_ROW)), cells=cells)
 
     def add(self, *columns: npt.ArrayLike) -> None:
         """Pieces as columns of what stands in a row, each of shape (pieces,) or (powers, pieces)."""
         whole = np.concatenate([np.atleast_2d(np.asarray(each, dtype=np.float64)) for each in columns])
-        padded = np.zeros((whole.shape[1], WIDTH_OF_ROW))
-        padded[:, : len(whole)] = whole.T
-        self.rows.extend(padded.tolist())
+        rows = np.zeros((whole.shape[1], WIDTH_OF_ROW))
+        rows[:, : len(whole)] = whole.T
+        self.pieces.append(rows)
 
     def add_cells(self, knots: FloatArray) -> tuple[float, float]:
         """Cells for the pieces that are added next. Returns: cells for one of x, and the place of x = 0."""
-        start, place, first = float(knots[0]), len(self.numbers), len(self.rows)
-        edges = np.linspace(start, float(knots[-1]), self.cells + 1)[:-1]
-        pieces = first + np.searchsorted(knots[1:], edges, side="right")
-        self.numbers.extend([*pieces.astype(float).tolist(), float(first + knots.size - 2)])
+        start, place = float(knots[0]), sum(each.size for each in self.numbers)
+        first = sum(map(len, (self.ways, *self.pieces)))
+        edges = np.linspace(start, float(knots[-1]), self.cells + 1)
+        edges[-1] = knots[-2]
+        self.numbers.append(first + np.searchsorted(knots[1:], edges, side="right").astype(np.float64))
         scale = self.cells / (float(knots[-1]) - start)
         return scale, place - start * scale + _EDGE
 
@@ -56,16 +64,14 @@ class LawRows:
             behind the rest in the way's own row.
         """
         first = float(knots[0])
-        cells = self.add_cells(knots)
-        slowest = ratios[:, 0] @ (first - float(knots[1])) ** np.arange(6)
-        row = [first**8, float(slowest) / first**4, float(knots[-1]), *cells, *more]
-        self.rows[way] = row + [0.0] * (WIDTH_OF_ROW - len(row))
+        slowest = float(ratios[:, 0] @ (first - float(knots[1])) ** np.arange(6))
+        row = [first**8, slowest / first**4, float(knots[-1]), *self.add_cells(knots), *more]
+        self.ways[way, : len(row)] = row
         self.add(knots[1:], ratios, squares)
 
     def add_levels(self, levels: Table) -> None:
         """Hydrostatic pressure over the fill, with its half-width in column 3."""
-        cells = self.add_cells(levels.knots)
-        self.numbers[point.LEVEL_SCALE], self.numbers[point.LEVEL_CELLS] = cells
+        self.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = self.add_cells(levels.knots)
         self.add(levels.knots[1:], levels.quintics, levels.lines(levels.column(3)))
 
     def add_way(self, way: int, table: Table, density: float, *more: float) -> None:
@@ -78,16 +84,17 @@ class LawRows:
     def add_shares(self, table: Table, density: float) -> None:
         """Beside the pieces of the whole tube: from column 4 on, see `TubeHeads`."""
         powers = density ** (0.125 * np.arange(4))[:, None]
-        off = table.lines(table.column(4)) / powers[:2]
-        back = table.cubics(7) if table.count > 7 else np.zeros((4, table.knots.size - 1))
-        # Through the middle of a cubic piece and both its ends.
-        length = np.diff(table.knots)
-        back = np.array([back[0], back[1] - back[3] * length**2 / 2, back[2] - back[3] * length * 1.5])
-        self.add(table.cubics(5) / powers, off, back / powers[:3])
+        columns = [table.cubics(5) / powers, table.lines(table.column(4)) / powers[:2]]
+        if table.count > 7:
+            # A parabola through the middle of a cubic piece and both its ends.
+            value, slope, square, cube = table.cubics(7)
+            length = np.diff(table.knots)
+            parabola = np.array([value, slope - cube * length**2 / 2, square - cube * length * 1.5])
+            columns.append(parabola / powers[:3])
+        self.add(*columns)
 
     def arrays(self, scalars: Mapping[int, float]) -> tuple[FloatArray, FloatArray]:
         """Numbers, with those of the law at their places, and pieces, shape (rows, `WIDTH_OF_ROW`)."""
-        numbers = np.array(self.numbers)
-        for place, value in scalars.items():
-            numbers[place] = value
-        return numbers, np.array(self.rows)
+        numbers = np.concatenate(self.numbers)
+        numbers[list(scalars)] = list(scalars.values())
+        return numbers, np.concatenate([self.ways, *self.pieces])

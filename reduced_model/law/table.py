@@ -77,15 +77,15 @@ class Table:
 
     def quintic(self, x: npt.ArrayLike) -> FloatArray:
         """The first column at any x, level beyond the ends."""
-        return self.quintic_with_slope(x)[0]
-
-    def quintic_with_slope(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """The same, and its slope."""
         piece, t = self.place(x)
         c = self.quintics[:, piece]
-        value = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
-        slope = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5]))))
-        return np.asarray(value), np.asarray(slope)
+        return np.asarray(c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5])))))
+
+    def quintic_slope(self, x: npt.ArrayLike) -> FloatArray:
+        """Its slope; beyond the ends that at the ends."""
+        piece, t = self.place(x)
+        c = self.quintics[:, piece]
+        return np.asarray(c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5])))))
 
     def cubic(self, x: npt.ArrayLike, number: int) -> FloatArray:
         """A column with slopes behind it at any x, level beyond the ends."""

@@ -281,7 +281,7 @@ def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
     low, high = knots[piece], knots[piece + 1]
     root = low + (high - low) * (inside - at[piece]) / (at[piece + 1] - at[piece])
     for _ in range(_NEWTON_STEPS):
-        ratio, slope = table.quintic_with_slope(root)
+        ratio, slope = table.quintic(root), table.quintic_slope(root)
         change = (inside - root**4 * ratio) / (root**3 * (4 * ratio + root * slope))
         root = np.minimum(np.maximum(root + change, low), high)
         if np.all(np.abs(change) <= _ROUND_OFF * root):

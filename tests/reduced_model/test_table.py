@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from ringbalance.reduced_model.law.inverse import root_of_velocity, velocity_under
+from ringbalance.reduced_model.law.inverse import root_cells, root_of_velocity, velocity_under
 from ringbalance.reduced_model.law.point import SIPHON
 from ringbalance.reduced_model.law.rows import LawRows
 from ringbalance.reduced_model.law.table import (
@@ -42,7 +42,7 @@ def test_pieces_are_those_of_scipy() -> None:
     x = np.linspace(nodes[0], nodes[-1], 501)
     np.testing.assert_allclose(table.cubic(x, 0), CubicHermiteSpline(nodes, value, slope)(x), atol=1e-14)
     quintic = BPoly.from_derivatives(nodes, np.stack([value, slope, curvature], axis=1))
-    found = table.quintic_with_slope(x)
+    found = [table.quintic(x), table.quintic_slope(x)]
     np.testing.assert_allclose(found, [quintic(x), quintic(x, nu=1)], atol=1e-12)
     np.testing.assert_allclose(table.straight(x, 0), np.interp(x, nodes, value), atol=1e-15)
     np.testing.assert_allclose(table.quintic([-9.0, 9.0]), value[[0, -1]], atol=1e-15)
@@ -82,18 +82,20 @@ def test_a_velocity_loses_the_head_that_drives_it(u: list[float]) -> None:
         np.zeros_like(s),
     ]
     table = Table(knots=s, columns=np.concatenate(columns))
-    rows = LawRows(rows=[[]])
+    rows = LawRows.of(1)
     rows.add_way(SIPHON, table, 1000.0)
-    numbers, pieces = (each.tolist() for each in rows.arrays({}))
+    whole = rows.arrays({})
+    cells = root_cells(*whole, SIPHON).tolist()
+    numbers, pieces = (each.tolist() for each in whole)
     inside = (s[0] ** 8 / 2 < np.array(u)) & (np.array(u) < s[-1] ** 4 / 2)
     roots = roots_of(table, u)
     right = np.sqrt((np.array(u) + np.sqrt(np.array(u) ** 2 + 4 * np.array(u))) / 2) ** 0.5
     np.testing.assert_allclose(roots[inside], right[inside], rtol=1e-9)
     for speed, root in zip(u, roots.tolist(), strict=True):
         assert velocity_under(numbers, pieces, SIPHON, 1000.0 * root**8) == pytest.approx(speed, rel=1e-12)
-        found, slope = root_of_velocity(numbers, pieces, SIPHON, speed)
+        found, slope = root_of_velocity(cells, pieces, SIPHON, speed)
         assert found == pytest.approx(1000.0**0.125 * root, rel=1e-12)
-        more = root_of_velocity(numbers, pieces, SIPHON, speed * (1 + 1e-6))[0]
+        more = root_of_velocity(cells, pieces, SIPHON, speed * (1 + 1e-6))[0]
         assert speed * 1e-6 / (more - found) == pytest.approx(slope, rel=1e-4)
 
 

@@ -35,7 +35,7 @@ _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
 _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 26
+_MOST_LEVELS: Final = 16
 """Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
 _OF_SHARE: Final = 1e-3
 _OF_CHAMBER: Final = 2e-6

@@ -84,7 +84,7 @@ class Source:
                 if name in known and used.setdefault(name, known[name]) != known[name]:
                     raise ValueError(f"two modules mean different numbers by {name}")
         return cls(
-            constants={name: value for name, value in constants.items() if name in used},
+            constants={name: used[name] for name in constants if name in used},
             functions={name: each for name, each in functions.items() if name in needed},
         )
 

@@ -150,14 +150,14 @@ def _write_page(evidence: Record, stage: Path, pool: Workers | None) -> Record:
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
     (stage / TABLES).mkdir()
-    for name, table in csv_tables(kept).items():
+    for name, table in _csv_tables(kept).items():
         (stage / TABLES / name).write_text(table, encoding="utf-8")
     for name, page in render_pages(content).items():
         (stage / name).write_text(page, encoding="utf-8")
     return kept
 
 
-def csv_tables(evidence: Record) -> dict[str, str]:
+def _csv_tables(evidence: Record) -> dict[str, str]:
     """Contents of the files by name: tables of cases, the map of k, the operating map, the sampled loops.
 
     SI units, which stand in the heads. The same evidence gives the same bytes.

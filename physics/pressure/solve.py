@@ -144,7 +144,7 @@ class _LinearSolution:
     statistics: Statistics
 
 
-def solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = False) -> _LinearSolution:
+def _solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = False) -> _LinearSolution:
     """Solve A u = b for a symmetric positive definite A.
 
     Args: `multigrid`: conjugate gradients with algebraic multigrid instead of a factorisation; where they
@@ -304,7 +304,7 @@ class WeakProblem:
         matrix = csr_matrix(self.stiffness[free][:, free])
         right = (self.load - self.stiffness @ start)[free]
         large = self.basis.mesh.dim() == 3 and free.size > MULTIGRID_FROM
-        linear = solve_linear(matrix, right, multigrid=large)
+        linear = _solve_linear(matrix, right, multigrid=large)
         values = start.copy()
         values[free] += linear.values
         return _LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
@@ -372,4 +372,4 @@ def _surface_gradient(
     force = np.sum(problem.force(unit * surface.points) * surface.normals, axis=0)
     rest = (weak.stiffness @ pressure - weak.load) / unit + surface.load(force, unknowns=pressure.size)
     mass = surface.mass(unknowns=pressure.size)
-    return solve_linear(csr_matrix(mass[nodes][:, nodes]), rest[nodes])
+    return _solve_linear(csr_matrix(mass[nodes][:, nodes]), rest[nodes])

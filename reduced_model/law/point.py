@@ -182,7 +182,7 @@ def velocity(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
 def relative_square(p: Pieces, w: Query, driven: float, square: float) -> float:
     """Squared half-width of the last velocity over its square, by its loss and by what drives it.
 
-    Args: `driven`: its pressure. `square`: squared half-width of that.
+    Args: `driven`: its pressure, Pa. `square`: of what is known of it, Pa^2.
     """
     row = int(w[ROW])
     t = w[TO_END]

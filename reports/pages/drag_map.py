@@ -295,7 +295,7 @@ class DragMap:
         return [_bore_of(self.bore, *column) for column in zip(k.T, self.point.runs.T, strict=True)]
 
 
-def velocity_paper(density: float, gas_pressure: float) -> float:
+def _velocity_paper(density: float, gas_pressure: float) -> float:
     """Eq. 19 with k = 50 at equal fills, where its level terms cancel, m/s."""
     return float(
         paper.velocity_from_pressures(
@@ -328,7 +328,7 @@ def liquids_in_tube(
     for i, liquid in enumerate(chosen):
         starts = bool(at_scene.regime[i] != Regime.BLOCKED)
         pressure = float(scene.gas.pressure if starts else equal[i])
-        point, printed = (at_scene if starts else at_equal).at(i), velocity_paper(liquid.density, pressure)
+        point, printed = (at_scene if starts else at_equal).at(i), _velocity_paper(liquid.density, pressure)
         records.append(
             {
                 "name": liquid.name,

@@ -84,7 +84,7 @@ def _drawn_runs(evidence: Record) -> dict[str, Record]:
     return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
 
 
-def injections_until(run: Record) -> float:
+def _injections_until(run: Record) -> float:
     """End of the last injection, s; of the run where there is none."""
     ends = [item["time_s"] + item["duration_s"] for item in run["injections"]]
     return float(max(ends, default=run["time_s"][-1]))
@@ -96,7 +96,7 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
     Where a long rest follows the injections it has an axis of its own.
     """
     end = max(float(run["time_s"][-1]) for run in runs.values())
-    early = 1.15 * max(map(injections_until, runs.values()))
+    early = 1.15 * max(map(_injections_until, runs.values()))
     parts = {(0.0, end): (0.09, 0.15, 0.89, 0.68)}
     if 0 < early < _REST * end:
         parts = {(0.0, early): (0.09, 0.15, 0.6, 0.68), (early, end): (0.72, 0.15, 0.26, 0.68)}
@@ -141,7 +141,7 @@ def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str
     ]
 
 
-def frames_of(run: Record) -> list[tuple[str, float]]:
+def _frames_of(run: Record) -> list[tuple[str, float]]:
     """Titles and times, s, of the start, the first injections and the end."""
     last = float(run["time_s"][-1])
     after = [
@@ -154,7 +154,7 @@ def frames_of(run: Record) -> list[tuple[str, float]]:
 def _rings(run: Record, disc: Record) -> Drawing:
     """The ring at the start, after the first injections and at the end, as the shaft sees it: each chamber
     with its liquid, drawn as a sector between the radii that its fill takes."""
-    frames = frames_of(run)
+    frames = _frames_of(run)
     width = 1 / len(frames)
 
     def at(time: float, values: Sequence[float]) -> float:
@@ -229,7 +229,7 @@ _SMALL_FILL: Final = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopGain:
+class _LoopGain:
     """The proportional loop about level chambers under one law.
 
     e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V: a residual turns round from h = 1
@@ -250,7 +250,7 @@ class LoopGain:
     """h: share of the residual that an operation takes away."""
 
 
-def loop_gain(scene: Scene, model: BalancerModel) -> LoopGain | None:
+def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
     """Linearise the loop about level chambers; None when the gas does not drive a flow there."""
     x, pressure = scene.disc.initial_fill, scene.gas.pressure
     flow = model.flow.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
@@ -261,7 +261,7 @@ def loop_gain(scene: Scene, model: BalancerModel) -> LoopGain | None:
     moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
     per_fill = float(abs(moments[1] - moments[0])) / (2 * _SMALL_FILL)
     slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
-    return LoopGain(
+    return _LoopGain(
         law=model.name,
         velocity_m_s=u,
         drag_coefficient=2 * pressure / (model.density * u**2) - 1,
@@ -273,7 +273,7 @@ def loop_gain(scene: Scene, model: BalancerModel) -> LoopGain | None:
 
 def _consequences(work: Work) -> Record:
     """The paper's law over the devices on which the summary judges the calibrated one."""
-    gains = [loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
+    gains = [_loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
     paper = judged(balancer_of(work.ring, flow_law="paper"), {})
     return {
         "gain": [asdict(each) for each in gains if each is not None],

@@ -32,7 +32,7 @@ _RADII: Final = 17
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChamberField:
+class _ChamberField:
     """The liquid's gauge pressure in one chamber, gravity left out, at the nodes of a mesh."""
 
     fill_ratio: float
@@ -73,7 +73,7 @@ class ChamberField:
     def write(self, *, path: Path) -> Path:
         """Write gauge pressure, Pa, and depth below the free surface, m, to a VTU file. Raises: OSError."""
         depth = np.maximum(np.hypot(*self.mesh.doflocs[:2]) - self.surface_radius, 0.0)
-        return write_vtu(path, mesh=self.mesh, fields={"pressure_Pa": self.pressure, "depth_m": depth})
+        return _write_vtu(path, mesh=self.mesh, fields={"pressure_Pa": self.pressure, "depth_m": depth})
 
 
 def shown_fill(scene: Scene) -> float:
@@ -81,7 +81,7 @@ def shown_fill(scene: Scene) -> float:
     return scene.disc.initial_fill or scene.disc.max_fill_ratio / 2
 
 
-def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
+def chamber_field(scene: Scene, *, fill_ratio: float) -> _ChamberField:
     """Solve the pressure of the liquid in one chamber in three dimensions, gravity left out.
 
     Args: `fill_ratio`: x, within (0, 1).
@@ -94,7 +94,7 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
         if scene.disc.geometry is None
         else _in_imported(scene.disc.geometry, radius, liquid)
     )
-    return ChamberField(fill_ratio=fill_ratio, surface_radius=radius, **parts)
+    return _ChamberField(fill_ratio=fill_ratio, surface_radius=radius, **parts)
 
 
 def _in_sector(scene: Scene, surface: float, liquid: RotatingLiquid) -> Record:
@@ -140,7 +140,7 @@ def _in_imported(geometry: ChamberGeometry, surface: float, liquid: RotatingLiqu
     }
 
 
-def write_vtu(path: Path, *, mesh: Any, fields: Mapping[str, npt.ArrayLike] | None = None) -> Path:
+def _write_vtu(path: Path, *, mesh: Any, fields: Mapping[str, npt.ArrayLike] | None = None) -> Path:
     """Write a mesh of scikit-fem in metres with its boundary names and nodal fields, whole or not at all.
 
     Args: `path`: of the file, ending in .vtu. `fields`: nodal values by name, shape (nodes,) each, SI.

@@ -156,10 +156,20 @@ def test_structured_text_has_the_bits_of_python(six: Both) -> None:
     asked = queries(law, 400, seed=3, outside=True)
     right = np.array(list(answers(compact, asked)))
     assert np.unique(right[:, 2]).size == 5
+    operations = []
     for query, expected in zip(asked.T.tolist(), right, strict=True):
-        row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
-        machine.call("disc_answer", [constants, compact.pieces, row, True])
-        assert np.array(row[point.VELOCITY : point.PRIMED_AFTER + 1]).tobytes() == expected.tobytes()
+        for widths in (True, False):
+            row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
+            before = machine.operations
+            machine.call("disc_answer", [constants, compact.pieces, row, widths])
+            operations.append((row[point.REGIME] == point.BLOCKED, widths, machine.operations - before))
+            if widths:
+                found = row[point.VELOCITY : point.PRIMED_AFTER + 1]
+                assert np.array(found).tobytes() == expected.tobytes()
+        assert row[point.VELOCITY] == expected[0]
+        assert row[point.PRIMED_AFTER] == expected[4]
+    for blocked, widths, most in ((True, True, 120), (False, False, 180), (False, True, 300)):
+        assert most - 60 < max(n for at, wide, n in operations if (at, wide) == (blocked, widths)) <= most
 
 
 def test_the_function_block_is_one(six: Both) -> None:

@@ -14,7 +14,7 @@ import example_measurements
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.identification.criticism import Criticism, LawComparison, Review
+from ringbalance.identification.criticism import Review, _Criticism, _LawComparison
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import bundled_scene, load_scene
@@ -114,11 +114,11 @@ def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:
 
 def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values may then be wrong by more than their intervals, so that a script must not go on with them."""
-    better = LawComparison(other="another law", separation=100.0, preference=-50.0)
+    better = _LawComparison(other="another law", separation=100.0, preference=-50.0)
     assert better.outcome == "other"
     words = (PAPER, EXAMPLES["trial_weight"])
     for laws, expected in (((), 0), ((better,), 1)):
-        found = Review(criticism=Criticism(findings=()), laws=laws)
+        found = Review(criticism=_Criticism(findings=()), laws=laws)
         monkeypatch.setattr(Review, "of", lambda _, found=found: found)
         code, out, _ = run(*words)
         assert code == expected

@@ -7,8 +7,9 @@ decides on regime, status and uncertainty.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -19,7 +20,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, carried_by
 from ringbalance.reduced_model.law.rows import LawRows
-from ringbalance.reduced_model.law.table import Table, knots_of, largest_error
+from ringbalance.reduced_model.law.table import Table
 from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import SceneError
@@ -188,11 +189,16 @@ class _Column:
         found = np.linalg.solve(np.vander(t, increasing=True), self.value[at])
         return np.pad(found, (0, self.degree + 1 - at.size))
 
-    def errors(self, x: FloatArray, inside: slice) -> FloatArray:
+    def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
         """Of one piece, at the samples that it spans."""
-        first, last = inside.start, inside.stop - 1
+        inside = slice(first, last + 1)
         t = (x[inside] - x[last]) / (x[last] - x[first])
         return np.asarray(polyval(t, self.polynomial(x, first, last)) - self.value[inside])
+
+    def largest(self, x: FloatArray, ends: IntArray, of: FloatArray | float = 1.0) -> float:
+        """Error of all pieces. Args: `of`: what it is relative to, at the samples."""
+        scale, pairs = np.broadcast_to(of, x.shape), pairwise(ends.tolist())
+        return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
 
     def pieces(self, x: FloatArray, ends: IntArray) -> FloatArray:
         """Coefficients in powers of x - end, shape (degree + 1, pieces)."""
@@ -208,9 +214,9 @@ def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
     level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
-    while (ends := knots_of(x, [level, width])).size > _MOST_LEVELS + 1:
+    while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
-    error = largest_error(x, level, ends, relative=False)
+    error = level.largest(x, ends)
     rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = rows.add_cells(x[ends])
     widened = replace(width, value=np.hypot(width.value, error))
     rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
@@ -225,7 +231,7 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
         allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
         columns.append(_Column(value=value, allowed=allowed, degree=2))
     columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
-    ends = knots_of(x, columns)
+    ends = _ends(x, columns)
     rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
@@ -238,12 +244,12 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float
     ratio = _Column(value=value, allowed=_OF_HEADS * value)
     loss = _half_width(table.straight(s, LOSS) ** 2)
     beside = _shares(table, s) if way == point.SIPHON else []
-    ends = knots_of(x, [ratio, loss, *beside])
+    ends = _ends(x, [ratio, loss, *beside])
     more = (*law.path.clearing_velocities, *carried_by(law.path)) if way else (ends.size - 1,)
     rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
     if beside:
         rows.add(*(each.pieces(x, ends) for each in beside))
-    return largest_error(x, ratio, ends)
+    return ratio.largest(x, ends, of=value)
 
 
 def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
@@ -261,3 +267,27 @@ def _share(value: FloatArray, degree: int) -> _Column:
 def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
     allowed = of * (value + 0.1 * float(np.max(value))) + 1e-300
     return _Column(value=value, allowed=allowed, degree=1)
+
+
+def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:
+    """Samples at which pieces meet, each piece as long as its errors allow, and those at both ends."""
+
+    def fits(first: int, last: int) -> bool:
+        inside = slice(first, last + 1)
+        return all(
+            bool(np.all(np.abs(column.errors(x, first, last)) <= column.allowed[inside]))
+            for column in columns
+        )
+
+    ends = [0]
+    while ends[-1] < x.size - 1:
+        ends.append(_furthest(partial(fits, ends[-1]), ends[-1] + 1, x.size - 1))
+    return np.array(ends)
+
+
+def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:
+    """By halving; the lowest is taken to fit."""
+    while low < high:
+        middle = (low + high + 1) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle - 1)
+    return low

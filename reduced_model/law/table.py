@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from itertools import pairwise
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline, make_interp_spline
 
-from ringbalance.scene.arrays import FloatArray, IntArray, clipped
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, clipped
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,24 +128,6 @@ def smooth_tables(x: FloatArray, y: FloatArray) -> list[Table]:
     return [Table(knots=x, columns=each) for each in columns.T]
 
 
-class Sampled(Protocol):
-    """A quantity over samples, of which pieces are made."""
-
-    @property
-    def value(self) -> FloatArray:
-        """Shape (samples,)."""
-        ...
-
-    @property
-    def allowed(self) -> FloatArray:
-        """Largest error, shape (samples,)."""
-        ...
-
-    def errors(self, x: FloatArray, inside: slice) -> FloatArray:
-        """Of one piece, at the samples that it spans."""
-        ...
-
-
 @dataclass(frozen=True, kw_only=True)
 class Column:
     """A quantity over samples, with derivatives by the table's x as far as its pieces need them."""
@@ -158,48 +139,37 @@ class Column:
     derivatives: tuple[FloatArray, ...] = ()
     """Slope, or slope and curvature; none: straight between the knots."""
 
-    def errors(self, x: FloatArray, inside: slice) -> FloatArray:
-        """Of one piece, at the samples that it spans."""
-        first, last = inside.start, inside.stop - 1
-        h = float(x[last] - x[first])
-        ends = [(float(each[first]), float(each[last])) for each in (self.value, *self.derivatives)]
-        powers, t = _polynomial(h, *ends), (x[inside] - x[last]) / h
-        value = powers.pop()
+    def misses(self, x: FloatArray, inside: IntArray) -> BoolArray:
+        """Whether pieces miss more than is allowed, shape (pieces,); `inside`: their samples, (pieces, n)."""
+        first, last = inside[:, :1], inside[:, -1:]
+        h = x[last] - x[first]
+        powers = _polynomial(h, *((each[first], each[last]) for each in (self.value, *self.derivatives)))
+        t, value = (x[inside] - x[last]) / h, powers.pop()
         while powers:
             value = powers.pop() + t * value
-        return np.asarray(value - self.value[inside])
+        return np.asarray(np.any(np.abs(value - self.value[inside]) > self.allowed[inside], axis=1))
 
 
-def knots_of(x: FloatArray, columns: Sequence[Sampled], *, every: int = 1) -> IntArray:
-    """Samples at which pieces meet, each piece as long as its errors allow; `every`: of which samples."""
-
-    def fits(first: int, last: int) -> bool:
-        inside = slice(every * first, every * last + 1)
-        return all(bool(np.all(np.abs(each.errors(x, inside)) <= each.allowed[inside])) for each in columns)
-
-    knots, last, length = [0], (x.size - 1) // every, 1
-    while knots[-1] < last:
-        knots.append(_furthest(partial(fits, knots[-1]), knots[-1] + 1, last, length))
-        length = knots[-1] - knots[-2]
-    return every * np.array(knots)
+_LONGEST: Final = 128
+"""Of the lengths of pieces, in that of the shortest."""
 
 
-def _furthest(fits: Callable[[int], bool], low: int, high: int, step: int) -> int:
-    """The last that fits, by longer and longer steps and then by halving; the lowest is taken to fit."""
-    while low + step < high and fits(low + step):
-        low, step = low + step, 2 * step
-    high = min(high, low + step)
-    while low < high:
-        middle = (low + high + 1) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle - 1)
-    return low
+def knots_of(x: FloatArray, columns: Sequence[Column], *, shortest: int = 1) -> IntArray:
+    """Samples at which pieces meet, each halved until its errors are allowed or it is as short as can be.
 
-
-def largest_error(x: FloatArray, column: Sampled, knots: IntArray, *, relative: bool = True) -> float:
-    """Of a quantity between its knots, at the samples."""
-    pieces = [slice(a, b + 1) for a, b in pairwise(knots.tolist())]
-    scale = column.value if relative else np.ones_like(x)
-    return max(float(np.max(np.abs(column.errors(x, each) / scale[each]))) for each in pieces)
+    Args: `x`: a power of two samples and one more, at least. `shortest`: samples from end to end of a piece.
+    """
+    length = min(_LONGEST * shortest, x.size - 1)
+    starts, knots = np.arange(0, x.size - 1, length), [np.array([x.size - 1])]
+    while starts.size:
+        halved = np.zeros(starts.size, dtype=np.bool_)
+        for column in columns if length > shortest else ():
+            rest = np.flatnonzero(~halved)
+            halved[rest] = column.misses(x, starts[rest, None] + np.arange(length + 1))
+        knots.append(starts[~halved])
+        length //= 2
+        starts = np.concatenate([starts[halved], starts[halved] + length])
+    return np.sort(np.concatenate(knots))
 
 
 def table_at(x: FloatArray, knots: IntArray, columns: Sequence[Column]) -> Table:

@@ -17,7 +17,7 @@ from ringbalance.physics.tube.loss import (
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.law.table import Column, Table, knots_of, largest_error, spline, table_at
+from ringbalance.reduced_model.law.table import Column, Table, knots_of, spline, table_at
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_span,
@@ -86,7 +86,7 @@ class TubeHeads:
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
         exact = _Widths(*([np.zeros(log_u.size)] * 4))
         return tuple(
-            cls._tabled([each.of_design(i) for each in lost], exact, every=0)[0]
+            cls._tabled([each.of_design(i) for each in lost], exact, shortest=0)[0]
             for i in range(lost[0].root.shape[1])
         )
 
@@ -103,7 +103,9 @@ class TubeHeads:
         Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
         """
         place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
-        return cls._with_widths(scene, _widths(scene, np.exp(_places(2 * _SAMPLES - 1)), place=place))
+        log_u, every = _places(2 * _SAMPLES - 1), _places(_SAMPLES)
+        widths = _widths(scene, np.exp(every), place=place)
+        return cls._with_widths(scene, _Widths(*(np.interp(log_u, every, width) for width in widths)))
 
     @classmethod
     def _with_widths(cls, scene: Scene, widths: _Widths) -> TubeHeads:
@@ -111,15 +113,15 @@ class TubeHeads:
         log_u = _places(2 * _SAMPLES - 1)
         lost = [_Lost.of(log_u, value[:, 0]) for value in _sampled(scene, log_u)]
         heads, missed = cls._tabled(
-            lost, widths, every=2, allowed=_OF_TOLERANCE * max(scene.tolerance, _FINEST)
+            lost, widths, shortest=2, allowed=_OF_TOLERANCE * max(scene.tolerance, _FINEST)
         )
         return replace(heads, interpolation_error=_OF_HEAD * missed)
 
     @classmethod
     def _tabled(
-        cls, lost: list[_Lost], widths: _Widths, *, every: int, allowed: float = 0.0
+        cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float = 0.0
     ) -> tuple[TubeHeads, float]:
-        """From losses and half-widths at samples; `every`: as `knots_of`, or 0 for a knot at each sample.
+        """From losses and half-widths at samples; `shortest`: as `knots_of`, or 0 for a knot at each sample.
 
         Returns: The heads, and the largest relative error of a velocity.
         """
@@ -133,9 +135,9 @@ class TubeHeads:
         tables = [(way, [way.ratio(allowed), _half_width(width)]) for way, width in there]
         made, missed = [], 0.0
         for each, some in [(whole, columns), *tables]:
-            knots = knots_of(each.root, some, every=every) if every else np.arange(each.root.size)
+            knots = knots_of(each.root, some, shortest=shortest) if shortest else np.arange(each.root.size)
             made.append(table_at(each.root, knots, some))
-            missed = max(missed, largest_error(each.root, some[0], knots) if every else 0.0)
+            missed = max(missed, float(np.max(np.abs(made[-1].quintic(each.root) / each.over_root - 1.0))))
         return cls.with_ways(*made), missed
 
     @classmethod

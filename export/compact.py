@@ -17,10 +17,10 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, carried_by
-from ringbalance.reduced_model.law.rows import LawRows
-from ringbalance.reduced_model.law.table import Table
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import SceneError

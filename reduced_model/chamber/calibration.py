@@ -19,7 +19,7 @@ from ringbalance.reduced_model.chamber.contributions import (
 )
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues, chamber_pressure, measured_closed_forms
-from ringbalance.reduced_model.law.table import Table, smooth_table, smooth_tables, spline
+from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables, spline
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Disc, Scene

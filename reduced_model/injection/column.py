@@ -26,8 +26,8 @@ from typing import Final
 from ringbalance.physics.gas import flow_shape, flow_shape_slope
 from ringbalance.reduced_model.injection.dynamics import PIECES, P, Record
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.inverse import level_with_slope, root_of_velocity, velocity_under
-from ringbalance.reduced_model.law.point import SIPHON, THERE, WAY_BACK
+from ringbalance.reduced_model.pieces.inverse import level_with_slope, root_of_velocity, velocity_under
+from ringbalance.reduced_model.pieces.point import SIPHON, THERE, WAY_BACK
 from ringbalance.reduced_model.tube import regime
 from ringbalance.reduced_model.tube.regime import CLEARING, cleared, crest_margins, driving_pressure
 from ringbalance.scene.platform.compiled import in_place, inlined

@@ -19,13 +19,13 @@ from ringbalance.physics.gas import (
     VENTED,
     GasLine,
 )
-from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
-from ringbalance.reduced_model.law.inverse import ROOT_PLACES, root_cells
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.law.rows import WIDTH_OF_ROW, LawRows
-from ringbalance.reduced_model.law.table import Table
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.inverse import ROOT_PLACES, root_cells
+from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
+from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.arrays import FloatArray, plain

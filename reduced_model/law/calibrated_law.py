@@ -20,7 +20,6 @@ from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
-from ringbalance.reduced_model.law import point
 from ringbalance.reduced_model.law.flow_law import (
     CALIBRATED,
     FILL_SLACK,
@@ -30,8 +29,10 @@ from ringbalance.reduced_model.law.flow_law import (
     law_text,
     save_record,
 )
-from ringbalance.reduced_model.law.rows import LawRows
-from ringbalance.reduced_model.law.table import Table, smooth_table, smooth_tables
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.compiled_point import answer_each
+from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
@@ -231,8 +232,6 @@ class CalibratedLaw:
         if asked.shape[1] <= _FEW:
             each = [self._answer(*query) for query in asked.T.tolist()]
             return np.reshape([[query[place] for query in each] for place in _ANSWER], (len(_ANSWER), -1))
-        from ringbalance.reduced_model.law.compiled_point import answer_each  # noqa: PLC0415
-
         answers = np.empty((len(_ANSWER), asked.shape[1]))
         answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers)
         return answers

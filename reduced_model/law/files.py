@@ -15,7 +15,7 @@ import numpy as np
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, DriveUncertainty
 from ringbalance.reduced_model.law.flow_law import FORMAT, VERSION, CompleteLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
-from ringbalance.reduced_model.law.table import Table
+from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.faults import Fault, SceneError

@@ -17,7 +17,7 @@ from ringbalance.physics.tube.loss import (
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.law.table import Column, Table, knots_of, spline, table_at
+from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, spline, table_at
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_span,

@@ -10,7 +10,7 @@ import pytest
 from ringbalance.reduced_model.injection import column, step
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.law.point import SIPHON, THERE
+from ringbalance.reduced_model.pieces.point import SIPHON, THERE
 
 
 def plain_form() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from ringbalance.reduced_model.law.inverse import root_cells, root_of_velocity, velocity_under
-from ringbalance.reduced_model.law.point import SIPHON
-from ringbalance.reduced_model.law.rows import LawRows
-from ringbalance.reduced_model.law.table import (
+from ringbalance.reduced_model.pieces.inverse import root_cells, root_of_velocity, velocity_under
+from ringbalance.reduced_model.pieces.point import SIPHON
+from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.table import (
     Column,
     Table,
     knots_of,

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.law.point import (
+from ringbalance.reduced_model.pieces.point import (
     C0,
     C1,
     C2,

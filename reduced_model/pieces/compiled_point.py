@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ringbalance.reduced_model.law.point import (
+from ringbalance.reduced_model.pieces.point import (
     FILL,
     MARGIN,
     MARGIN_SQUARE,

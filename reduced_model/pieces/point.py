@@ -325,7 +325,7 @@ def set_margin(c: Law, w: Query, lost: float, width: float, known: float) -> Non
     """Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
 
     p_m - p_c = p_A - p_c + P_A - D_m - R p_d,  R = (alpha + k_up)/(k + 1), p_d the driving pressure.
-    Args: `lost`: R. `width`: its half-width. `known`: as `known_of`.
+    Args: `lost`: R. `width`: by how much that may be off (95 %). `known`: as `known_of`, Pa^2.
     Source: energy balance from the upstream chamber to the crest; inputs by sensitivity, ASME V&V 20.
     """
     liquid = w[ABOVE] - lost * (w[UP_LEVEL] - w[DISCHARGE])

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.law import point
-from ringbalance.reduced_model.law.table import Table
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.scene.arrays import FloatArray
 
 WIDTH_OF_ROW: Final = point.WIDTH_SLOPE + 1

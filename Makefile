@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd docs dist lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd pages docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -65,7 +65,10 @@ bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps t
 	@sh tools/make_openfoam.sh
 	$(PYTHON_IN_VENV) benchmarks/openfoam.py --keep
 
-docs: env ## the site of the documentation into build/site/, with every warning an error
+pages: env ## run the code on every page of the documentation and compare what it prints
+	$(PYTHON_IN_VENV) -W error tools/generate.py pages
+
+docs: pages ## the site of the documentation into build/site/, its pages run and every warning an error
 	@# From nothing, so that two builds are the same: what an earlier one has kept would show in the next.
 	@rm -rf build/site build/doctrees
 	$(PYTHON_IN_VENV) -m sphinx -q -W --keep-going -c docs -d build/doctrees . build/site

@@ -29,8 +29,7 @@ from ringbalance.controller.rotor import (
     vibrating,
 )
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.paired import Paired
-from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import Paired, Proportion
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite

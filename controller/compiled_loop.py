@@ -65,7 +65,7 @@ def continue_runs(
     """Continue each run by as many samples as there is noise for, unless it ends.
 
     Args:
-        loop: of type `LOOP`. plant: of type `PLANT`; it is given each run's gas line.
+        loop: of type `LOOP`. plant: of type `PLANT`.
         assumed: the same as the law-based algorithm has it; the others do not look at it.
         runs: of type `RUN`, shape (n,), changed.
         motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the pairs as they are and, with
@@ -79,8 +79,6 @@ def continue_runs(
     """
     for i in range(runs.size):
         run = runs[i]
-        plant.passing, plant.critical_ratio = run.gas_line[0], run.gas_line[1]
-        plant.dead_volume, plant.valve_lag = run.gas_line[2], run.gas_line[3]
         if noise.shape[1] == 0:
             _begin(loop, plant, run, motions[i], instants)
         for k in range(noise.shape[1]):

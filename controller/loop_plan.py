@@ -14,7 +14,6 @@ from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.compiled_loop import continue_runs
 from ringbalance.controller.loop_records import (
-    GAS_LINE,
     GAS_POINTS,
     INJECTION,
     LOOP,
@@ -30,7 +29,7 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.scene.arrays import FloatArray, Record, Records
+from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 
 CHUNK: Final = 128
@@ -127,7 +126,7 @@ class LoopPlan:
         loop["rises_tolerated"], loop["most_samples"] = controller.rises_tolerated, most_samples
         loop["sensed"], loop["to_time_limit"] = sensed or not built_in, to_time_limit
         loop["exact"] = not sensed and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0
-        assumed = controller.plant.copy() if isinstance(controller, LawBased) else plant
+        assumed = controller.plant if isinstance(controller, LawBased) else plant
         liquid = controller.liquid() if isinstance(controller, BuiltIn) else np.zeros(0, dtype=MOTION)
         return cls(loop=loop, plant=plant, assumed=assumed, memory=memory, liquid=liquid)
 
@@ -137,10 +136,9 @@ class LoopPlan:
         return int(self.loop["chambers"][0]) // 2
 
     def runs(self, size: int) -> Records:
-        """Runs with the scene's own gas line and velocity, to be given the rest; type `RUN`."""
+        """Runs with the law's own velocity, to be given the rest; type `RUN`."""
         runs = np.repeat(self.memory, size)
         runs["speed"] = 1.0
-        runs["gas_line"] = [float(self.plant[name][0]) for name in GAS_LINE]
         return runs
 
     def carry(
@@ -160,7 +158,7 @@ class LoopPlan:
         shape = (runs.size, CHUNK if watch is None else 1, 2)
         motions = np.zeros((runs.size, 2 * self.pairs + 1), dtype=MOTION)
         liquid = np.tile(self.liquid, (runs.size, 1))
-        room = self.plant.copy()[0], np.zeros(NOTES), np.zeros(WORKSPACE)
+        room = np.zeros(NOTES), np.zeros(WORKSPACE)
         noise, parts = np.zeros(shape), []
         parts.append(self._continued(runs, motions, liquid, noise[:, :0], *room, traced=traced))
         while np.any(running := runs["cause"] == NONE):
@@ -177,7 +175,6 @@ class LoopPlan:
         motions: Records,
         liquid: Records,
         noise: FloatArray,
-        plant: Record,
         notes: FloatArray,
         workspace: FloatArray,
         *,
@@ -189,7 +186,7 @@ class LoopPlan:
         run["instants"], run["injections"], run["samples_before"] = 0, 0, run["samples"]
         continue_runs(
             self.loop[0],
-            plant,
+            self.plant[0],
             self.assumed[0],
             runs,
             motions,

@@ -19,7 +19,7 @@ GAS_POINTS: Final = 8
 """Instants recorded within one command's valve-open time, beside the closing of each valve."""
 TAIL_POINTS: Final = 12
 """Instants recorded within a wait, in which an operation continues after its valve has closed."""
-MOMENT_NODES: Final = 4097
+MOMENT_NODES: Final = 513
 """Of the table of a pair's moment."""
 PAIRS: Final = MAX_CHAMBERS // 2
 TARGET_VECTOR: Final = 0
@@ -172,22 +172,19 @@ _RUN_FLAGS: Final = (
     "runs_back",  # whether liquid still ran back as the last wait ended
     "fixed",  # law-based: whether a pair is at a bound
 )
-GAS_LINE: Final = ("passing", "critical_ratio", "dead_volume", "valve_lag")
-"""Constants of a `PLANT` that belong to a chamber's gas line."""
 RUN: Final = np.dtype(
     [(name, np.float64) for name in _RUN_REAL]
     + [(name, np.int64) for name in _RUN_WHOLE]
     + [(name, np.complex128) for name in ("gain", "vibration", "influence")]
     + [(name, np.float64, (PAIRS,)) for name in _RUN_PAIRS]
     + [(name, np.int64, (PAIRS,)) for name in _RUN_FLAGS]
-    + [("gas_line", np.float64, (len(GAS_LINE),))]
     + [(name, np.int64, (MAX_CHAMBERS,)) for name in ("at_residual", "refused")]
 )
 """One run: what differs between runs, its state and what its algorithm remembers.
 
-`gain`: vibration per balancing moment, m/(kg m). `gas_line`: its own values of `GAS_LINE`. `at_residual`: of
-every chamber, whether its last injection was shortened to keep its residual fill, and none has filled it
-since; `refused`: the same of the last command alone.
+`gain`: vibration per balancing moment, m/(kg m). `at_residual`: of every chamber, whether its last injection
+was shortened to keep its residual fill, and none has filled it since; `refused`: the same of the last command
+alone.
 """
 INJECTION: Final = np.dtype(
     [
@@ -236,7 +233,8 @@ class MomentTable(NamedTuple):
         moment = model.moment.pair_vector(fill_ratio=x, opposite_fill_ratio=np.maximum(total - x, 0.0))
         middle = np.concatenate([moment[:1], moment[1::2], moment[-1:]])
         slope = np.diff(middle)
-        slope[[0, -1]] *= 2.0
+        slope[0] = 4.0 * moment[1] - 3.0 * moment[0] - moment[2]
+        slope[-1] = 3.0 * moment[-1] - 4.0 * moment[-2] + moment[-3]
         return cls(lowest=float(lowest), step=float(step), nodes=np.stack([moment[::2], slope], axis=1))
 
 

@@ -39,6 +39,12 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
     return tuple(row.term for row in used if row.term in IN_INJECTIONS and row.modelled)
 
 
+def run_terms(*, scene: Scene, model: BalancerModel) -> tuple[str, ...]:
+    """`terms_modelled` of runs of a scene; estimates nothing of chamber and tube."""
+    used = models_used(scene, law=model.name, obstacles=_obstacles(model), parts=("injection",))
+    return terms_modelled(used)
+
+
 def dynamics_of(
     *,
     scene: Scene,
@@ -124,7 +130,7 @@ def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
 
     At least the valve's lag and its shortest opening, s.
     """
-    modelled, total = terms_modelled(run_models(scene=scene, model=model)), 2 * scene.disc.initial_fill
+    modelled, total = run_terms(scene=scene, model=model), 2 * scene.disc.initial_fill
     least = max(scene.gas.valve_lag or 0.0, scene.controller.minimum_gas_time)
     if not modelled or rate <= 0.0:
         return least

@@ -21,8 +21,7 @@ from ringbalance.design.hunt import Candidate, Finalist, Hunt, Static, deal, hun
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import Space
 from ringbalance.design.static import point_scene, static_rows
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET
+from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.narrowing import liquid_ring_scene

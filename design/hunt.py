@@ -26,8 +26,7 @@ from ringbalance.design.racing import DEVICES, Place, Race, near, race
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, static_rows
 from ringbalance.design.surface import Surface
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET
+from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.registry import registered
 
@@ -48,7 +47,9 @@ _STEPS: Final = (0.15, 0.15, 0.1, 0.08, 0.06, 0.05)
 """Standard deviations of the steps in the unit cube, round by round."""
 _SIZES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.15), (0.85, 1.15), (0.88, 1.12), (0.9, 1.1))
 """Times the size that is looked for: between which points are tried."""
-_CHILDREN: Final = 17
+_ANYWHERE: Final = (0.5, 0.3, 0.1, 0.0, 0.0, 0.0)
+"""Part of the points that lie anywhere in the unit cube, round by round."""
+_CHILDREN: Final = 16
 """Points that race in a round."""
 _TRIED: Final = 16
 """Drawn for each of them: of those that can work the one races that promises most."""
@@ -235,9 +236,14 @@ class _State:
             axis=1,
         )
 
-    def places(self, parent: Candidate) -> list[Place] | None:
-        """The settings of a parent, and others beside them."""
-        place = parent.race.place
+    def places(self, shares: FloatArray) -> list[list[Place] | None]:
+        """By point the settings of the nearest design that served many devices, and others beside them."""
+        whole = [each for each in self.candidates if each.race.meets.size == DEVICES] or self.candidates
+        known = self.coordinates(np.array([each.shares for each in whole]))
+        apart = np.linalg.norm(self.coordinates(shares)[:, np.newaxis] - known, axis=2)
+        return [self._beside(whole[at].race.place) for at in np.argmin(apart, axis=1).tolist()]
+
+    def _beside(self, place: Place | None) -> list[Place] | None:
         if place is None:
             return None
         beside = near(self.trials, place)
@@ -252,19 +258,22 @@ class _State:
         return [self.candidates[i] for i in (whole or order.tolist())[:_PARENTS]]
 
     def cloud(
-        self, parents: Sequence[Candidate], step: float, sizes: FloatArray | None
-    ) -> tuple[FloatArray, list[Point], list[Candidate]]:
-        """Points about some that can work, each with its parent; one a size, if sizes are asked for."""
-        count = _CHILDREN * _TRIED if sizes is None else sizes.size
-        drawn = self.random.integers(0, len(parents), count).tolist()
+        self, parents: Sequence[Candidate], step: float, sizes: FloatArray, *, anywhere: float = 0.0
+    ) -> tuple[FloatArray, list[Point]]:
+        """Points about some designs that can work, one for each size.
+
+        Args: `anywhere`: part of them that lie anywhere.
+        """
+        drawn = self.random.integers(0, len(parents), sizes.size).tolist()
         shares = np.array([_stepped(self, parents[at].shares, step) for at in drawn])
-        if sizes is not None:
-            shares = np.array(
-                [_sized(self.space, each, size) for each, size in zip(shares, sizes, strict=True)]
-            )
+        free = self.random.random(sizes.size) < anywhere
+        shares[free] = self.random.random((int(np.count_nonzero(free)), shares.shape[1]))
+        if self.space.sized:
+            pairs = zip(shares, sizes, strict=True)
+            shares = np.array([_sized(self.space, each, size) for each, size in pairs])
         points = self.space.points(shares)
         able = np.flatnonzero(self.able(points)[1]).tolist()
-        return shares[able], [points[i] for i in able], [parents[drawn[i]] for i in able]
+        return shares[able], [points[i] for i in able]
 
 
 def hunt(
@@ -290,9 +299,9 @@ def hunt(
     if not state.candidates:
         return Hunt(static=static, whole=whole, candidates=(), threshold=state.threshold)
     size = _size_at_first(state)
-    for number, (step, (low, high)) in enumerate(zip(_STEPS, _SIZES, strict=True) if not whole else ()):
+    for number in range(0 if whole else len(_STEPS)):
         told(f"round {number + 1} of {len(_STEPS)}, about {1e6 * size:.4g} ml")
-        size = _round(state, size, step, low, high)
+        size = _round(state, size, number)
     finalists = _all(state, size) if whole or not space.sized else _ladder(state, size)
     return Hunt(
         static=static,
@@ -330,18 +339,17 @@ def _served(candidate: Candidate) -> float:
     return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
 
 
-def _round(state: _State, size: float, step: float, low: float, high: float) -> float:
+def _round(state: _State, size: float, number: int) -> float:
     """Race points about the best. Returns: the size from which on they serve enough devices."""
-    surface = state.surface(size)
-    parents = state.parents(surface, size)
+    surface, (low, high) = state.surface(size), _SIZES[number]
     sizes = size * np.exp(np.linspace(math.log(low), math.log(high), _CHILDREN * _TRIED))
-    shares, points, of = state.cloud(parents, step, sizes if state.space.sized else None)
+    parents = state.parents(surface, size)
+    shares, points = state.cloud(parents, _STEPS[number], sizes, anywhere=_ANYWHERE[number])
     if points:
         logits, spread = surface.logits(state.coordinates(shares))
         slices = np.array_split(np.arange(len(points)), min(_CHILDREN, len(points)))
         chosen = [int(each[np.argmax((logits + _BOLD * spread)[each])]) for each in slices]
-        places = [state.places(of[i]) for i in chosen]
-        state.race(shares[chosen], [points[i] for i in chosen], places)
+        state.race(shares[chosen], [points[i] for i in chosen], state.places(shares[chosen]))
     surface = state.surface(size)
     shares = np.array([each.shares for each in state.candidates])
     logits, spread = surface.logits(state.coordinates(shares))
@@ -361,7 +369,7 @@ def _ladder(state: _State, size: float) -> list[Finalist]:
     surface = state.surface(size)
     parents = state.parents(surface, size)
     steps = size * (1 + _FINER) ** np.arange(*_LADDER)
-    shares, points, _ = state.cloud(parents, _STEPS[-1], np.repeat(steps, _CLOUD))
+    shares, points = state.cloud(parents, _STEPS[-1], np.repeat(steps, _CLOUD))
     if not points:
         return _all(state, size)
     logits, _ = surface.logits(state.coordinates(shares))

@@ -49,7 +49,7 @@ _MOST_NAMED: Final = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LinearFit:
+class _LinearFit:
     """Residuals and derivatives at the solution, each row in units of its own standard deviation."""
 
     residuals: FloatArray
@@ -96,7 +96,7 @@ class _ResidualTest:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Criticism:
+class _Criticism:
     """All tests of a fit's residuals, clearest first."""
 
     findings: tuple[_ResidualTest, ...]
@@ -119,7 +119,7 @@ class Criticism:
         return text_of("residuals_sound", tests=len(self.findings), level=LEVEL)
 
     @classmethod
-    def of(cls, fit: LinearFit) -> Criticism:
+    def of(cls, fit: _LinearFit) -> _Criticism:
         """Test the residuals of a fit."""
         tests = [*_sizes(fit), *_runs(fit)]
         corrected = [
@@ -129,14 +129,14 @@ class Criticism:
         return cls(findings=tuple(sorted(corrected, key=lambda each: each.p_value)))
 
 
-def _blocks(fit: LinearFit) -> Iterator[tuple[str, BoolArray]]:
+def _blocks(fit: _LinearFit) -> Iterator[tuple[str, BoolArray]]:
     for name in filter(None, dict.fromkeys(map(str, fit.block))):
         rows = fit.block == name
         if np.count_nonzero(rows) >= FEWEST and fit.freedom(rows) > 1:
             yield name, rows
 
 
-def _sizes(fit: LinearFit) -> Iterator[_ResidualTest]:
+def _sizes(fit: _LinearFit) -> Iterator[_ResidualTest]:
     for block, rows in _blocks(fit):
         if bool(np.all(fit.known_noise[rows])):
             square, freedom = float(np.sum(fit.residuals[rows] ** 2)), fit.freedom(rows)
@@ -145,7 +145,7 @@ def _sizes(fit: LinearFit) -> Iterator[_ResidualTest]:
             yield _ResidualTest(test="size", block=block, p_value=float(chi2.sf(square, freedom)), text=text)
 
 
-def _runs(fit: LinearFit) -> Iterator[_ResidualTest]:
+def _runs(fit: _LinearFit) -> Iterator[_ResidualTest]:
     for block, rows in _blocks(fit):
         signs = fit.residuals[rows] > 0
         plus = int(np.count_nonzero(signs))
@@ -185,7 +185,7 @@ _CODES: Final[Mapping[Outcome, str]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class LawComparison:
+class _LawComparison:
     """The fitted law against another one."""
 
     other: str
@@ -209,7 +209,7 @@ class LawComparison:
         return text_of(_CODES[self.outcome], law=self.other)
 
     @classmethod
-    def of(cls, fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:
+    def of(cls, fit: _LinearFit, *, other: str, residuals: FloatArray) -> _LawComparison:
         """Compare by linear re-fits from the solution.
 
         Args: `other`: the other law in words. `residuals`: with its predictions at the fitted parameters,
@@ -223,7 +223,7 @@ class LawComparison:
         )
 
 
-def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, str]]:
+def summaries(comparisons: Sequence[_LawComparison]) -> Iterator[tuple[Outcome, str]]:
     """What the data say of all of them, one sentence for each outcome, the gravest first."""
     for outcome, code in _CODES.items():
         others = [each.other for each in comparisons if each.outcome == outcome]
@@ -290,8 +290,8 @@ def _square_off(null: FloatArray, values: FloatArray) -> float:
 class Review:
     """Criticism of a fit."""
 
-    criticism: Criticism
-    laws: tuple[LawComparison, ...]
+    criticism: _Criticism
+    laws: tuple[_LawComparison, ...]
     """The fitted law against others; empty where no data depend on one."""
     explained: tuple[_Explained, ...] = ()
     """Of each file, what the fit explains of it."""
@@ -337,7 +337,7 @@ class Review:
         fit = _at_solution(best)
         ranges = tuple(compared_columns(best.residuals.problem))
         return cls(
-            criticism=Criticism.of(fit),
+            criticism=_Criticism.of(fit),
             laws=tuple(_comparisons(result, fit)),
             explained=tuple(_shares_explained(best)),
             readings=other_readings(best, ranges),
@@ -345,13 +345,13 @@ class Review:
         )
 
 
-def _comparisons(result: FitResult, fit: LinearFit) -> Iterator[LawComparison]:
+def _comparisons(result: FitResult, fit: _LinearFit) -> Iterator[_LawComparison]:
     best = result.optimum
     problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
     # Each yields nothing without data of the kinds that it is about.
     for name, predicted in (*by_other_tubes(problem, scene), *by_other_machines(problem, scene)):
         residuals = _turned(fit.turn, best.residuals.at(best.t, predicted=predicted))
-        yield LawComparison.of(fit, other=name, residuals=residuals)
+        yield _LawComparison.of(fit, other=name, residuals=residuals)
 
 
 def _turned(turn: FloatArray, rows: FloatArray) -> FloatArray:
@@ -359,14 +359,14 @@ def _turned(turn: FloatArray, rows: FloatArray) -> FloatArray:
     return np.concatenate([turn @ rows[: len(turn)], rows[len(turn) :]])
 
 
-def _at_solution(best: Optimum) -> LinearFit:
+def _at_solution(best: Optimum) -> _LinearFit:
     """The fit linearised at its optimum; what is no parameter but was fitted too counts as one."""
     problem, residuals = best.residuals.problem, best.residuals
     count, rows = problem.measured.size, best.at
     turn = _rotation(problem, best.t)
     more = np.zeros((rows.size - residuals.base.shape[0], residuals.base.shape[1]))
     blocks = [_titles(block.observations, block.measured.size) for block in problem.blocks]
-    return LinearFit(
+    return _LinearFit(
         residuals=_turned(turn, rows),
         derivatives=_turned(turn, np.hstack([-best.slopes, np.concatenate([residuals.base, more])])),
         block=np.concatenate([*blocks, np.full(rows.size - count, "")]),

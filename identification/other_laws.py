@@ -85,7 +85,7 @@ def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> fl
     return abs(float(flow.velocity)) or 1.0
 
 
-def power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
+def _power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
     """Heads in proportion to a power of the velocity, those of the law at one velocity, m/s."""
     heads = law.heads
     near, far = heads.hump_head, heads.return_hump_head
@@ -110,7 +110,7 @@ def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteT
 def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
     """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
     if name in _EXPONENTS:
-        return power_of(law, velocity, _EXPONENTS[name])
+        return _power_of(law, velocity, _EXPONENTS[name])
     if name == UNBROKEN:
         heads = replace(law.heads, hump_head=None, return_hump_head=None)
         return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)

@@ -250,7 +250,7 @@ expanded uncertainty (95 %).
 """
 
 
-class SceneInputs:
+class _SceneInputs:
     """What a fit asks of a scene, through its `Balancer`: quantities go by their paths, such as
     "rotor.damping" and "masses.friction_arm[0]"."""
 
@@ -332,7 +332,7 @@ class SceneInputs:
         return moved
 
 
-class _LiquidRing(SceneInputs):
+class _LiquidRing(_SceneInputs):
     """Quantities go by their keys, such as "bore"."""
 
     scene: Scene
@@ -364,13 +364,13 @@ class _LiquidRing(SceneInputs):
         return shifted(scene=self.scene, quantity=name, change=change)
 
 
-_INPUTS: Final[Mapping[str, type[SceneInputs]]] = {Scene.balancer: _LiquidRing}
+_INPUTS: Final[Mapping[str, type[_SceneInputs]]] = {Scene.balancer: _LiquidRing}
 """By the name of the balancer; the others have nothing but their `Balancer`."""
 
 
-def inputs_of(scene: SceneFile) -> SceneInputs:
+def inputs_of(scene: SceneFile) -> _SceneInputs:
     """What a fit asks of a scene."""
-    return _INPUTS.get(scene.balancer, SceneInputs)(scene)
+    return _INPUTS.get(scene.balancer, _SceneInputs)(scene)
 
 
 def path_of(name: str) -> str:

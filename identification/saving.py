@@ -57,7 +57,7 @@ def save_result(
     data: Sequence[Observations],
     said: Sequence[str] = (),
 ) -> Path:
-    """Write the scene that a fit found, see `fitted_scene`: every key of the scene stays, no comment does.
+    """Write the scene that a fit found, see `_fitted_scene`: every key of the scene stays, no comment does.
 
     Args: `scene`: that was fitted. `said`: what the criticism of the fit says.
     Raises: SceneError: the fitted values make no scene. OSError: the file cannot be written.
@@ -73,7 +73,7 @@ def save_result(
         *(("combination", _combination(each)) for each in result.combinations),
         *(("correlation", each) for each in _correlations(result)),
     ]
-    saved = fitted_scene(
+    saved = _fitted_scene(
         scene,
         fitted=[each for each in result.parameters if each.name not in START],
         files=files,
@@ -84,7 +84,7 @@ def save_result(
     return write_whole(path, file_text(saved, to=path.parent))
 
 
-def fitted_scene(
+def _fitted_scene(
     scene: AnyScene,
     *,
     fitted: Sequence[FittedParameter],

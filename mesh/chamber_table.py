@@ -256,7 +256,7 @@ _WET: Final = 1e-7
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TiltedLiquid:
+class _TiltedLiquid:
     """At each fill and each angle of gravity, shape (n, turn)."""
 
     wall_square: FloatArray
@@ -276,7 +276,7 @@ class TiltedLiquid:
 @lru_cache(maxsize=16)
 def tilted_liquid(
     table: ChamberTable, *, length: float, vertical: bool, turn: int, fills: tuple[float, ...]
-) -> TiltedLiquid:
+) -> _TiltedLiquid:
     """Integrals over the liquid of given fill ratios, above zero.
 
     Args: `length`: G, m. `turn`: angles of gravity, equally spaced from along x; one on a vertical shaft.
@@ -289,7 +289,7 @@ def tilted_liquid(
         at_angles = [_at_angle(table, fill, -length * np.array([np.cos(p), np.sin(p)]), 0.0) for p in angles]
         shift = length**2
     *columns, level = np.stack(at_angles, axis=-1)
-    return TiltedLiquid(
+    return _TiltedLiquid(
         wall_square=columns[3] / table.wall_area,
         surface_square=level - shift,
         moment=columns[1],

@@ -143,11 +143,11 @@ def _folded(body: Tetrahedra, after: Tetrahedra) -> IntArray:
     """Cells that moves of their nodes turn inside out, or nearly so."""
     moved = (after.nodes != body.nodes).any(axis=1)
     near = np.flatnonzero(moved[body.cells].any(axis=1))
-    was, least = (jacobians(replace(b, cells=b.cells[near])).min(axis=1) for b in (body, after))
+    was, least = (_jacobians(replace(b, cells=b.cells[near])).min(axis=1) for b in (body, after))
     return np.asarray(near[least < _FOLDED * was])
 
 
-def jacobians(body: Tetrahedra) -> FloatArray:
+def _jacobians(body: Tetrahedra) -> FloatArray:
     """Determinants of dx/dX at the four corners and in the middle of each cell, shape (cells, 5)."""
     matrix = derivatives(body.nodes[body.cells], np.vstack([np.eye(4), np.full(4, 0.25)]))
     return np.asarray(np.einsum("epi,epi->ep", matrix[..., 0], np.cross(matrix[..., 1], matrix[..., 2])))

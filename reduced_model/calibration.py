@@ -68,13 +68,14 @@ def calibrate(scene: AnyScene) -> Calibration:
     )
 
 
-def calibrated_model(scene: Scene, *, checked: bool = True) -> BalancerModel:
+def calibrated_model(scene: Scene, *, checked: bool = True, varied: bool = True) -> BalancerModel:
     """The balancer that `calibrate` finds, without what it reports beside: half the work.
 
     Args: `checked`: whether finite elements check the chamber, which takes half of the rest.
+        `varied`: whether the law knows what the scene's uncertain inputs do to it, half of what remains.
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return BalancerModel.of(chamber_and_law(scene, checked=checked)[1])
+    return BalancerModel.of(chamber_and_law(scene, checked=checked, varied=varied)[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
@@ -83,15 +84,18 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
     Raises: SceneError: a scene that cannot be calibrated, or a file that holds no law.
     """
     if law in (CALIBRATED, UNCHECKED):
-        return calibrated_model(scene, checked=law == CALIBRATED)
+        return calibrated_model(scene, checked=law == CALIBRATED, varied=law == CALIBRATED)
     return paper_model(scene) if law == "paper" else BalancerModel.of(load_law(Path(law)))
 
 
-def chamber_and_law(scene: Scene, *, checked: bool = True) -> tuple[ChamberCalibration, CalibratedLaw]:
-    """The chamber, and the law.
+def chamber_and_law(
+    scene: Scene, *, checked: bool = True, varied: bool = True
+) -> tuple[ChamberCalibration, CalibratedLaw]:
+    """The chamber, and the law. Args: as `calibrated_model`.
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
     check_ring(scene)
-    chamber = calibrate_chamber(scene, checked=checked)
-    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=TubeHeads.of(scene))
+    chamber = calibrate_chamber(scene, checked=checked, varied=varied)
+    heads = TubeHeads.of(scene) if varied else TubeHeads.bare(scene)
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=heads, varied=varied)

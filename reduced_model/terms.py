@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas import HEAT_CAPACITY_RATIO
@@ -47,12 +47,16 @@ def _has_loss(scene: Scene, estimate: Contribution) -> bool:
     return scene.tube.drag_coefficient is None and estimate.value != 0.0
 
 
+Part = Literal["chamber", "tube", "injection"]
+PARTS: Final[tuple[Part, ...]] = get_args(Part)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Term:
     """One physical term."""
 
     name: str
-    part: Literal["chamber", "tube", "injection"]
+    part: Part
     """Those of chamber and tube are part of a flow law; those of an injection go beyond it."""
     group: str
     """Dimensionless group that its contribution grows with."""
@@ -98,6 +102,7 @@ def models_used(
     law: str = CALIBRATED,
     obstacles: Mapping[str, str] = MappingProxyType({}),
     asked: Collection[str] | None = None,
+    parts: Collection[str] = PARTS,
 ) -> tuple[ModelUsed, ...]:
     """Model of every term of a scene, with the reason: chamber, tube, injection.
 
@@ -105,9 +110,10 @@ def models_used(
         law: name of the flow law; any but the calibrated one has its own models of chamber and tube.
         obstacles: why the flow law cannot carry a term of an injection, by term.
         asked: the terms of an injection to model; None: all.
+        parts: those whose terms are listed.
     """
     rows = []
-    for term in TERMS:
+    for term in (each for each in TERMS if each.part in parts):
         estimate = term.estimate(scene)
         model, more = _model(term, scene, estimate, law=law, obstacles=obstacles, asked=asked)
         reason = estimate.reason(None if term.model else scene.tolerance)

@@ -90,7 +90,7 @@ def collect_evidence(
         "level": level,
         "balancer": scene.balancer,
         "versions": versions(),
-        "scene": scene_record(scene, scene_text),
+        "scene": _scene_record(scene, scene_text),
         "seeds": {"run": scene.run.seed},
         **study,
         **sections,
@@ -101,7 +101,7 @@ def collect_evidence(
     }
 
 
-def scene_record(scene: AnyScene, text: str) -> Record:
+def _scene_record(scene: AnyScene, text: str) -> Record:
     """Names, hashes and text of a scene file, with the rows of its values."""
     return {
         "name": scene.name,

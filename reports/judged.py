@@ -23,8 +23,7 @@ from ringbalance.controller.judging.tuning import (
 )
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET
+from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.rows import Finding
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.draws import BLOCK

@@ -189,7 +189,7 @@ def equation_svg(latex: str, words: str, name: str) -> str:
 
 @cache
 def _kept() -> Mapping[str, str]:
-    """SVG of the program's own equations by their LaTeX, as `tools/generated_docs.py` has set them."""
+    """SVG of the program's own equations by their LaTeX, as `tools/doc_tables.py` has set them."""
     packed = files("ringbalance.reports").joinpath("data", "equations.json.xz").read_bytes()
     return cast(Mapping[str, str], json.loads(lzma.decompress(packed)))
 

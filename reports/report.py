@@ -26,7 +26,7 @@ from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of, views
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
@@ -150,14 +150,14 @@ def _write_page(evidence: Record, stage: Path, pool: Workers | None) -> Record:
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
     (stage / TABLES).mkdir()
-    for name, table in csv_tables(kept).items():
+    for name, table in _csv_tables(kept).items():
         (stage / TABLES / name).write_text(table, encoding="utf-8")
     for name, page in render_pages(content).items():
         (stage / name).write_text(page, encoding="utf-8")
     return kept
 
 
-def csv_tables(evidence: Record) -> dict[str, str]:
+def _csv_tables(evidence: Record) -> dict[str, str]:
     """Contents of the files by name: tables of cases, the map of k, the operating map, the sampled loops.
 
     SI units, which stand in the heads. The same evidence gives the same bytes.

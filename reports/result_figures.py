@@ -29,7 +29,7 @@ _LEAST: Final = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class ResultFigures:
+class _ResultFigures:
     """Figures of a result, which a notebook shows below each other."""
 
     drawings: tuple[Drawing, ...]
@@ -50,7 +50,7 @@ class ResultFigures:
         return f"<{len(self.drawings)} figures; .save(path) writes them as one SVG file>"
 
 
-def figures_of_result(result: Result) -> ResultFigures:
+def figures_of_result(result: Result) -> _ResultFigures:
     """Of a calibration, a run, a tuning, a fit, a comparison or a trade study.
 
     Raises: TypeError: there is nothing to draw of such a result.
@@ -58,7 +58,7 @@ def figures_of_result(result: Result) -> ResultFigures:
     kind = type(result).__name__
     if kind not in _DRAWN:
         raise TypeError(f"of a result of the type {kind} there is no figure")
-    return ResultFigures(drawings=tuple(_DRAWN[kind](result)))
+    return _ResultFigures(drawings=tuple(_DRAWN[kind](result)))
 
 
 def _calibration(result: Any) -> list[Drawing]:

@@ -155,7 +155,7 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
     amplitude, phase = _MICROMETRE * np.asarray(run["amplitude_m"]), np.asarray(run["phase_rad"])
     limit, ends = run["limit_m"] * _MICROMETRE, np.zeros(0, dtype=np.complex128)
     if reach is not None:
-        ends = reachable(reach["vibration_m"] * _MICROMETRE, reach["direction_rad"], reach["pairs"])
+        ends = _reachable(reach["vibration_m"] * _MICROMETRE, reach["direction_rad"], reach["pairs"])
     whole = 1.15 * float(max(amplitude.max(), limit, *np.abs(ends), 0.0))
 
     def paint(axes: Axes) -> None:
@@ -207,7 +207,7 @@ def _unbalance(panel: Axes, phase: float, lag: float, span: float) -> None:
     note(text, (heavy, 0.85 * span), (0, 3), ha=side, va="bottom", bbox=ground)(panel)
 
 
-def reachable(length: float, direction: float, pairs: int) -> Any:
+def _reachable(length: float, direction: float, pairs: int) -> Any:
     """Corners of what equal pairs give together, each between plus and minus its length, as complex vectors.
 
     The first is the sum of all, l e^(jd) (1 + e^(j pi/n) + ... ) = 2 l e^(jd)/(1 - e^(j pi/n)); each next one

@@ -15,8 +15,6 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -31,6 +29,7 @@ from ringbalance.scene.platform.kept_code import (
     trusted,
     write_checked,
 )
+from ringbalance.scene.platform.program import program_digest, version_of
 from ringbalance.scene.toml import toml_text
 
 PACKAGED: Final = "heavy_evidence.json"
@@ -125,11 +124,6 @@ def _shown(value: Any) -> str:
 
 
 _PREFIX: Final = "cases-"
-_DECIDING: Final = (
-    *("scene", "results", "mesh", "physics", "reduced_model", "controller", "identification"),
-    *("verification", "scenes"),
-)
-"""Rooms whose files decide what a case finds."""
 
 
 def looks_at_no_scene(case: Mapping[str, Any]) -> bool:
@@ -177,18 +171,7 @@ def keep_cases(kept: Mapping[str, Record]) -> None:
 
 
 def _kept_file() -> Path:
-    return code_root() / f"{_PREFIX}{_program()}{OTHER}"
-
-
-@cache
-def _program() -> str:
-    """Digest of all that decides what a case finds: this program's files, its packages, the processor."""
-    total = hashlib.sha256(json.dumps([versions(), platform.machine()]).encode())
-    for room in _DECIDING:
-        folder = Path(str(files(f"ringbalance.{room}")))
-        for path in sorted(p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
-            total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
-    return total.hexdigest()[:16]
+    return code_root() / f"{_PREFIX}{program_digest()[:16]}{OTHER}"
 
 
 _PACKAGES: Final = (
@@ -216,15 +199,11 @@ def provenance() -> Record:
 
 def versions() -> Record:
     """Versions of this program, of Python and of the packages that numbers come from."""
-    found = {"ringbalance": _version("ringbalance") or "not installed", "python": platform.python_version()}
-    return found | {name: told for name in _PACKAGES if (told := _version(name))}
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
+    found = {
+        "ringbalance": version_of("ringbalance") or "not installed",
+        "python": platform.python_version(),
+    }
+    return found | {name: told for name in _PACKAGES if (told := version_of(name))}
 
 
 def _bare(argument: str) -> str:

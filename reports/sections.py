@@ -15,8 +15,8 @@ from typing import Any, Final
 from ringbalance.reports import summary
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
+    cases,
     chamber,
-    consequences,
     drag_coefficient,
     eccentric,
     first_page,
@@ -24,11 +24,9 @@ from ringbalance.reports.pages import (
     measured,
     operation,
     plain,
-    studies,
     tube,
     tube_flow,
 )
-from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Place, Record, Section, Work
 from ringbalance.scene.platform.processes import Workers
@@ -52,11 +50,11 @@ SECTIONS: Final[tuple[Section, ...]] = (
     tube.CREST,
     drag_coefficient.SECTION,
     loop.INJECTIONS,
-    consequences.SECTION,
+    loop.CONSEQUENCES,
     CASES,
     Section(name="numerics", title="Numerical verification"),
-    studies.EXTREMES,
-    studies.TRADE,
+    cases.EXTREMES,
+    cases.TRADE,
     Section(name="models", title="Models used, and why"),
     measured.SECTION,
     Section(name="scene", title="Scene file, mesh and versions"),
@@ -110,7 +108,7 @@ def completed(records: Record, apart: Begun, work: Work, pool: Workers | None) -
 def view_of(name: str, evidence: Record) -> Record | None:
     """What a section shows of the whole evidence, or under `CASES_VIEW` what the page shows of each case."""
     if name == CASES_VIEW:
-        return {case["id"]: case_view(case) for case in evidence[CASES_VIEW]}
+        return {case["id"]: cases.case_view(case) for case in evidence[CASES_VIEW]}
     return sections_of(evidence["balancer"])[name].view(evidence)
 
 

@@ -52,7 +52,7 @@ def marked(text: str, value: object) -> str:
     return Markup('<span data-from="{}">{}</span>').format(path, text) if path else text
 
 
-def marked_up(value: object) -> object:
+def _marked_up(value: object) -> object:
     """Text as it goes onto the page: typeset, symbols such as K_B with their index below the line.
 
     Markup, and what is marked `verbatim`, is left as it is.
@@ -282,7 +282,7 @@ def finished(value: object) -> object:
     """What a template prints: text typeset, counts traced; other numbers must have passed the filter."""
     if isinstance(value, float):
         raise TypeError(f"{getattr(value, 'path', value)} is printed without a filter")
-    return marked(str(value), value) if isinstance(value, Count) else marked_up(value)
+    return marked(str(value), value) if isinstance(value, Count) else _marked_up(value)
 
 
 _FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")

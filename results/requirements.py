@@ -1,8 +1,13 @@
-"""Verdicts on what is required, and the senses of a requirement."""
+"""Verdicts on what is required; a fraction of drawn devices with its bounds, and two of the same devices."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from math import comb
 from typing import Final
+
+from ringbalance.scene.arrays import BoolArray
 
 MET: Final = "met"
 MISSED: Final = "not met"
@@ -11,3 +16,92 @@ UNASKED: Final = "none stated"
 """Verdicts on a requirement."""
 AT_LEAST: Final = "at least"
 AT_MOST: Final = "at most"
+
+
+_NORMAL_95: Final = 1.959963984540054
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proportion:
+    """`count` of `of` devices, with the 95 % interval of a binomial fraction.
+
+    Source: Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", JASA 22 (1927).
+    """
+
+    count: int
+    of: int
+
+    @property
+    def value(self) -> float:
+        """Fraction; not a number where none was drawn."""
+        return self.count / self.of if self.of else math.nan
+
+    @property
+    def low(self) -> float:
+        """Lower 95 % bound."""
+        return self._ends()[0]
+
+    @property
+    def high(self) -> float:
+        """Upper 95 % bound."""
+        return self._ends()[1]
+
+    def verdict(self, asked: float) -> str:
+        """`MET` where the lower bound is at least the fraction asked for, `MISSED` where the upper bound is
+        below it, else `OPEN`."""
+        low, high = self._ends()
+        if low >= asked:
+            return MET
+        return MISSED if high < asked else OPEN
+
+    def _ends(self) -> tuple[float, float]:
+        if self.of == 0:
+            return 0.0, 1.0
+        p, z2 = self.value, _NORMAL_95**2 / self.of
+        centre = (p + z2 / 2) / (1 + z2)
+        half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
+        return max(centre - half, 0.0), min(centre + half, 1.0)
+
+    def document(self) -> dict[str, float | int]:
+        """For JSON."""
+        return {"value": self.value, "low": self.low, "high": self.high, "count": self.count, "of": self.of}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paired:
+    """How many devices meet something under the first of two, the second, both or neither."""
+
+    both: int
+    first_alone: int
+    second_alone: int
+    neither: int
+
+    @classmethod
+    def of(cls, first: BoolArray, second: BoolArray) -> Paired:
+        """Args: `first`, `second`: of each device, shape (n,)."""
+        return cls(
+            both=int((first & second).sum()),
+            first_alone=int((first & ~second).sum()),
+            second_alone=int((~first & second).sum()),
+            neither=int((~first & ~second).sum()),
+        )
+
+    @property
+    def p_value(self) -> float:
+        """Two-sided probability of a difference as large by chance: the exact test of the discordant pairs.
+
+        Source: McNemar, Psychometrika 12 (1947), with the binomial distribution in place of its limit.
+        """
+        n = self.first_alone + self.second_alone
+        tail = sum(comb(n, k) for k in range(min(self.first_alone, self.second_alone) + 1))
+        return min(1.0, float(2 * tail) / float(1 << n))
+
+    def better(self, level: float) -> int | None:
+        """0 or 1, the one under which more devices do; None: no difference is shown at a level."""
+        if self.p_value > level:
+            return None
+        return 0 if self.first_alone > self.second_alone else 1
+
+    def document(self) -> dict[str, float | int]:
+        """For JSON."""
+        return {**vars(self), "p_value": self.p_value}

@@ -155,7 +155,7 @@ def text_of(code: str, **values: Value) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sentence:
+class _Sentence:
     """What stands in `sentences.toml` under a code."""
 
     severity: Severity
@@ -169,10 +169,10 @@ class Sentence:
 
 
 @cache
-def sentences() -> Mapping[str, Sentence]:
+def sentences() -> Mapping[str, _Sentence]:
     """All codes with their sentences, in the order of the file."""
     content = (files("ringbalance.results") / "sentences.toml").read_text(encoding="utf-8")
-    return {code: Sentence(**entry) for code, entry in tomllib.loads(content).items()}
+    return {code: _Sentence(**entry) for code, entry in tomllib.loads(content).items()}
 
 
 def _value_text(value: Value, unit: str = "", *, digits: int = 4) -> str:

@@ -33,7 +33,7 @@ from cyclopts import (
 
 import ringbalance
 from ringbalance.scene.platform.display import LOG, displayed
-from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.signals import interrupts
 from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
 

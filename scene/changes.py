@@ -16,7 +16,6 @@ from typing import Any, Final
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.foreign import plain_number
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
@@ -26,7 +25,7 @@ from ringbalance.scene.narrowing import AnyScene, Kind, scene_as
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
 from ringbalance.scene.toml import toml_bytes, toml_text
 from ringbalance.scene.uncertain import NORMAL_95
-from ringbalance.scene.units import DIMENSIONS
+from ringbalance.scene.units import DIMENSIONS, plain_number
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")
 """Paths on which a mesh, or the meshing of a solid, depends."""

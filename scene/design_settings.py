@@ -18,7 +18,7 @@ from ringbalance.scene.keys.fields import (
 
 
 @dataclass(frozen=True, kw_only=True)
-class ValveAtHand:
+class _ValveAtHand:
     """A valve with its line."""
 
     name: Annotated[OneLine, needed("as it is ordered")]
@@ -49,7 +49,7 @@ class DesignSettings:
         Shown("gas pressure available", "MPa", note="gauge"),
     ] = None
     valves: Annotated[
-        tuple[ValveAtHand, ...],
+        tuple[_ValveAtHand, ...],
         standard([], "valves at hand; without any, and without `valve_file`, the scene's own stays"),
         Listed(
             '[{ name = "V1", conductance = "0.4 l/(s*bar)", critical_ratio = 0.3, valve_lag = "2 ms" }, ...]'

@@ -34,7 +34,7 @@ class MeasuredFile:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasuredQuantity:
+class _MeasuredQuantity:
     """One quantity of the scene before and after the fit; intervals are those of 95 %."""
 
     quantity: Annotated[OneLine, needed('its path, such as "tube.bore"')]
@@ -71,7 +71,7 @@ class Measured:
         Listed('[{ file = "run.csv", kind = "injection", rows = 40, sha256 = "..." }, ...]'),
     ] = ()
     quantities: Annotated[
-        tuple[MeasuredQuantity, ...],
+        tuple[_MeasuredQuantity, ...],
         standard([], "quantities before and after"),
         Listed(
             '[{ quantity = "tube.bore", unit = "mm", before = 1.5, value = 1.48, verdict = "identified" }, '

@@ -18,7 +18,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import STRETCHED
 from ringbalance.scene.fitted import LARGEST_ERROR, MODEL, ErrorCause, Fitted, ModelError
 from ringbalance.scene.keys.schema import LIQUID_RING
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Scene, Tube
 
 NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
@@ -104,20 +104,48 @@ def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
     value = nominal_value(scene=scene, quantity=quantity)
     if value is None:
         raise ValueError(f"the scene has no {quantity}")
+    return with_value(scene=scene, quantity=quantity, value=_moved_value(scene.tube, quantity, value, change))
+
+
+def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
+    """The scene with several quantities `shifted`, one after the other; those that no device can have so."""
+    tube, clipped = scene.tube, []
+    values: dict[str, dict[str, float]] = {}
+    for quantity, change in changes.items():
+        table, value = _table_of(quantity), nominal_value(scene=scene, quantity=quantity)
+        if value is None:
+            raise ValueError(f"the scene has no {quantity}")
+        moved = _moved_value(tube, quantity, value, change)
+        if not math.isclose(moved, value + change):
+            clipped.append(quantity)
+        if table == "tube":
+            # Its radii bound each other.
+            tube = replace(tube, **{quantity: moved})
+        elif quantity in SHAPE and scene.disc.geometry is not None:
+            scene = with_value(scene=scene, quantity=quantity, value=moved)
+        else:
+            values.setdefault(table, {})[quantity] = moved
+    tables = {table: replace(getattr(scene, table), **changed) for table, changed in values.items()}
+    return replace(scene, tube=tube, **tables), tuple(clipped)
+
+
+def _moved_value(tube: Tube, quantity: str, value: Any, change: Any) -> Any:
+    """A quantity, changed as far as a device can have it; an array where the scene is many designs."""
     low: Any = 0.0 if quantity in _MAY_VANISH else 0.1 * value
     high: Any = math.inf
     if quantity == "length":
-        low = np.maximum(low, sum(b.angle * b.radius for b in scene.tube.bends))
+        low = np.maximum(low, sum(b.angle * b.radius for b in tube.bends))
     if quantity == "hump_position":
         low, high = 0.0, 1.0
     if quantity == "hump_radius":
-        high = scene.tube.port_radius
-    if quantity == "port_radius" and scene.tube.hump_radius is not None:
-        low = scene.tube.hump_radius
+        high = tube.port_radius
+    if quantity == "port_radius" and tube.hump_radius is not None:
+        low = tube.hump_radius
+    if isinstance(value, float) and isinstance(change, float):
+        return float(min(max(value + change, low if value > 0.0 else min(value, 0.0)), high))
     low = np.where(np.less_equal(value, 0), np.minimum(value, 0.0), low)
     moved = np.minimum(np.maximum(value + change, low), high)
-    # Arrays where the scene is many designs.
-    return with_value(scene=scene, quantity=quantity, value=moved if moved.ndim else float(moved))
+    return moved if moved.ndim else float(moved)
 
 
 def _table_of(quantity: str) -> str:

@@ -1,7 +1,8 @@
 """Quantities as people write them, read into SI and written back: no guessing, one rounding.
 
 The written decimal times the unit's exact factor is rounded once, so "44.5 mm" and "4.45 cm" are the same
-double.
+double.  A number that another package wraps is recognised by its methods alone: with a unit, as pint has it,
+with a standard deviation, as uncertainties has it, or with both.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from fractions import Fraction
 from functools import lru_cache
 from importlib import resources
 from types import MappingProxyType
+from typing import Any, Final
 
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.toml import toml_text
@@ -30,7 +32,7 @@ class _Unit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dimension:
+class _Dimension:
     """A kind of quantity with its units."""
 
     name: str
@@ -55,15 +57,15 @@ class Dimension:
         return ", ".join(self.units)
 
 
-def _dimensions() -> Mapping[str, Dimension]:
+def _dimensions() -> Mapping[str, _Dimension]:
     data = resources.files("ringbalance.scene") / "data" / "units.csv"
     lines = data.read_text(encoding="utf-8").splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
     return MappingProxyType({row["dimension"]: _dimension(row) for row in rows})
 
 
-def _dimension(row: Mapping[str, str]) -> Dimension:
-    return Dimension(
+def _dimension(row: Mapping[str, str]) -> _Dimension:
+    return _Dimension(
         name=row["name"],
         example=row["example"],
         units=MappingProxyType(dict(map(_unit, row["units"].split("; ")))),
@@ -83,7 +85,7 @@ def _unit(text: str) -> tuple[str, _Unit]:
     )
 
 
-DIMENSIONS: Mapping[str, Dimension] = _dimensions()
+DIMENSIONS: Mapping[str, _Dimension] = _dimensions()
 
 
 _LONGEST_TEXT = 60
@@ -138,7 +140,7 @@ def parse_quantity(text: object, dimension: str) -> float:
     Args: `text`: a number and a unit; the space between may be left out. `dimension`: a key of `DIMENSIONS`.
     Returns: The value in SI, finite.
     Raises: FieldError: not such a quantity; the error says what is wrong and which units exist.
-    Range: magnitudes up to `Dimension.largest`; a temperature above absolute zero.
+    Range: magnitudes up to `_Dimension.largest`; a temperature above absolute zero.
     """
     return _parsed_text(text, dimension) if isinstance(text, str) else _parsed(text, dimension)
 
@@ -214,7 +216,7 @@ def unit_of(text: str) -> str:
     return "" if match is None else _canonical(match[2])
 
 
-def _split(text: object, kind: Dimension) -> tuple[str, str]:
+def _split(text: object, kind: _Dimension) -> tuple[str, str]:
     if isinstance(text, bool) or not isinstance(text, int | float | str):
         raise FieldError("it is not text with a number and a unit", _allowed(kind))
     if not isinstance(text, str):
@@ -249,7 +251,7 @@ def _canonical(unit: str) -> str:
     return re.sub(r"(?<=m)(?=[23](?![0-9]))", "^", product)
 
 
-def _in_si(number: str, unit: _Unit, kind: Dimension) -> float:
+def _in_si(number: str, unit: _Unit, kind: _Dimension) -> float:
     # The double is looked at first: an exponent of a thousand million must not reach the exact arithmetic.
     rough = float(number)
     scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
@@ -262,15 +264,15 @@ def _in_si(number: str, unit: _Unit, kind: Dimension) -> float:
     return value
 
 
-def _too_large(kind: Dimension) -> str:
+def _too_large(kind: _Dimension) -> str:
     return f"its magnitude is above {kind.largest:g} {next(iter(kind.units))}, more than any balancer has"
 
 
-def _allowed(kind: Dimension) -> str:
+def _allowed(kind: _Dimension) -> str:
     return f'{kind.name} such as "{kind.example}", in {", ".join(kind.units)}'
 
 
-def _wrong_unit(unit_text: str, kind: Dimension) -> str:
+def _wrong_unit(unit_text: str, kind: _Dimension) -> str:
     unit = _canonical(unit_text)
     if not unit:
         return "the unit is missing"
@@ -280,3 +282,22 @@ def _wrong_unit(unit_text: str, kind: Dimension) -> str:
         if unit in other.units:
             return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}'
     return f"{toml_text(unit)} is not a unit of {kind.noun}{did_you_mean(unit, kind.units)}"
+
+
+NO_UNIT: Final = "dimensionless"
+
+
+def plain_number(value: Any, unit: str) -> tuple[Any, float]:
+    """The number in a unit, and its standard deviation, zero where it has none; other values as they are.
+
+    Args: `unit`: as scene files have it.
+    Raises: ValueError: a quantity of another dimension.
+    """
+    if hasattr(value, "magnitude") and hasattr(value, "to"):
+        try:
+            value = value.to(unit or NO_UNIT).magnitude
+        except Exception as error:
+            raise ValueError(f"{value} is nothing in {unit or 'numbers without a unit'}: {error}") from error
+    if hasattr(value, "nominal_value") and hasattr(value, "std_dev"):
+        return value.nominal_value, float(value.std_dev)
+    return value, 0.0

@@ -10,7 +10,7 @@ import pydoc
 from pathlib import Path
 from typing import Final
 
-import generated_docs
+import doc_tables
 import pytest
 
 import ringbalance as rb
@@ -65,8 +65,8 @@ def test_a_sensor_stands_in_an_example() -> None:
 
 
 def test_the_page_of_names_has_their_docstrings() -> None:
-    page = generated_docs.text_of("docs/api.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/api.md"]()) == page
+    page = doc_tables.text_of("docs/api.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/api.md"]()) == page
     assert all(f"## `rb.{name}`" in page for name in rb.__all__)
 
 

@@ -1,4 +1,4 @@
-"""Pages run as they stand and print what they show; no number in the text of a tutorial is typed."""
+"""What `make pages` does with a page; no number in the text of a tutorial is typed."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ import sys
 from pathlib import Path
 from typing import Final
 
-import page_programs
+import page_runs
 import pytest
 
+import ringbalance as rb
+
 DOCS: Final = Path(__file__).resolve().parents[1] / "docs"
-PAGES: Final = sorted(
-    path
-    for path in DOCS.rglob("*.md")
-    if any(language in page_programs.RUN for language, _ in page_programs.FENCE.findall(path.read_text()))
-)
 TUTORIALS: Final = sorted((DOCS / "tutorials").glob("*.md"))
 NAMES: Final = re.compile(
     r"`[^`]*`|\]\([^)]*\)|\b(?:ISO|IEC) \d+(?:-\d+)?|\bEq\. \d+|^#.*$|\b95 %", re.MULTILINE
@@ -24,22 +21,10 @@ NAMES: Final = re.compile(
 NUMBER: Final = re.compile(r"\d+(?:\.\d+)?")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.stem))
-def test_a_page_prints_what_it_shows(page: Path) -> None:
-    """In a process of its own, as a reader's, with every warning an error."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", page_programs.__file__, str(page)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
 def typed_numbers(page: str) -> set[str]:
     """Numbers in the text of a page that none of its blocks has."""
-    blocks = " ".join(body for _, body in page_programs.FENCE.findall(page))
-    text = NAMES.sub("", page_programs.FENCE.sub("", page))
+    blocks = " ".join(body for _, body in page_runs.FENCE.findall(page))
+    text = NAMES.sub("", page_runs.FENCE.sub("", page))
     return set(NUMBER.findall(text)) - set(NUMBER.findall(blocks))
 
 
@@ -81,23 +66,51 @@ print(Path("a.txt").read_text(), 2.50)
     ],
 )
 def test_what_is_printed_stands_below(shown: str, fresh: str, tmp_path: Path) -> None:
-    assert page_programs.fresh_page(PAGE.format(shown=shown), tmp_path) == PAGE.format(shown=fresh)
+    assert page_runs.fresh_page(PAGE.format(shown=shown), tmp_path) == PAGE.format(shown=fresh)
 
 
 @pytest.mark.parametrize("shown", ["y\n 2.5\n", "x\n", "x\n 2.5\nz\n", " 2.5\n"])
 def test_lines_that_are_not_printed_are_refused(shown: str, tmp_path: Path) -> None:
-    with pytest.raises(page_programs.PageError):
-        page_programs.fresh_page(PAGE.format(shown=shown), tmp_path)
+    with pytest.raises(page_runs.PageError):
+        page_runs.fresh_page(PAGE.format(shown=shown), tmp_path)
 
 
 def test_a_command_that_fails_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(page_programs.PageError, match="ends with 3"):
-        page_programs.fresh_page("```sh\nexit 3\n```\n", tmp_path)
+    with pytest.raises(page_runs.PageError, match="ends with 3"):
+        page_runs.fresh_page("```sh\nexit 3\n```\n", tmp_path)
 
 
 def test_a_block_is_left_out_with_a_reason_alone(tmp_path: Path) -> None:
     block = "```python\nraise KeyError\n```\n"
     page = f"<!-- not run: needs a cluster -->\n{block}"
-    assert page_programs.fresh_page(page, tmp_path) == page
+    assert page_runs.fresh_page(page, tmp_path) == page
     with pytest.raises(KeyError):
-        page_programs.fresh_page(f"<!-- not run: -->\n{block}", tmp_path)
+        page_runs.fresh_page(f"<!-- not run: -->\n{block}", tmp_path)
+
+
+def generate(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """In a process without pytest's threads: a page is run in a copy of it."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", DOCS.parent / "tools" / "generate.py", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_commands_of_a_page_are_run_and_written(tmp_path: Path) -> None:
+    """A page that fails does not keep others from being written."""
+    good, bad = tmp_path / "good.md", tmp_path / "bad.md"
+    scene = "scenes/six_chamber.toml"
+    lines = f"ringbalance --version\nringbalance calibrate {scene} --brief > brief.txt\nwc -l < brief.txt"
+    good.write_text(f"```sh\n{lines}\n```\n\n```text\n```\n")
+    bad.write_text("```sh\nringbalance calibrate \\\n  absent.toml\n```\n")
+    done = generate("--write", "pages", good, bad)
+    assert done.returncode == 1
+    assert "bad.md: Traceback" in done.stderr
+    assert re.search(r"PageError: ringbalance calibrate +absent\.toml ends with 2", done.stderr)
+    assert good.read_text() == f"```sh\n{lines}\n```\n\n```text\n{rb.__version__}\n5\n```\n"
+    assert generate("pages", good).returncode == 0
+    good.write_text(good.read_text().replace("\n5\n", "\n7\n"))
+    done = generate("pages", good)
+    assert (done.returncode, done.stdout) == (1, f"{good}: not what is generated now\n")

@@ -1,4 +1,4 @@
-"""The reference of public names as Markdown, from their docstrings, for `generated_docs`."""
+"""The reference of public names as Markdown, from their docstrings, for `doc_tables`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of docs/is-k-50-right.md as Markdown, straight from the map, for `generated_docs`."""
+"""The tables of docs/is-k-50-right.md as Markdown, straight from the map, for `doc_tables`."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""Table of the laminar end losses: `python tools/end_losses_table.py`.
+"""Table of the laminar end losses.
 
 Each end is one path in Re, followed on every mesh.  A finished path is one file, so a stopped run resumes.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import sys
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from ringbalance.physics.convergence import gci
-from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
@@ -30,6 +30,7 @@ from ringbalance.verification.navier_stokes.tube import (
     solve_end,
 )
 
+ROOT = Path(__file__).resolve().parents[1]
 ENDS: tuple[End, End] = ("entrance", "exit")
 REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0
 DEVELOPED_SLOPE = 32.0
@@ -144,7 +145,7 @@ def table_text(*, folder: Path, settings: EndSettings) -> str:
         "K Re of a tube's sharp-edged ends in laminar flow, a = ln(1 + Re/5), by finite elements",
         "(axisymmetric) on three meshes; uncertainty: 95 % half-width of the fine value (GCI).",
         "K_ent and K_exit are static pressure differences over rho U^2/2, beyond developed friction.",
-        "Computed by: python tools/end_losses_table.py",
+        "Computed by: python tools/generate.py --write end_losses",
         f"settings: {plain}",
         f"settings_sha256: {hashlib.sha256(plain.encode()).hexdigest()}",
         f"data_sha256: {hashlib.sha256(body.encode()).hexdigest()}",
@@ -168,28 +169,14 @@ def generate(*, folder: Path, settings: EndSettings, executor: Executor) -> None
             progress.advance(bar)
 
 
-def main() -> int:
-    """Compute the table and write it. Returns: Exit code 0."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--points", type=Path, default=Path("out/end_losses"), help="folder of finished paths"
-    )
-    parser.add_argument(
-        "--table",
-        type=Path,
-        default=Path(__file__).resolve().parents[1] / "physics" / "data" / "end_losses.csv",
-    )
-    parser.add_argument("--workers", type=int, default=2)
-    arguments = parser.parse_args()
+def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """The table; paths are kept in out/end_losses/."""
     settings = EndSettings()
     digest = hashlib.sha256(json.dumps(asdict(settings), sort_keys=True).encode()).hexdigest()
-    folder = arguments.points / digest[:12]
-    folder.mkdir(parents=True, exist_ok=True)
-    with Workers(arguments.workers) as executor:
+    folder = ROOT / "out" / "end_losses" / digest[:12]
+    with Workers(2) as executor:
         generate(folder=folder, settings=settings, executor=executor)
-    write_whole(arguments.table, table_text(folder=folder, settings=settings))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    yield (
+        ROOT / "physics" / "data" / "end_losses.csv",
+        table_text(folder=folder, settings=settings).encode(),
+    )

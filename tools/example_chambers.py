@@ -1,6 +1,4 @@
-"""Make the meshes of chambers that come with the program, by OpenCASCADE through gmsh (extra `cad`).
-
-    python tools/example_chambers.py
+"""The meshes of chambers that come with the program, by OpenCASCADE through gmsh (extra `cad`).
 
 The chamber of the liquid-ring paper with the gas tube of its section 3.1, of assumed size and place:
 once with fillets for the example scene, once without for the case that compares it with closed forms.
@@ -9,6 +7,8 @@ once with fillets for the example scene, once without for the case that compares
 from __future__ import annotations
 
 import math
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import gmsh
@@ -75,8 +75,8 @@ def name_of(face: int) -> str:
     return "walls"
 
 
-def write(path: Path, *, fillets: bool, size: float, round_turn: int) -> None:
-    """A mesh of quadratic tetrahedra, as small a file as Gmsh writes.
+def mesh(*, fillets: bool, size: float, round_turn: int) -> bytes:
+    """A file with a mesh of quadratic tetrahedra, as small a file as Gmsh writes.
 
     Args: `size`: largest edge, mm. `round_turn`: edges along a full circle, which small radii need.
     """
@@ -100,16 +100,15 @@ def write(path: Path, *, fillets: bool, size: float, round_turn: int) -> None:
         gmsh.model.addPhysicalGroup(2, faces, name=name)
     gmsh.model.addPhysicalGroup(3, [tag for _, tag in volume], name="chamber")
     gmsh.model.mesh.generate(3)
-    gmsh.write(str(path))
-    gmsh.finalize()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "chamber.msh"
+        gmsh.write(str(path))
+        gmsh.finalize()
+        return path.read_bytes()
 
 
-def main() -> None:
-    """Write both meshes."""
-    write(ROOT / "scenes" / "imported_chamber.msh", fillets=True, size=14.0, round_turn=4)
+def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """Both meshes."""
+    yield ROOT / "scenes" / "imported_chamber.msh", mesh(fillets=True, size=14.0, round_turn=4)
     data = ROOT / "verification" / "cases" / "gas_tube" / "data"
-    write(data / "chamber.msh", fillets=False, size=9.0, round_turn=5)
-
-
-if __name__ == "__main__":
-    main()
+    yield data / "chamber.msh", mesh(fillets=False, size=9.0, round_turn=5)

@@ -1,14 +1,9 @@
-"""Write the example files of measurements in scenes/measurements/: a documented truth, noise, fixed seeds.
-
-python tools/example_measurements.py            prints the files
-python tools/example_measurements.py --write    writes them
-"""
+"""The example files of measurements in scenes/measurements/: a documented truth, noise, fixed seeds."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -19,7 +14,7 @@ from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS
-from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
+from ringbalance.scene import AnyScene, bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
 from ringbalance.scene.models import Scene
@@ -230,9 +225,7 @@ def _told(balancer: str) -> str:
     )
 
 
-if __name__ == "__main__":
-    for name in EXAMPLES:
-        if "--write" in sys.argv:
-            write_whole(FOLDER / f"{name}.csv", example(name))
-        else:
-            print(example(name))
+def files(words: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """The files of all kinds, or of those named."""
+    for name in words or EXAMPLES:
+        yield FOLDER / f"{name}.csv", example(name).encode()

@@ -1,4 +1,4 @@
-"""Friction table of the rotating tube: `python tools/rotating_friction_table.py`.
+"""Friction table of the rotating tube.
 
 Each column of a rectangle is one path, followed on the medium mesh from slow rotation upwards; every point of
 it is then solved on the other meshes, starting from that flow.  A finished point is one file: a stopped run
@@ -7,11 +7,10 @@ resumes.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, wait
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -45,6 +44,7 @@ from ringbalance.verification.navier_stokes.tube import (
     solve_section_without_inertia,
 )
 
+ROOT = Path(__file__).resolve().parents[1]
 COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
 
 
@@ -256,7 +256,7 @@ def table_text(*, folder: Path, settings: TableSettings) -> str:
         "Friction ratio F = f/f0 of laminar developed flow in a tube rotating about an axis across it,",
         "by finite elements on three meshes; uncertainty: 95 % half-width of the fine value (GCI).",
         "slow: a = ln(1 + Kl/300), b = S/(1 + S); fast: a = ln(1 + R/20), b = S_min(R)/S; F = 1 at a = 0.",
-        "Computed by: python tools/rotating_friction_table.py",
+        "Computed by: python tools/generate.py --write rotating_friction",
         f"settings: {json.dumps(settings.plain(), sort_keys=True)}",
         f"settings_sha256: {settings_hash(settings)}",
         f"data_sha256: {hashlib.sha256(body.encode()).hexdigest()}",
@@ -288,27 +288,11 @@ def generate(*, folder: Path, settings: TableSettings, executor: Executor) -> No
             progress.update(bar, completed=sum(1 for _ in folder.glob("*.json")))
 
 
-def main() -> int:
-    """Compute the table and write it. Returns: Exit code 0."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--points", type=Path, default=Path("out/rotating_friction"), help="folder of finished points"
-    )
-    parser.add_argument(
-        "--table",
-        type=Path,
-        default=Path(__file__).resolve().parents[1] / "physics" / "data" / "rotating_friction.csv",
-    )
-    parser.add_argument("--workers", type=int, default=2)
-    arguments = parser.parse_args()
+def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """The table; points are kept in out/rotating_friction/."""
     settings = table_settings()
-    folder = arguments.points / settings_hash(settings)[:12]
-    folder.mkdir(parents=True, exist_ok=True)
-    with Workers(arguments.workers) as executor:
+    folder = ROOT / "out" / "rotating_friction" / settings_hash(settings)[:12]
+    with Workers(2) as executor:
         generate(folder=folder, settings=settings, executor=executor)
-    write_whole(arguments.table, table_text(folder=folder, settings=settings))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    table = table_text(folder=folder, settings=settings)
+    yield ROOT / "physics" / "data" / "rotating_friction.csv", table.encode()

@@ -1,4 +1,4 @@
-"""Tables of docs/scene-file.md from the declarations of keys, liquids and units, for `generated_docs`."""
+"""Tables of docs/scene-file.md from the declarations of keys, liquids and units, for `doc_tables`."""
 
 from __future__ import annotations
 

@@ -1,11 +1,9 @@
-"""Write scene/data/water.csv: water at atmospheric pressure as Chebyshev series, from package `chemicals`.
-
-Not a dependency of the program: run it where `chemicals` is installed, `python tools/water_table.py`.
-"""
+"""Water at atmospheric pressure as Chebyshev series, from `chemicals`; the program does not need that."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +34,7 @@ def table() -> str:
     return "\n".join(rows) + "\n"
 
 
-if __name__ == "__main__":
+def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """The series, with their digest."""
     body = table()
-    TARGET.write_text(HEAD.format(digest=hashlib.sha256(body.encode()).hexdigest()) + body, encoding="utf-8")
+    yield TARGET, (HEAD.format(digest=hashlib.sha256(body.encode()).hexdigest()) + body).encode()

@@ -92,7 +92,7 @@ def verify(
         _say(wrong)
     if errors:
         return _BAD_INPUT
-    return _DONE if list_ else exit_code(results)
+    return _DONE if list_ else _exit_code(results)
 
 
 def _say(error: Exception) -> None:
@@ -184,7 +184,7 @@ def _judge_data(path: Path, *, json: bool) -> int:
     return _DONE
 
 
-def exit_code(results: Sequence[CaseResult]) -> int:
+def _exit_code(results: Sequence[CaseResult]) -> int:
     """1 when a code-verification case failed or a mutation was not caught; a refuted claim is a result."""
     failed = any(
         result.broken or (result.definition.kind == "code_verification" and result.verdict is Verdict.FAILED)

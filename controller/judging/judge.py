@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.balancer import FURTHER, Balancer, Demand, Draws, Outcomes, Settings
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import OPEN
+from ringbalance.results.requirements import OPEN, Proportion
 from ringbalance.scene.arrays import BoolArray
 
 MOST_DRAWS: Final = 1024

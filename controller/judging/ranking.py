@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.balancer import Balancer
 from ringbalance.controller.judging.judge import Judgement
-from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import Proportion
 from ringbalance.results.rows import Finding, Value
 from ringbalance.scene.arrays import FloatArray
 

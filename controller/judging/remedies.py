@@ -14,8 +14,7 @@ from typing import Any, Final
 
 from ringbalance.controller.balancer import Balancer, Remedy, Settings
 from ringbalance.controller.judging.judge import Judgement, judged, judged_all
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET, MISSED
+from ringbalance.results.requirements import MET, MISSED, Proportion
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import value_at

@@ -20,7 +20,7 @@ import numpy as np
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.trials import Axis, Trials
-from ringbalance.results.paired import Paired
+from ringbalance.results.requirements import Paired
 from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.origins import value_at
 

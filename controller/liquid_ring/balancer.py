@@ -210,17 +210,23 @@ class LiquidRingBalancer(Balancer):
         remade = self.flow_law in (None, CALIBRATED, UNCHECKED)
         spread = Spread.of(self.scene, self.model, remade=remade)
         return DrawnRuns(
-            scene=self.scene, model=self.model, spread=spread, limit=self.limit, rotors=self.rotors
+            scene=self.scene,
+            model=self.model,
+            spread=spread,
+            limit=self.limit,
+            rotors=self.rotors,
+            bare=self.flow_law == UNCHECKED,
         )
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> RunResult:
         drawn: dict[str, Any] = {"controller": self.controller}
-        model, moment = self.model, 1.0
+        informed = self._drawn_runs.informed if self.flow_law == UNCHECKED else self.model
+        model, moment = informed, 1.0
         if devices:
             device = self._drawn_runs.device(number)
             model, scene, moment = device.model, device.under(scene, of=self.scene), device.moment
             drawn = {
-                "controller": self.controller or controller_of(scene, self.model),
+                "controller": self.controller or controller_of(scene, informed),
                 "speed": device.speed,
                 "noise": run_noise(self.scene.run.seed, number),
             }

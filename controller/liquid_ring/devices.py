@@ -26,8 +26,7 @@ from ringbalance.scene.uncertain import (
     NORMAL_95,
     independent_half_widths,
     moved,
-    nominal_value,
-    shifted,
+    shifted_in_turn,
 )
 
 ASSUMED_INFLUENCE: Final = 0.05
@@ -197,24 +196,19 @@ def _drawn(
     scene: Scene, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
 ) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a device, and the inputs that no device can have as drawn."""
-    device, clipped = scene, []
-    for name, width in spread.inputs.items():
-        change, before = width * z[name], nominal_value(scene=device, quantity=name)
-        device = shifted(scene=device, quantity=name, change=change)
-        after = nominal_value(scene=device, quantity=name)
-        if before is not None and after is not None and not math.isclose(after, before + change):
-            clipped.append(name)
+    changes = {name: width * z[name] for name, width in spread.inputs.items()}
+    device, clipped = shifted_in_turn(scene, changes)
     keys = [each.key for each in scene.fitted.quantities]
     for place, column in enumerate(spread.directions.T):
-        changes = zip(keys, (column * z[f"{FITTED} {place + 1}"]).tolist(), strict=True)
-        device = moved(device, dict(changes))
+        together = zip(keys, (column * z[f"{FITTED} {place + 1}"]).tolist(), strict=True)
+        device = moved(device, dict(together))
     rotor, half = device.rotor, scene.requirement.phase_range
     started = replace(
         rotor,
         initial_amplitude=rotor.initial_amplitude * math.exp(math.log1p(ASSUMED_AMPLITUDE) * z[AMPLITUDE]),
         initial_phase=rotor.initial_phase + half * (2.0 * q[PHASE] - 1.0),
     )
-    return replace(device, rotor=started), tuple(clipped)
+    return replace(device, rotor=started), clipped
 
 
 def _laws(

@@ -20,8 +20,9 @@ from ringbalance.controller.loop_plan import LoopPlan
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING
 from ringbalance.controller.rotor import Rotors
 from ringbalance.controller.simulation import Outcome
-from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
+from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import compression_work
+from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import PLANT, Dynamics
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
@@ -38,8 +39,10 @@ RELATIVE_ERROR: Final = 1e-4
 within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Of one run without a trace."""
-_GROUP: Final = 16
-"""Devices that are made at once, by consecutive numbers: each has the same bits whichever are asked for."""
+_GROUPS: Final = (0, 4, 16, 32, 64)
+"""Between which numbers, of each 64 that follow each other, devices are made at once: each has the same bits
+whichever are asked for, and of a design that four devices refuse no more are made.
+"""
 _KEPT: Final = 32
 """Groups of devices, and groups under a pressure."""
 _OUT_OF_REACH: Final = 2.0
@@ -68,11 +71,18 @@ class DrawnRuns:
     """Amplitude to come below, m, whatever the controller rests at."""
     rotors: Rotors | None = None
     """Of the devices; None: their own, drawn."""
+    bare: bool = False
+    """Whether the model's law does not know what the scene's uncertain inputs do to it."""
+
+    @cached_property
+    def informed(self) -> BalancerModel:
+        """The model with that, which the law-based algorithm asks for."""
+        return calibrated_model(self.scene, checked=False) if self.bare else self.model
 
     @cached_property
     def terms(self) -> tuple[str, ...]:
         """Names of the terms that runs model, of all devices alike."""
-        return terms_modelled(run_models(scene=self.scene, model=self.model))
+        return run_terms(scene=self.scene, model=self.model)
 
     def outcomes(
         self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
@@ -86,14 +96,14 @@ class DrawnRuns:
         asked = [self._setting(place, each) for place, each in enumerate(settings)]
         ended: list[list[RunResult]] = [[] for _ in asked]
         drawn: list[Device] = []
-        for group, numbers in groupby(draws.numbers, lambda number: number // _GROUP):
+        for group, numbers in groupby(draws.numbers, _group):
             some = list(numbers)
             made = self._devices(group) if draws.devices else self._as_given(group)
-            drawn += [made[number % _GROUP] for number in some]
+            drawn += [made[group.index(number)] for number in some]
             for pressure, tried in _grouped(asked, lambda each: each.scene.gas.pressure):
                 under = self._under(made, pressure)
                 for number in some:
-                    for at, done in self._runs(under[number % _GROUP], tried, further, whole=draws.whole):
+                    for at, done in self._runs(under[group.index(number)], tried, further, whole=draws.whole):
                         ended[at].append(done)
         devices_drawn: dict[str, Any] = {
             "numbers": tuple(device.number for device in drawn),
@@ -104,7 +114,8 @@ class DrawnRuns:
 
     def _setting(self, place: int, setting: Settings) -> _Setting:
         scene = with_values_at(self.scene, setting)
-        controller = controller_of(scene, self.model, relative_error=RELATIVE_ERROR)
+        model = self.informed if scene.controller.kind == "law_based" else self.model
+        controller = controller_of(scene, model, relative_error=RELATIVE_ERROR)
         return _Setting(place=place, scene=scene, controller=controller)
 
     def _runs(
@@ -132,26 +143,27 @@ class DrawnRuns:
 
     def device(self, number: int) -> Device:
         """One of the devices."""
-        return self._devices(number // _GROUP)[number % _GROUP]
+        group = _group(number)
+        return self._devices(group)[group.index(number)]
 
-    def _as_given(self, group: int) -> tuple[Device, ...]:
+    def _as_given(self, group: range) -> tuple[Device, ...]:
         """The scene's own device, over and over."""
         own = Device(
             number=0, scene=self.scene, model=self.model, speed=1.0, moment=1.0, inputs={}, clipped=()
         )
-        return tuple(replace(own, number=number) for number in _numbers(group))
+        return tuple(replace(own, number=number) for number in group)
 
     def __getstate__(self) -> dict[str, Any]:
         """What is kept stays behind."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
-    def _devices(self) -> Callable[[int], tuple[Device, ...]]:
+    def _devices(self) -> Callable[[range], tuple[Device, ...]]:
         """Of a group; the last ones are kept, as a search runs the same again and again."""
 
-        def made(group: int) -> tuple[Device, ...]:
+        def made(group: range) -> tuple[Device, ...]:
             seed, rotors = self.scene.run.seed, self.rotors
-            return devices(self.scene, self.model, self.spread, _numbers(group), seed=seed, rotors=rotors)
+            return devices(self.scene, self.model, self.spread, group, seed=seed, rotors=rotors)
 
         return lru_cache(_KEPT)(made)
 
@@ -289,9 +301,11 @@ def _why(under: _Under, run: np.void, limit: float) -> Outcome:
     return Outcome.GAS_TIME_TOO_SHORT if run["cause"] == IDLE else Outcome.TIME_LIMIT
 
 
-def _numbers(group: int) -> range:
-    """Of its devices."""
-    return range(group * _GROUP, (group + 1) * _GROUP)
+def _group(number: int) -> range:
+    """Numbers of the devices that are made with one."""
+    start, place = number - number % _GROUPS[-1], number % _GROUPS[-1]
+    after = next(each for each in range(len(_GROUPS)) if _GROUPS[each] > place)
+    return range(start + _GROUPS[after - 1], start + _GROUPS[after])
 
 
 def _grouped(settings: Sequence[_Setting], key: Any) -> Iterator[tuple[Any, list[_Setting]]]:

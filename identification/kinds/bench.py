@@ -188,11 +188,11 @@ def _adiabatic_venting(ratio: float, far: float, b: float) -> float:
 
 def _frequency(data: Observations) -> Stated:
     depths, place = np.unique(data.columns["depth_over_width"], return_inverse=True)
-    found = np.array([tank_frequency(float(depth)) for depth in depths])[place]
+    found = np.array([_tank_frequency(float(depth)) for depth in depths])[place]
     return found, FREQUENCY_UNCERTAINTY * found
 
 
-def tank_frequency(depth: float) -> float:
+def _tank_frequency(depth: float) -> float:
     """Lowest natural frequency of a rectangular tank, sigma sqrt(L/g). Args: `depth`: in widths L.
 
     A chamber whose radius is large against its width is such a tank under gravity: its Coriolis force

@@ -135,7 +135,7 @@ def _normal(tangents: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearSolution:
+class _LinearSolution:
     """Solution of one linear system."""
 
     values: FloatArray
@@ -144,7 +144,7 @@ class LinearSolution:
     statistics: Statistics
 
 
-def solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = False) -> LinearSolution:
+def _solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = False) -> _LinearSolution:
     """Solve A u = b for a symmetric positive definite A.
 
     Args: `multigrid`: conjugate gradients with algebraic multigrid instead of a factorisation; where they
@@ -197,7 +197,7 @@ def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, in
     return np.asarray(values), len(steps)
 
 
-def _judged(matrix: csr_matrix, right: FloatArray, values: FloatArray, iterations: int) -> LinearSolution:
+def _judged(matrix: csr_matrix, right: FloatArray, values: FloatArray, iterations: int) -> _LinearSolution:
     size = float(np.linalg.norm(right)) or 1.0
     residual = float(np.linalg.norm(right - matrix @ values)) / size
     limit = _ACCEPTED
@@ -212,7 +212,7 @@ def _judged(matrix: csr_matrix, right: FloatArray, values: FloatArray, iteration
         )
         status = Status(code=StatusCode.NOT_CONVERGED, text=text)
     statistics = Statistics(unknowns=right.size, iterations=iterations, relative_residual=residual)
-    return LinearSolution(values=values, status=status, statistics=statistics)
+    return _LinearSolution(values=values, status=status, statistics=statistics)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -298,16 +298,16 @@ class WeakProblem:
         field = DiscreteField(unit * force(unit * np.asarray(basis.global_coordinates())))
         return cls(basis=basis, stiffness=stiffness(basis), load=_work.assemble(basis, force=field))
 
-    def solve(self, *, start: FloatArray, fixed: IntArray) -> LinearSolution:
+    def solve(self, *, start: FloatArray, fixed: IntArray) -> _LinearSolution:
         """Solve with the values of `start` kept at some nodes; the solution at all nodes."""
         free = np.setdiff1d(np.arange(start.size), fixed)
         matrix = csr_matrix(self.stiffness[free][:, free])
         right = (self.load - self.stiffness @ start)[free]
         large = self.basis.mesh.dim() == 3 and free.size > MULTIGRID_FROM
-        linear = solve_linear(matrix, right, multigrid=large)
+        linear = _solve_linear(matrix, right, multigrid=large)
         values = start.copy()
         values[free] += linear.values
-        return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
+        return _LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
 
 
 @LinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
@@ -315,7 +315,7 @@ def _work(v: Any, w: Any) -> Any:
     return dot(w.force, grad(v))
 
 
-def solve_on(basis: Any, problem: PressureProblem) -> LinearSolution:
+def solve_on(basis: Any, problem: PressureProblem) -> _LinearSolution:
     """Nodal pressure, Pa, on any mesh of the liquid that names its free surface, lengths in m.
 
     Args: `basis`: of `quadratic_basis`.
@@ -324,7 +324,7 @@ def solve_on(basis: Any, problem: PressureProblem) -> LinearSolution:
     return _solved(WeakProblem.of(basis, problem.force), problem, 1.0)
 
 
-def _solved(weak: WeakProblem, problem: PressureProblem, unit: float) -> LinearSolution:
+def _solved(weak: WeakProblem, problem: PressureProblem, unit: float) -> _LinearSolution:
     surface = weak.basis.get_dofs(FREE_SURFACE).all()
     places = unit * weak.basis.mesh.doflocs[:, surface]
     # From one value everywhere, or a film's small differences would cancel.
@@ -363,7 +363,7 @@ def solve_pressure(
 
 def _surface_gradient(
     chamber: ChamberMesh, weak: WeakProblem, problem: PressureProblem, pressure: FloatArray
-) -> LinearSolution:
+) -> _LinearSolution:
     """Flux that balances the weak form on the surface: better than the field's gradient.
 
     int_surface (n . grad p - n . f) v = int (grad p - f) . grad v.
@@ -372,4 +372,4 @@ def _surface_gradient(
     force = np.sum(problem.force(unit * surface.points) * surface.normals, axis=0)
     rest = (weak.stiffness @ pressure - weak.load) / unit + surface.load(force, unknowns=pressure.size)
     mass = surface.mass(unknowns=pressure.size)
-    return solve_linear(csr_matrix(mass[nodes][:, nodes]), rest[nodes])
+    return _solve_linear(csr_matrix(mass[nodes][:, nodes]), rest[nodes])

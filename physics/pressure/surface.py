@@ -74,7 +74,7 @@ def solve_with_gravity(
     Raises: ValueError: a fill ratio outside (0, 1].
     Source: quasi-static balance, Eq. 9 of the liquid-ring paper with gravity.
     """
-    found = find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
+    found = _find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
     if not found.status.ok:
         return PressureSolution(
             chamber=found.chamber,
@@ -91,7 +91,7 @@ def solve_with_gravity(
     return replace(solution, statistics=replace(solution.statistics, iterations=steps, extra=extra))
 
 
-def find_surface(
+def _find_surface(
     *,
     disc: Disc,
     liquid: RotatingLiquid,

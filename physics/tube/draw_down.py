@@ -48,7 +48,7 @@ def _rim_depth(*, flow_rate: npt.ArrayLike, acceleration: float, bore: float) ->
     return np.asarray(1.5 * width ** (2 / 3))
 
 
-def draw_down_depth(
+def _draw_down_depth(
     *,
     flow_rate: npt.ArrayLike,
     acceleration: float,
@@ -87,7 +87,7 @@ def draw_down_depth(
 
 
 def port_depth(scene: Scene, *, flow_rate: npt.ArrayLike) -> FloatArray:
-    """`draw_down_depth` over the port of a scene's chamber, times `tube.draw_down_factor`, m.
+    """`_draw_down_depth` over the port of a scene's chamber, times `tube.draw_down_factor`, m.
 
     The port lies at r_p, where g_c = omega^2 r_p; the layer is fed from the outer wall.
     """
@@ -95,7 +95,7 @@ def port_depth(scene: Scene, *, flow_rate: npt.ArrayLike) -> FloatArray:
     wall = disc.central_angle * disc.outer_radius * disc.axial_width
     return np.asarray(
         tube.draw_down_factor
-        * draw_down_depth(
+        * _draw_down_depth(
             flow_rate=flow_rate,
             acceleration=scene.rotor.speed**2 * tube.port_radius,
             bore=tube.bore,

@@ -40,16 +40,16 @@ def turbulent_ratio_uncertainty(*, reynolds: npt.ArrayLike, rotation_reynolds: n
     """Expanded uncertainty (95 %) of `turbulent_friction_ratio`, zero without rotation.
 
     The formula is recalled and unverified, so it reaches the farthest of what else could be: no effect at
-    all, and `curved_friction_ratio` of the bend whose centrifugal force equals the Coriolis force, a/R_c = S,
-    or S/2.
+    all, and `_curved_friction_ratio` of the bend whose centrifugal force equals the Coriolis force,
+    a/R_c = S, or S/2.
     """
     kt = np.asarray(rotation_reynolds, dtype=np.float64) ** 2 / np.asarray(reynolds, dtype=np.float64)
     ratio = turbulent_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
-    bends = [curved_friction_ratio(curvature_number=share * kt) for share in _EQUAL_FORCE]
+    bends = [_curved_friction_ratio(curvature_number=share * kt) for share in _EQUAL_FORCE]
     return np.asarray(np.max(np.abs([ratio - other for other in (np.ones_like(kt), *bends)]), axis=0))
 
 
-def curved_friction_ratio(*, curvature_number: npt.ArrayLike) -> FloatArray:
+def _curved_friction_ratio(*, curvature_number: npt.ArrayLike) -> FloatArray:
     """Turbulent friction factor of a smooth curved tube over Blasius' of a straight one.
 
     (0.3/0.3164) T^0.05 (1 + 0.112/T^0.2) with T = Re (a/R_c)^2; below T = 1 its excess fades with T^(1/4).

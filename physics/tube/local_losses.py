@@ -65,7 +65,7 @@ class _EndTable:
 
 
 @lru_cache(maxsize=2)
-def end_table(end: str) -> _EndTable:
+def _end_table(end: str) -> _EndTable:
     """The table of the "entrance" or the "exit", as it comes with the package."""
     path = resources.files("ringbalance.physics") / "data" / "end_losses.csv"
     lines = [x for x in path.read_text(encoding="utf-8").splitlines() if not x.startswith("#")]
@@ -92,13 +92,13 @@ def _end_value(end: str, reynolds: npt.ArrayLike) -> FloatArray:
     re = np.asarray(reynolds, dtype=np.float64)
     if not (np.all(re > 0.0) and np.all(np.isfinite(re))):
         raise ValueError("reynolds must be finite and above zero")
-    table, inside = end_table(end), np.minimum(re, _LIMIT)
+    table, inside = _end_table(end), np.minimum(re, _LIMIT)
     grown = 1 + inside / _SCALE
     return np.asarray(table.scaled(np.log(grown)) * grown**table.power / inside)
 
 
 def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
-    re, value, table = np.asarray(reynolds, dtype=np.float64), _end_value(end, reynolds), end_table(end)
+    re, value, table = np.asarray(reynolds, dtype=np.float64), _end_value(end, reynolds), _end_table(end)
     inside = np.minimum(re, _LIMIT)
     a = np.log1p(inside / _SCALE)
     uncertainty_95 = np.interp(a, table.nodes, table.numerical) + table.interpolation_error * np.exp(a)
@@ -119,7 +119,7 @@ def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
     )
 
 
-def laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
+def _laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
     """Loss of a sharp-edged entrance from a large reservoir, laminar.
 
     K_ent = 2 (p_reservoir - p_tube)/(rho U^2) with the developed line of p carried back to the entrance; it
@@ -132,7 +132,7 @@ def laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
     return _end_loss("entrance", reynolds)
 
 
-def laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
+def _laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
     """Loss of a sharp-edged exit into a large reservoir, laminar and developed; otherwise as the entrance.
 
     K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p carried on to the mouth; about
@@ -193,7 +193,7 @@ def entrance_loss(*, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.Ar
     Laminar: K_ent - 2 of a sharp entrance by finite elements, turbulent: the entrance's K, blended over the
     transition.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts.
-    Source: `laminar_entrance_loss`; an entrance that is not sharp has the same laminar value with a
+    Source: `_laminar_entrance_loss`; an entrance that is not sharp has the same laminar value with a
         wider half-width.
     """
     turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
@@ -208,7 +208,7 @@ def entrance_uncertainty(
     re = np.asarray(reynolds, dtype=np.float64)
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     turbulent, half_width = _turbulent_entrance_loss(tube=tube)
-    table = laminar_entrance_loss(reynolds=re)
+    table = _laminar_entrance_loss(reynolds=re)
     unlike = 0.0 if tube.entrance == "sharp" else _OTHER_ENTRANCE + 0.2 * _CREEPING / re
     uncertainty_95 = (1 - turned) * (table.uncertainty + unlike) + turned * half_width
     return np.hypot(uncertainty_95, 2 * turned * (1 - turned) * (table.value - 2 - turbulent))
@@ -222,7 +222,7 @@ def exit_loss(
     Turbulent it is zero, because there the "+1" is the whole exit loss.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
         laminar flow, broadcasts.
-    Source: alpha of `kinetic_factor`; K_exit from `laminar_exit_loss`, which is for the profile
+    Source: alpha of `kinetic_factor`; K_exit from `_laminar_exit_loss`, which is for the profile
         without rotation.
     """
     turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
@@ -242,7 +242,7 @@ def exit_uncertainty(
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     undeveloped = np.minimum(1.0, LAMINAR_ENTRY_LENGTH * re * tube.bore / tube.length)
     blunted = ROTATING_PROFILE_UNCERTAINTY * np.minimum(1.0, (ratio - 1) / 0.1)
-    laminar = laminar_exit_loss(reynolds=re).uncertainty + 0.3 * undeveloped + blunted
+    laminar = _laminar_exit_loss(reynolds=re).uncertainty + 0.3 * undeveloped + blunted
     return np.hypot((1 - turned) * laminar + 0.06 * turned, 2 * turned * (1 - turned))
 
 

@@ -222,7 +222,7 @@ def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) 
     developing = developing_length(
         reynolds=state.reynolds, rotation_reynolds=state.rotation_reynolds, friction_ratio=friction_ratio
     )
-    return laminar * development_uncertainty(
+    return laminar * _development_uncertainty(
         length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
     )
 
@@ -260,7 +260,7 @@ def developing_length(
     return np.asarray(_CREEPING + re / (_INERTIAL * ratio) + np.sqrt(rotation) / _EKMAN)
 
 
-def development_uncertainty(
+def _development_uncertainty(
     *, length: float, bore: float, developing: npt.ArrayLike, rotation_loss: npt.ArrayLike
 ) -> FloatArray:
     """Half-width of k for flow that is not developed yet: rotation's share on the developing length.

@@ -151,7 +151,7 @@ def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
 
 
 @lru_cache(maxsize=1)
-def friction_table() -> _FrictionTable:
+def _friction_table() -> _FrictionTable:
     """The table that comes with the package. Returns: The table, read once."""
     path = resources.files("ringbalance.physics") / "data" / "rotating_friction.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
@@ -192,7 +192,7 @@ def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.Arr
 
 def _carried_on(slow: FloatArray, fast: FloatArray, kl: FloatArray, rotation: FloatArray) -> Any:
     """F of both rectangles, beyond the edge with the growth that Ito and Nanbu, and fast rotation, have."""
-    growth = ito_nanbu_laminar(kl=np.maximum(kl, KL_LIMIT)) / ito_nanbu_laminar(kl=KL_LIMIT)
+    growth = _ito_nanbu_laminar(kl=np.maximum(kl, KL_LIMIT)) / _ito_nanbu_laminar(kl=KL_LIMIT)
     more = 0.07863 * (np.sqrt(np.maximum(rotation, ROTATION_LIMIT)) - np.sqrt(ROTATION_LIMIT))
     return np.exp(slow) * growth, np.exp(fast) + more
 
@@ -244,7 +244,7 @@ def laminar_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) 
 
 
 def _ratio(at: _Place, rotation: FloatArray) -> FloatArray:
-    table = friction_table()
+    table = _friction_table()
     slow, fast = _carried_on(
         _logarithm(table.slow, *at.slow, where=at.weight < 1),
         _logarithm(table.fast, *at.fast, where=at.weight > 0),
@@ -267,7 +267,7 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
     Source: finite elements, `rotating_section`; the limits are exact.
     """
     re, rotation = _checked(reynolds, rotation_reynolds)
-    table, at = friction_table(), _place(re, rotation)
+    table, at = _friction_table(), _place(re, rotation)
     ratio, inside = _ratio(at, rotation), rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
     uncertainty_95 = (
         (1 - at.weight) * _discretisation(table.slow, *at.slow)
@@ -294,7 +294,7 @@ def _interpolation_uncertainty(table: _FrictionTable, kl: FloatArray, rotation: 
     return np.asarray((1 - weight) * inner + weight * edge, dtype=np.float64)
 
 
-def ito_nanbu_laminar(*, kl: npt.ArrayLike) -> FloatArray:
+def _ito_nanbu_laminar(*, kl: npt.ArrayLike) -> FloatArray:
     """Ito and Nanbu's laminar friction ratio, 0.0883 Kl^(1/4) (1 + 11.2 Kl^-0.325), for comparison.
 
     Range: stated for 220 < Kl < 1e7 and S = R/Re < 0.5.

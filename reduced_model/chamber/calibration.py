@@ -129,7 +129,7 @@ class ChamberCalibration:
     moment_per_mass_inputs: float
     """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
     input_effects: Mapping[str, _InputEffect]
-    """Effect of each uncertain input."""
+    """Effect of each uncertain input; empty where they were not varied."""
     status: Status
     """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
     statistics: Statistics
@@ -156,12 +156,13 @@ def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
     return nodes, reported
 
 
-def calibrate_chamber(scene: Scene, *, checked: bool = True) -> ChamberCalibration:
+def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True) -> ChamberCalibration:
     """Evaluate the closed forms over the fill range and check them by finite elements at a few fills.
 
     The values hold gravity's mean over a turn; finite elements hold it where it exceeds the scene's tolerance
     at some fill, for it takes them ten times as long. A ring must exist.
-    Args: `checked`: whether finite elements check them, which takes most of the time.
+    Args: `checked`: whether finite elements check them, which takes most of the time. `varied`: whether both
+        sides of the uncertain inputs are looked at.
     Raises: SceneError: as `scene_ring`.
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates; moments and lambda times the scene's
         measured factor.
@@ -169,11 +170,12 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True) -> ChamberCalibrati
     nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
     ring = RingValues.of(scene, fill_ratio=fills, gravity=scene.environment.gravity > 0)
-    held = gravity_shares(scene).mean > scene.tolerance
-    compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
-    check = ElementCheck.of(scene, values=compared, gravity=held) if checked else None
+    check, effects = None, _input_effects(scene, fills) if varied else {}
+    if checked:
+        held = gravity_shares(scene).mean > scene.tolerance
+        compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
+        check = ElementCheck.of(scene, values=compared, gravity=held)
     unmodelled = unmodelled_fractions(scene, fills)
-    effects = _input_effects(scene, fills)
     ring = _as_measured(scene.disc.moment_factor, ring)
     waves = chamber_status(scene)
 

@@ -45,7 +45,7 @@ from ringbalance.reduced_model.injection.step import (
     take,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""
@@ -58,8 +58,8 @@ _NOTHING_MOVED: Final = 1e-13
 """Fill ratio below which a start has come to nothing but round-off."""
 _LITTLE_MOVED: Final = 1e-9
 """Fill ratio below which a flow that ends was the last swing of a column about its balance."""
-_OPENINGS: Final = 40
-"""Halvings of the valve-open time that leaves a chamber with its residual fill."""
+_OPENINGS: Final = 42
+"""Valve-open times that are tried at most to leave a chamber its residual fill."""
 _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 
 
@@ -101,18 +101,36 @@ def opening_within(
 
     `motions[spare]` is written to.  Returns: zero where the chamber is already there.
     """
-    if _least_after(plant, motions, pair, spare, chamber, duration, w) >= motions[pair].residual:
+    y, residual = motions[pair].state, motions[pair].residual
+    low, high, near, stays = 0.0, duration, 1e-9 * duration, 0
+    # How far the driven chamber falls below its residual fill, with either time.
+    before = residual - (plant.total - y[X] if chamber else y[X])
+    after = residual - _least_after(plant, motions, pair, spare, chamber, duration, w)
+    if after <= 0.0:
         return duration
-    low, high = 0.0, duration
-    for _ in range(_OPENINGS):
-        middle = (low + high) / 2.0
-        if _least_after(plant, motions, pair, spare, chamber, middle, w) >= motions[pair].residual:
-            low = middle
+    for step in range(_OPENINGS):
+        middle = _look_at(low, high, before, after, step, near)
+        found = residual - _least_after(plant, motions, pair, spare, chamber, middle, w)
+        if found > 0.0:
+            high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1
         else:
-            high = middle
-        if high - low <= 1e-9 * duration:
+            low, before, after, stays = middle, found, after * (0.5 if stays > 0 else 1.0), 1
+        if high - low <= near:
             break
     return low
+
+
+@inlined
+def _look_at(low: float, high: float, before: float, after: float, step: int, near: float) -> float:
+    """Where to look next for a root between two ends with these values, at most `near` exact.
+
+    By the secant through both, and by halves where that has no sign change or takes long. The caller halves
+    the value of an end that stays (the Illinois rule).
+    """
+    guided = step < _SECANTS and before < 0.0 < after
+    middle = low + (high - low) * (before / (before - after) if guided else 0.5)
+    # Never nearer to an end than that: so a root close to it is soon between two close ends.
+    return float(min(max(middle, low + near / 2.0), high - near / 2.0))
 
 
 @in_place
@@ -234,17 +252,13 @@ def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
 def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatArray) -> float:
     """Part of the step just taken after which the first event lies, at most `near` late.
 
-    By the secant through how far both ends are `beyond` it, which halves the weight of an end that stays
-    (the Illinois rule); by halves where that has no sign change or takes long.
+    Looked for by how far both ends are `beyond` it, see `_look_at`.
     """
     low, high, what, stays = 0.0, 1.0, heading(plant, motion, _at(w, END)), 0
     before = beyond(plant, motion, now(motion), what)
     after = beyond(plant, motion, _at(w, END), what)
     for step in range(_BISECTIONS):
-        guided = step < _SECANTS and before < 0.0 < after
-        middle = low + (high - low) * (before / (before - after) if guided else 0.5)
-        # Never nearer to an end than that: so a root close to it is soon between two close ends.
-        middle = min(max(middle, low + near / 2.0), high - near / 2.0)
+        middle = _look_at(low, high, before, after, step, near)
         between(plant, motion, h, middle, w)
         found = beyond(plant, motion, _at(w, BETWEEN), what)
         if changes(plant, motion, _at(w, BETWEEN)):

@@ -262,8 +262,12 @@ _NEXT_TO_NOTHING: Final = 1e-4
 """Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
 
 
-def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads) -> CalibratedLaw:
+def calibrated_law(
+    *, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads, varied: bool = True
+) -> CalibratedLaw:
     """Put the flow law together.
+
+    Args: `varied`: whether inputs that were fitted together are varied for the law's uncertainty.
 
     Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
     """
@@ -286,7 +290,7 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
             across=_across_table(scene, chamber.moment.table.nodes),
         ),
     )
-    return replace(law, variants=_variants(scene)) if scene.fitted.quantities else law
+    return replace(law, variants=_variants(scene)) if varied and scene.fitted.quantities else law
 
 
 def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:

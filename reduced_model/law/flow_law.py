@@ -17,14 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, clipped
-from ringbalance.scene.foreign import plain_number
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.units import plain_number
 
 CALIBRATED: Final = "calibrated"
 """Name of the law that `calibrate` makes, which is used where no other is asked for."""
 UNCHECKED: Final = "calibrated, unchecked"
-"""The same without finite elements beside it, for runs of many designs."""
+"""The same without finite elements beside it and effects of uncertain inputs, for runs of many designs."""
 _FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
 

@@ -1,9 +1,12 @@
-"""A verification result as the page shows it: every number already text, nothing judged again."""
+"""Verification on the page, every number already text and nothing judged again: a case; and the studies of a
+scene: where answers end and what is said beyond, and speed against accuracy.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from itertools import count
 from types import MappingProxyType
 from typing import Any, Final
@@ -23,7 +26,7 @@ from ringbalance.reports.figure import (
     logarithmic,
 )
 from ringbalance.reports.prose import equation_svg, input_name, typeset
-from ringbalance.reports.section import Record
+from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import marked, printed
 from ringbalance.results.numbers import (
     MISSING,
@@ -36,6 +39,9 @@ from ringbalance.results.numbers import (
     with_unit,
 )
 from ringbalance.results.result import Table
+from ringbalance.scene.models import Scene
+from ringbalance.verification.extremes.study import axis_rows
+from ringbalance.verification.trade import TradeStudy, error_text, models_table, trade_study
 
 Quantity = Mapping[str, Any]
 """A judged quantity of a case, whose numbers know their place in the evidence."""
@@ -235,7 +241,7 @@ def _order_plot(case: Record, sequences: list[Record]) -> Drawing | None:
     )
 
 
-def series_plots(case: Record) -> list[Drawing]:
+def _series_plots(case: Record) -> list[Drawing]:
     """The figures that a case hands over as plain series."""
     stem = f"case-{case['id'].replace('_', '-')}"
     return [_series_plot(f"{stem}-{index}", series) for index, series in enumerate(case.get("series") or [])]
@@ -295,7 +301,7 @@ def case_view(case: Record) -> Record:
         "order_plot": _order_plot(case, falling),
         # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
         "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],
-        "drawings": series_plots(case),
+        "drawings": _series_plots(case),
         "series": [series["name"] for series in case.get("series") or []],
         "sequences": sequences,
         "tables": [_data_table(table) for table in tables if not is_long(table)],
@@ -309,3 +315,64 @@ FILTERS: Final[Mapping[str, Callable[[Quantity], str]]] = MappingProxyType(
     {"found": _found, "error": _error, "brief": _in_brief, "half_width": _width}
 )
 """Filters of the templates, for a judged quantity."""
+
+
+_CASE: Final = "extremes"
+
+
+def _extremes(_own: Record, evidence: Record) -> Record:
+    """Sentences and the table of axes."""
+    case = next((c for c in evidence.get("verification", []) if c["id"] == _CASE), None)
+    if case is None or not case.get("tables"):
+        return {"ran": False}
+    tables = {table["name"]: table["columns"] for table in case["tables"]}
+    return {
+        "ran": True,
+        "text": case.get("explanation", ""),
+        "date": case.get("date", ""),
+        "table": Table(
+            caption="Each input alone, from end to end, all else as in the paper’s scene: where points begin "
+            "to end in another way, and what is said there.",
+            heads=("Input", "Stretch", "Answer", "Loop", "Said"),
+            rows=axis_rows(tables["axes"]),
+            style="",
+        ),
+    }
+
+
+EXTREMES: Final = Section(name="extremes", title="At the extremes", show=_extremes)
+"""Shown also where it was not run, to say how it is."""
+
+
+def _collect(work: Work) -> Record | None:
+    """The trade of the scene, light: without meshes in three dimensions."""
+    return _study(work.ring).to_dict()
+
+
+@lru_cache(maxsize=4)
+def _study(scene: Scene) -> TradeStudy:
+    """One measurement serves every report of a scene within a process."""
+    return trade_study(scene, level="light")
+
+
+def _trade(trade: Record, evidence: Record) -> Record:
+    times = evidence["times"].get("trade") or {}
+    terms = [(row["term"], row["group"], error_text(row["estimated_contribution"])) for row in trade["terms"]]
+    quantities = [quantity for quantity in trade["quantities"] if quantity["models"]]
+    return {
+        "terms": Table(
+            caption="What leaving a term out would change, by the dimensionless group that it grows with.",
+            heads=("Term", "Group", "Estimated contribution"),
+            rows=terms,
+        ),
+        "quantities": [_quantity(each, times) for each in quantities],
+    }
+
+
+def _quantity(quantity: Record, times: Record) -> Record:
+    table = models_table(quantity, times)
+    title = quantity["title"][0].upper() + quantity["title"][1:]
+    return {"title": title, "status": table.note, "models": table}
+
+
+TRADE: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_trade)

@@ -66,7 +66,7 @@ def _collect(work: Work) -> Record:
             "runs": bool(np.all(point.runs)),
             "starts": bool(np.all(point.regime != Regime.BLOCKED)),
         },
-        "liquids": [record | {"verdict": verdict_on_fifty(record)} for record in liquids],
+        "liquids": [record | {"verdict": _verdict_on_fifty(record)} for record in liquids],
         "separated": _separated(calibration),
     }
 
@@ -93,7 +93,7 @@ def _with_budget(liquids: list[Record], calibration: Calibration) -> list[Record
     return [first, *others]
 
 
-def verdict_on_fifty(record: Record) -> str:
+def _verdict_on_fifty(record: Record) -> str:
     """What a liquid says of k = 50, judged by the velocity that Eq. 19 gives with it."""
     if not record["runs"]:
         return "nothing flows"

@@ -96,7 +96,7 @@ def _collect(work: Work) -> Record:
         "recommended_pressure_Pa": chosen.gas.pressure,
         "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
-        "requirement": requirement_record(scene, limit=balancer.limit),
+        "requirement": _requirement_record(scene, limit=balancer.limit),
         "bore_m": scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in scene.uncertainty),
         "other_reading": _other_reading(scene),
@@ -109,7 +109,7 @@ def _run_record(scene: Scene, model: BalancerModel) -> Record:
     return {**{key: run[key] for key in _RUN if key in run}, "injections": len(run["injections"])}
 
 
-def requirement_record(scene: Scene, *, limit: float) -> Record:
+def _requirement_record(scene: Scene, *, limit: float) -> Record:
     """What the limit of a scene's vibration amplitude, m, means for its rotor; SI, None where not known."""
     rotor = scene.rotor
     left = limit / rotor.influence_coefficient

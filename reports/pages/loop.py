@@ -1,9 +1,10 @@
-"""The loop and its tuning: runs under each law, and how many devices settle by when."""
+"""The loop and its tuning: runs under each law, how many devices settle by when, and what a wrong k costs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any, Final
 
@@ -12,6 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Wedge
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.judging.judge import judged
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.figure import (
     AS_PAPER,
     FOUND,
@@ -26,11 +31,13 @@ from ringbalance.reports.figure import (
     panels,
     plain_number,
 )
+from ringbalance.reports.judged import judgement_record
 from ringbalance.reports.prose import series
 from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import is_papers
 from ringbalance.results.numbers import shown
+from ringbalance.scene.models import Scene
 
 SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "own": {**AS_PAPER, "label": "the scene’s settings"},
@@ -77,7 +84,7 @@ def _drawn_runs(evidence: Record) -> dict[str, Record]:
     return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
 
 
-def injections_until(run: Record) -> float:
+def _injections_until(run: Record) -> float:
     """End of the last injection, s; of the run where there is none."""
     ends = [item["time_s"] + item["duration_s"] for item in run["injections"]]
     return float(max(ends, default=run["time_s"][-1]))
@@ -89,7 +96,7 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
     Where a long rest follows the injections it has an axis of its own.
     """
     end = max(float(run["time_s"][-1]) for run in runs.values())
-    early = 1.15 * max(map(injections_until, runs.values()))
+    early = 1.15 * max(map(_injections_until, runs.values()))
     parts = {(0.0, end): (0.09, 0.15, 0.89, 0.68)}
     if 0 < early < _REST * end:
         parts = {(0.0, early): (0.09, 0.15, 0.6, 0.68), (early, end): (0.72, 0.15, 0.26, 0.68)}
@@ -134,7 +141,7 @@ def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str
     ]
 
 
-def frames_of(run: Record) -> list[tuple[str, float]]:
+def _frames_of(run: Record) -> list[tuple[str, float]]:
     """Titles and times, s, of the start, the first injections and the end."""
     last = float(run["time_s"][-1])
     after = [
@@ -147,7 +154,7 @@ def frames_of(run: Record) -> list[tuple[str, float]]:
 def _rings(run: Record, disc: Record) -> Drawing:
     """The ring at the start, after the first injections and at the end, as the shaft sees it: each chamber
     with its liquid, drawn as a sector between the radii that its fill takes."""
-    frames = frames_of(run)
+    frames = _frames_of(run)
     width = 1 / len(frames)
 
     def at(time: float, values: Sequence[float]) -> float:
@@ -214,4 +221,70 @@ def _injections(_own: Record, evidence: Record) -> Record:
 
 INJECTIONS: Final = Section(
     name="injections", title="The closed loop, injection by injection", show=_injections
+)
+
+
+_SMALL_FILL: Final = 1e-3
+"""Change of fill over which a loop counts as linear."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _LoopGain:
+    """The proportional loop about level chambers under one law.
+
+    e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V: a residual turns round from h = 1
+    and grows from h = 2.
+    Source: sections 4.2 and 5 of the liquid-ring paper; a discrete first-order loop.
+    """
+
+    law: str
+    velocity_m_s: float
+    """u at equal fills."""
+    drag_coefficient: float
+    """k that Eq. 18 reads out of that velocity, 2p/(rho u^2) - 1."""
+    moment_per_transferred_mass_m: float
+    """lambda at equal fills."""
+    slope_m_per_s: float
+    """Vibration taken away per second of gas."""
+    gain_per_operation: float
+    """h: share of the residual that an operation takes away."""
+
+
+def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
+    """Linearise the loop about level chambers; None when the gas does not drive a flow there."""
+    x, pressure = scene.disc.initial_fill, scene.gas.pressure
+    flow = model.flow.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
+    u = float(flow.velocity)
+    if u <= 0 or pressure <= 0:
+        return None
+    ends = np.array([x - _SMALL_FILL, x + _SMALL_FILL])
+    moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
+    per_fill = float(abs(moments[1] - moments[0])) / (2 * _SMALL_FILL)
+    slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
+    return _LoopGain(
+        law=model.name,
+        velocity_m_s=u,
+        drag_coefficient=2 * pressure / (model.density * u**2) - 1,
+        moment_per_transferred_mass_m=per_fill / (model.density * model.chamber_volume),
+        slope_m_per_s=slope,
+        gain_per_operation=scene.controller.proportional * slope,
+    )
+
+
+def _consequences(work: Work) -> Record:
+    """The paper's law over the devices on which the summary judges the calibrated one."""
+    gains = [_loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
+    paper = judged(balancer_of(work.ring, flow_law="paper"), {})
+    return {
+        "gain": [asdict(each) for each in gains if each is not None],
+        "paper": judgement_record(paper),
+    }
+
+
+def _where_judged(_own: Record, evidence: Record) -> Record | None:
+    return {} if (evidence.get("summary") or {}).get("own") else None
+
+
+CONSEQUENCES: Final = Section(
+    name="consequences", title="What a wrong k costs", collect=_consequences, apart=True, show=_where_judged
 )

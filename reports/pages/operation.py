@@ -305,7 +305,7 @@ def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
     for index, middle in enumerate(2 * math.pi * np.arange(count) / count):
         turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
         _filled(panel, _area([loop @ turn for loop in loops]), ring)
-        x, y = _polar(letter_radius(size), middle + 0.62 * half)
+        x, y = _polar(_letter_radius(size), middle + 0.62 * half)
         panel.text(x, y, chr(ord("A") + index), ha="center", va="center", weight="bold")
     panel.plot(0, 0, "+", color=INK, markersize=9)
     _tube(panel, size)
@@ -327,7 +327,7 @@ def _polar(radius: float, angle: float) -> tuple[float, float]:
     return radius * math.cos(angle), radius * math.sin(angle)
 
 
-def letter_radius(size: dict[str, float]) -> float:
+def _letter_radius(size: dict[str, float]) -> float:
     """In the gas, in the wider of the gaps that the tube's way round leaves."""
     inner, surface = size["inner_radius"], size["free_surface_radius"]
     crest = min(max(size.get("crest_radius", inner), inner), surface)

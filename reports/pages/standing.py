@@ -143,7 +143,7 @@ CASES: Final = Section(
 
 
 @cache
-def symbols_and_sources() -> Record:
+def _symbols_and_sources() -> Record:
     """Symbols with unit and term of the glossary, and sources, by kind of balancer."""
     path = files("ringbalance.reports").joinpath("templates", "document.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -155,7 +155,7 @@ def evidence_text(evidence: Record) -> str:
 
 
 def _document(_own: Record, evidence: Record) -> Record:
-    listed = symbols_and_sources()
+    listed = _symbols_and_sources()
     balancer = listed.get(evidence["balancer"], {"symbols": [], "sources": []})
     return {
         "evidence_sha256": hashlib.sha256(evidence_text(evidence).encode()).hexdigest(),

@@ -54,7 +54,7 @@ _WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Theme:
+class _Theme:
     """Colours of a picture, so that it sits on the page without a frame."""
 
     name: str
@@ -75,8 +75,8 @@ class Theme:
 
 
 THEMES: Final = (
-    Theme(name="light", colours=LIGHT, metal="#c3cad2", mark=LIGHT["--fig-ink"]),
-    Theme(name="dark", colours=DARK, metal="#66717e", mark="#ffffff"),
+    _Theme(name="light", colours=LIGHT, metal="#c3cad2", mark=LIGHT["--fig-ink"]),
+    _Theme(name="dark", colours=DARK, metal="#66717e", mark="#ffffff"),
 )
 
 
@@ -184,7 +184,7 @@ def _look(
     plotter.camera.SetWindowCenter(-0.12, -lift)
 
 
-def _draw_pressure(plotter: Any, job: Record, liquid: Any, theme: Theme) -> _Lettering:
+def _draw_pressure(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Lettering:
     """The liquid of one chamber, a corner cut away, coloured by pressure, in the outline of its chamber."""
     disc, half = job["lengths"], job["central_angle"] / 2
     outer, inner, width = disc["outer_radius"], disc["inner_radius"], disc["axial_width"]
@@ -216,7 +216,7 @@ def _add_field(plotter: Any, surface: Any, name: str, colours: Colormap, high: f
     plotter.add_mesh(surface, scalars=name, cmap=colours, clim=[0, high], n_colors=256, **look)
 
 
-def _draw_disc(plotter: Any, job: Record, liquid: Any, theme: Theme) -> _Lettering:
+def _draw_disc(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Lettering:
     """All chambers with their liquid, the front half of the width cut off, and one tube over its crest."""
     disc, count = job["lengths"], job["chambers"]
     outer, inner, back = disc["outer_radius"], disc["inner_radius"], -disc["axial_width"] / 2
@@ -263,7 +263,7 @@ def _metal(job: Record) -> list[Any]:
     return rings + [web.rotate_z(360.0 * (index + 0.5) / count) for index in range(count)]
 
 
-def _add_arrow(plotter: Any, radius: float, theme: Theme) -> _Label:
+def _add_arrow(plotter: Any, radius: float, theme: _Theme) -> _Label:
     """An arrow along the rim that shows which way the disc turns."""
     angle = np.radians(np.linspace(287, 325, 40))
     points = np.c_[radius * np.cos(angle), radius * np.sin(angle), np.zeros(angle.size)]
@@ -275,7 +275,7 @@ def _add_arrow(plotter: Any, radius: float, theme: Theme) -> _Label:
     return _Label(text="rotation", place=_polar(1.16 * radius, math.radians(300), -0.1 * radius))
 
 
-def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[_Label]:
+def _add_tube(plotter: Any, disc: Record, theme: _Theme) -> list[_Label]:
     outer, crest = disc["outer_radius"], disc["hump_radius"]
     height, reach = 0.09 * outer, disc["port_radius"] - 0.04 * outer
     path = _tube_path(port=reach, crest=crest, height=height, bend=0.06 * outer)
@@ -337,7 +337,7 @@ def _pixel(plotter: Any, place: FloatArray) -> tuple[float, float]:
     return (x / w + 1) / 2 * width, (y / w + 1) / 2 * height
 
 
-def _save(plotter: Any, lettering: _Lettering, theme: Theme, path: Path) -> None:
+def _save(plotter: Any, lettering: _Lettering, theme: _Theme, path: Path) -> None:
     """Reduces the picture, letters it and writes it."""
     plotter.suppress_rendering = False
     plotter.render()
@@ -361,7 +361,7 @@ def _save(plotter: Any, lettering: _Lettering, theme: Theme, path: Path) -> None
     Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]).save(path, optimize=True)
 
 
-def _write(figure: Figure, label: _Label, place: tuple[float, float], theme: Theme) -> None:
+def _write(figure: Figure, label: _Label, place: tuple[float, float], theme: _Theme) -> None:
     """A label, whole within the picture, with a leader from its upper or lower edge."""
     (x, y), (right, up) = place, label.shift
     halo = [withStroke(linewidth=10 * _POINTS, foreground=theme.ground)]

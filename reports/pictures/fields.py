@@ -1,24 +1,30 @@
-"""The pressure field that a report shows, in three dimensions: of a sector, or of an imported chamber."""
+"""The pressure field that a report shows, in three dimensions: of a sector, or of an imported chamber; and
+meshes with their boundary names and fields as VTU files.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import meshio
 import numpy as np
+import numpy.typing as npt
+from skfem.io.meshio import to_meshio
 
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
-from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.pressure.solve import RotatingLiquid, quadratic_basis, solve_on, solve_pressure
 from ringbalance.reduced_model import paper
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Scene
+from ringbalance.scene.platform.files import draft_folder, write_whole
 
 Record = dict[str, Any]
 _RADII: Final = 17
@@ -26,7 +32,7 @@ _RADII: Final = 17
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChamberField:
+class _ChamberField:
     """The liquid's gauge pressure in one chamber, gravity left out, at the nodes of a mesh."""
 
     fill_ratio: float
@@ -67,7 +73,7 @@ class ChamberField:
     def write(self, *, path: Path) -> Path:
         """Write gauge pressure, Pa, and depth below the free surface, m, to a VTU file. Raises: OSError."""
         depth = np.maximum(np.hypot(*self.mesh.doflocs[:2]) - self.surface_radius, 0.0)
-        return write_vtu(path, mesh=self.mesh, fields={"pressure_Pa": self.pressure, "depth_m": depth})
+        return _write_vtu(path, mesh=self.mesh, fields={"pressure_Pa": self.pressure, "depth_m": depth})
 
 
 def shown_fill(scene: Scene) -> float:
@@ -75,7 +81,7 @@ def shown_fill(scene: Scene) -> float:
     return scene.disc.initial_fill or scene.disc.max_fill_ratio / 2
 
 
-def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
+def chamber_field(scene: Scene, *, fill_ratio: float) -> _ChamberField:
     """Solve the pressure of the liquid in one chamber in three dimensions, gravity left out.
 
     Args: `fill_ratio`: x, within (0, 1).
@@ -88,7 +94,7 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
         if scene.disc.geometry is None
         else _in_imported(scene.disc.geometry, radius, liquid)
     )
-    return ChamberField(fill_ratio=fill_ratio, surface_radius=radius, **parts)
+    return _ChamberField(fill_ratio=fill_ratio, surface_radius=radius, **parts)
 
 
 def _in_sector(scene: Scene, surface: float, liquid: RotatingLiquid) -> Record:
@@ -132,3 +138,40 @@ def _in_imported(geometry: ChamberGeometry, surface: float, liquid: RotatingLiqu
             "status": solution.status.text,
         },
     }
+
+
+def _write_vtu(path: Path, *, mesh: Any, fields: Mapping[str, npt.ArrayLike] | None = None) -> Path:
+    """Write a mesh of scikit-fem in metres with its boundary names and nodal fields, whole or not at all.
+
+    Args: `path`: of the file, ending in .vtu. `fields`: nodal values by name, shape (nodes,) each, SI.
+    Raises: ValueError: another ending, or a field that is not one finite value per node.
+    Raises: OSError: the file cannot be written.
+    Source: VTK XML through meshio; scikit-fem stores each boundary as cell data "skfem:b:<name>".
+    """
+    if path.suffix != ".vtu":
+        raise ValueError(f"the name of a VTU file must end in .vtu, not {path.suffix!r}")
+    nodal = {name: np.asarray(value, dtype=np.float64) for name, value in (fields or {}).items()}
+    for name, value in nodal.items():
+        if value.shape != mesh.doflocs.shape[1:] or not np.all(np.isfinite(value)):
+            raise ValueError(f"field {name!r} must hold one finite value per node")
+    stored = to_meshio(mesh, nodal)
+    # VTK has no points in the plane; meshio would say so on the console.
+    stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
+    return _written(path, stored)
+
+
+def write_cells(path: Path, *, kind: CellKind, points: FloatArray, cells: IntArray) -> Path:
+    """Write cells of one kind in metres to a VTU file, whole or not at all.
+
+    Args: `cells`: in meshio's order.
+    Raises: OSError: the file cannot be written.
+    """
+    return _written(path, meshio.Mesh(points, {str(kind): cells}))
+
+
+def _written(path: Path, stored: meshio.Mesh) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with draft_folder(path.parent) as folder:
+        draft = folder / path.name
+        meshio.write(draft, stored)
+        return write_whole(path, draft.read_bytes())

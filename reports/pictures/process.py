@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.mesh.export import write_cells
-from ringbalance.reports.pictures.fields import chamber_field, shown_fill
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_cells
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.scene import Scene
 
@@ -74,7 +73,7 @@ class _Drawing3D:
             self.process.communicate()
 
 
-def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
+def _write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     """Solve and write the pressure fields that the pictures show, and the space of an imported chamber.
 
     Raises: OSError: a file cannot be written.
@@ -99,15 +98,15 @@ def drawn(scene: Scene, folder: Path, opengl: OpenGL | None = None) -> Iterator[
 
     Raises: OSError: the folder cannot be written.
     """
-    fields = write_fields(scene=scene, folder=folder)
-    drawing = start_drawing(scene=scene, fields=fields, folder=folder, opengl=opengl)
+    fields = _write_fields(scene=scene, folder=folder)
+    drawing = _start_drawing(scene=scene, fields=fields, folder=folder, opengl=opengl)
     try:
         yield drawing.finish
     finally:
         drawing.stop()
 
 
-def start_drawing(
+def _start_drawing(
     *, scene: Scene, fields: Mapping[str, Path], folder: Path, opengl: OpenGL | None = None
 ) -> _Drawing3D:
     """Begin to draw in a process of its own, or say why nothing can be drawn.

@@ -1,4 +1,4 @@
-"""The contents of a mesh file, in its own unit: Gmsh and VTK by meshio, Abaqus by `abaqus_file`.
+"""The contents of a mesh file, in its own unit: Gmsh and VTK by meshio, Abaqus by a reader of its own.
 
 For a damaged file meshio raises anything, prints, or ends the process; here that is one error.
 """
@@ -13,6 +13,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -20,10 +21,16 @@ from typing import Final
 import meshio
 import numpy as np
 
-from ringbalance.scene.arrays import BoolArray
-from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.body import Contents, Mark, MeshFileError
-from ringbalance.scene.chamber_file.elements import MOST_NODES, dimension
+from ringbalance.scene.chamber_file.elements import (
+    CELL_KINDS,
+    FACET_KINDS,
+    MOST_NODES,
+    NODES,
+    dimension,
+    faces,
+)
 from ringbalance.scene.chamber_file.record import KNOWN_NAMES, VOLUME
 from ringbalance.scene.platform.memory import bounded_memory
 
@@ -164,7 +171,205 @@ def _refuse_bomb(content: bytes) -> None:
             raise MeshFileError.of(problem, f"up to {MOST_NODES} nodes or cells")
 
 
+_SHELL: Final = r"(CPS|CPE|CAX|S|M3D|SFM3D|R3D|DS)"
+_KINDS: Final = (
+    (r"(D?C3D|AC3D|F3D)4\D*", "tetra"),
+    (r"(D?C3D|AC3D)10\D*", "tetra10"),
+    (r"(D?C3D|AC3D|F3D)8\D*", "hexahedron"),
+    (r"(D?C3D|AC3D)20\D*", "hexahedron20"),
+    (_SHELL + r"3\D*|STRI3", "triangle"),
+    (_SHELL + r"6\D*|STRI65", "triangle6"),
+    (_SHELL + r"4\D*5?", "quad"),
+    (_SHELL + r"8\D*5?", "quad8"),
+    (r"T[23]D2|B[23]1", "line"),
+    (r"T[23]D3|B[23]2", "line3"),
+)
+_NODES: Final = MappingProxyType({"line": 2, "line3": 3, **NODES})
+_ALLOWED: Final = "C3D4, C3D10, C3D8 or C3D20 for the chamber, S3, S4, S6 or S8 for its faces"
+_FACES: Final = MappingProxyType(
+    {
+        4: ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)),
+        6: ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7), (0, 3, 4, 7)),
+    }
+)
+"""Corners of the faces S1, S2, ... by their number."""
+_SKIPPED: Final = re.compile(r"(surface|line|volume)\d+|_.*|", re.IGNORECASE)
+"""Names that programs give by themselves."""
+
+
+@dataclass
+class _Parts:
+    """What was read so far; names in small letters."""
+
+    nodes: list[FloatArray] = field(default_factory=list)
+    """Rows of number and coordinates."""
+    elements: list[tuple[str, str, IntArray]] = field(default_factory=list)
+    """Kind, name, rows of number and numbers of nodes."""
+    sets: dict[str, list[IntArray]] = field(default_factory=dict)
+    """Numbers of elements."""
+    surfaces: list[tuple[str, str, str]] = field(default_factory=list)
+    """Name; an element or a set; a face of it."""
+
+
+def _read_abaqus(content: bytes) -> Contents:
+    """The contents of an .inp file: nodes, elements, element sets and surfaces, no other keyword.
+
+    Own code: meshio passes over *SURFACE, keeps the last of several *NODE, *ELSET or *ELEMENT of one name,
+    and gives the set of one *ELEMENT to another where some have none, all without a word.
+    Raises: MeshFileError: it is no such file, or damaged.
+    Source: Abaqus keywords reference, *NODE, *ELEMENT, *ELSET, *SURFACE; faces of solid elements as its
+        element library numbers them.
+    """
+    parts = _Parts()
+    for keyword, options, data in _keywords(content.decode("utf-8", errors="replace")):
+        _add(parts, keyword, options, data)
+    if not parts.nodes or not parts.elements:
+        raise MeshFileError.of(
+            "this is not an Abaqus mesh: it has no *NODE or no *ELEMENT", "an Abaqus .inp file"
+        )
+    nodes = np.concatenate(parts.nodes)
+    order = np.argsort(nodes[:, 0], kind="stable")
+    numbers = _whole(nodes[order, 0], "*NODE")
+    if (numbers[1:] == numbers[:-1]).any():
+        raise MeshFileError.of(f"*NODE has number {numbers[1:][numbers[1:] == numbers[:-1]][0]} twice")
+
+    def places(of: IntArray) -> IntArray:
+        at = np.minimum(np.searchsorted(numbers, of), len(numbers) - 1)
+        return np.where(numbers[at] == of, order[at], -1)
+
+    sides = list(_sides(parts))
+    blocks = [(kind, places(rows[:, 1:])) for kind, _, rows in parts.elements]
+    blocks += [(FACET_KINDS[rows.shape[1]], places(rows)) for _, rows in sides]
+    named = (
+        Mark(name=name, block=len(parts.elements) + place, where=np.ones(len(rows), dtype=np.bool_))
+        for place, (name, rows) in enumerate(sides)
+    )
+    return Contents(
+        points=nodes[:, 1:],
+        blocks=tuple(blocks),
+        marks=(*_marks(parts), *named),
+        other_names=tuple(name for name in parts.sets if not _SKIPPED.fullmatch(name)),
+    )
+
+
+def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
+    """Each keyword with its options and the lines of data under it; text before the first is none."""
+    for block in re.split(r"(?m)^\*(?!\*)", re.sub(r"(?m)^\*\*.*$", "", text))[1:]:
+        head, *data = (line for line in block.splitlines() if line.strip())
+        word, *rest = (part.strip() for part in head.split(","))
+        pairs = (part.partition("=") for part in rest)
+        options = {key.strip().lower(): value.strip().strip('"').lower() for key, _, value in pairs}
+        yield word.lower(), options, data
+
+
+def _add(parts: _Parts, keyword: str, options: dict[str, str], data: list[str]) -> None:
+    if keyword == "include":
+        raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
+    if keyword == "instance" and data:
+        raise MeshFileError.of(
+            "*INSTANCE moves the part", "a part in its final place, or a mesh without parts"
+        )
+    if keyword == "node":
+        parts.nodes.append(_table(data, 4, "*NODE"))
+    elif keyword == "element":
+        kind = _kind(options.get("type", ""))
+        rows = _whole(_table(data, 1 + _NODES[kind], "*ELEMENT"), "*ELEMENT")
+        parts.elements.append((kind, options.get("elset", ""), rows))
+    elif keyword == "elset":
+        numbers = _set(data, "generate" in options, parts)
+        parts.sets.setdefault(options.get("elset", ""), []).append(numbers)
+    elif keyword == "surface" and options.get("type", "element") == "element":
+        for line in data:
+            first, _, side = line.partition(",")
+            parts.surfaces.append((options.get("name", ""), first.strip().lower(), side.strip(" ,").upper()))
+
+
+def _table(data: list[str], width: int, what: str) -> FloatArray:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            values = np.fromstring(" ".join(data).replace(",", " "), dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError) as error:
+            problem = f"{what} holds something other than numbers: the file is damaged"
+            raise MeshFileError.of(problem) from error
+    if not len(values) or len(values) % width:
+        raise MeshFileError.of(f"{what} does not have {width} numbers for each entry: the file is damaged")
+    return values.reshape(-1, width)
+
+
+def _whole(values: FloatArray, what: str) -> IntArray:
+    """The same numbers as integers. Raises: MeshFileError: one of them is none."""
+    with np.errstate(invalid="ignore"):
+        numbers = values.astype(np.int64)
+    if not ((numbers == values) & (np.abs(values) < 2**53)).all():
+        raise MeshFileError.of(f"{what} has a fraction where a whole number belongs: the file is damaged")
+    return numbers
+
+
+def _kind(name: str) -> str:
+    kind = next((kind for pattern, kind in _KINDS if re.fullmatch(pattern, name.upper())), None)
+    if kind is None:
+        raise MeshFileError.of(f"*ELEMENT has the unknown type {name[:20].upper() or 'none'}", _ALLOWED)
+    return kind
+
+
+def _set(data: list[str], generate: bool, parts: _Parts) -> IntArray:
+    """Numbers of elements in a set: listed, as first, last and step, or by the names of other sets."""
+    words = [word.strip().lower() for line in data for word in line.split(",") if word.strip()]
+    listed = [word for word in words if word.isdigit()]
+    numbers = _whole(_table(listed, 1, "*ELSET")[:, 0], "*ELSET") if listed else np.empty(0, dtype=np.int64)
+    if not generate:
+        return np.concatenate([numbers, *(_numbers_in(word, parts) for word in words)])
+    every = np.concatenate([np.empty(0, dtype=np.int64), *(rows[:, 0] for _, _, rows in parts.elements)])
+    ranges = np.append(numbers, 1) if len(numbers) == 2 else numbers
+    inside = np.zeros(len(every), dtype=np.bool_)
+    for first, last, step in ranges[: len(ranges) // 3 * 3].reshape(-1, 3).tolist():
+        inside |= (every >= first) & (every <= last) & ((every - first) % max(step, 1) == 0)
+    return every[inside]
+
+
+def _numbers_in(name: str, parts: _Parts) -> IntArray:
+    """Numbers of the elements that a set, or *ELEMENT with its option, has under a name."""
+    named = [rows[:, 0] for _, block, rows in parts.elements if block == name]
+    return np.concatenate([np.empty(0, dtype=np.int64), *named, *parts.sets.get(name, [])])
+
+
+def _marks(parts: _Parts) -> Iterator[Mark]:
+    """Names of elements; a set of cells matters as `chamber` only."""
+    names = dict.fromkeys([*parts.sets, *(name for _, name, _ in parts.elements)])
+    for name in (each for each in names if not _SKIPPED.fullmatch(each)):
+        numbers = _numbers_in(name, parts)
+        for block, (kind, _, rows) in enumerate(parts.elements):
+            if dimension(kind) < 3 or name == "chamber":
+                yield Mark(name=name, block=block, where=np.isin(rows[:, 0], numbers))
+
+
+def _sides(parts: _Parts) -> Iterator[tuple[str, IntArray]]:
+    """Name and facets of each line of a *SURFACE, as numbers of nodes."""
+    for name, first, side in parts.surfaces:
+        one = first.isdigit() and len(first) < 16
+        numbers = np.array([int(first)]) if one else _numbers_in(first, parts)
+        for kind, _, rows in parts.elements:
+            inside = np.isin(rows[:, 0], numbers)
+            if inside.any():
+                yield name, rows[inside, 1:][:, _face(kind, side)]
+
+
+def _face(kind: str, side: str) -> list[int]:
+    """Nodes of a face of a cell, in meshio's order; of a shell, its own."""
+    if kind not in CELL_KINDS:
+        return list(range(_NODES[kind]))
+    there = faces(kind)
+    numbered = _FACES[len(there)]
+    if side not in [f"S{count}" for count in range(1, 1 + len(numbered))]:
+        raise MeshFileError.of(
+            f"*SURFACE names face {side[:9]} of {kind} cells, which have no such face", "S1 to S6"
+        )
+    corners = set(numbered[int(side[1]) - 1])
+    return next(list(each) for each in there if set(each[: len(corners)]) == corners)
+
+
 READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
-    {".msh": _read_gmsh, ".inp": read_abaqus, ".vtu": _read_vtu}
+    {".msh": _read_gmsh, ".inp": _read_abaqus, ".vtu": _read_vtu}
 )
 """By the ending of a file's name."""

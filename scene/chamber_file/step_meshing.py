@@ -14,9 +14,7 @@ from typing import Final
 import gmsh
 
 from ringbalance.scene.chamber_file.record import KNOWN_NAMES
-
-if sys.platform != "win32":
-    import resource
+from ringbalance.scene.platform.memory import bounded_memory
 
 _MEMORY: Final = 4 * 2**30
 _SAME: Final = 1e-6
@@ -49,9 +47,7 @@ def _mesh_step(source: str, target: str, share: float) -> None:
 
 
 def _start() -> None:
-    """Start Gmsh, silent, in metres, with bounded memory where the system can do so."""
-    if sys.platform != "win32":
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    """Start Gmsh, silent and in metres."""
     gmsh.initialize(["gmsh", "-nopopup"], readConfigFiles=False)
     for option, value in (
         ("General.Terminal", 0),
@@ -93,4 +89,5 @@ def _nodes(face: _Entity) -> list[tuple[float, float]]:
 
 
 if __name__ == "__main__":
-    _mesh_step(sys.argv[1], sys.argv[2], float(sys.argv[3]))
+    with bounded_memory(_MEMORY):
+        _mesh_step(sys.argv[1], sys.argv[2], float(sys.argv[3]))

@@ -209,7 +209,7 @@ class _Guarded(_Called):
 @cache
 def _digest() -> str:
     total = hashlib.sha256(numba.__version__.encode())
-    for path in compiled_sources():
+    for path in _compiled_sources():
         total.update(path.read_bytes())
     return total.hexdigest()[:16]
 
@@ -218,7 +218,7 @@ _COMPILED: Final = ("controller", "reduced_model")
 """Folders whose functions are compiled, from the package's root."""
 
 
-def compiled_sources() -> tuple[Path, ...]:
+def _compiled_sources() -> tuple[Path, ...]:
     """Every source that holds functions that are compiled, and the machinery's own."""
     here, root = Path(__file__), Path(__file__).parents[2]
     sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]

@@ -17,7 +17,7 @@ _FORMAT: Final = "%(asctime)s %(levelname)s %(message)s"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Display:
+class _Display:
     """How much of a result and of the work is shown."""
 
     brief: bool = False
@@ -26,12 +26,12 @@ class Display:
     """Neither progress nor messages."""
 
 
-_DISPLAY: Final[ContextVar[Display]] = ContextVar("display")
+_DISPLAY: Final[ContextVar[_Display]] = ContextVar("display")
 
 
-def display() -> Display:
+def display() -> _Display:
     """What holds for the command line that is running; all is shown outside one."""
-    return _DISPLAY.get(Display())
+    return _DISPLAY.get(_Display())
 
 
 class Progress(Protocol):
@@ -76,7 +76,7 @@ def displayed(*, brief: bool, quiet: bool, log: Path | None) -> Iterator[None]:
 
     Raises: OSError: the file cannot be written.
     """
-    token = _DISPLAY.set(Display(brief=brief, quiet=quiet))
+    token = _DISPLAY.set(_Display(brief=brief, quiet=quiet))
     handler = None if log is None else logging.FileHandler(log, encoding="utf-8")
     if handler is not None:
         handler.setFormatter(logging.Formatter(_FORMAT))

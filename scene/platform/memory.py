@@ -1,13 +1,30 @@
-"""A bound on what a block of code may allocate, where the system can see to it: Linux, nothing elsewhere."""
+"""Memory of a process: how often garbage is looked for, and a bound on what a block of code may allocate."""
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
+
+COLLECTED_AT: Final = (50_000, 50, 1000)
+"""Objects between two collections, then collections of one generation for one of the next.  The interpreter's
+own 700, 10, 10 look through all that stays (modules, meshes, results): 4 % of a report's processor time."""
+
+
+@contextmanager
+def seldom_collected() -> Iterator[None]:
+    """Look for garbage more seldom within a block that makes much and keeps most of it."""
+    before = gc.get_threshold()
+    gc.set_threshold(*COLLECTED_AT)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
 
 if sys.platform == "linux":
     import resource

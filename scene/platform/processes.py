@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
 
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.platform.garbage import COLLECTED_AT
+from ringbalance.scene.platform.memory import COLLECTED_AT
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

@@ -10,11 +10,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-_PACKAGES: Final = ("numpy", "scipy", "numba", "fluids", "scikit-fem")
+_PACKAGES: Final = ("numpy", "scipy", "numba", "fluids", "scikit-fem", "pyamg", "meshio")
 """Whose versions may change a number."""
 _ROOMS: Final = (
     *("scene", "results", "mesh", "physics", "reduced_model", "controller", "identification"),
-    *("design", "verification"),
+    *("design", "verification", "scenes"),
 )
 _SUFFIXES: Final = frozenset({".py", ".toml", ".csv", ".json", ".xz"})
 
@@ -25,7 +25,7 @@ def program_digest() -> str:
     known = [
         platform.python_version(),
         platform.machine(),
-        *(f"{name} {_version(name)}" for name in _PACKAGES),
+        *(f"{name} {version_of(name)}" for name in _PACKAGES),
     ]
     found = hashlib.sha256("\n".join(known).encode())
     for room in _ROOMS:
@@ -35,7 +35,8 @@ def program_digest() -> str:
     return found.hexdigest()
 
 
-def _version(name: str) -> str:
+def version_of(name: str) -> str:
+    """Version of an installed package; empty where there is none."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -63,7 +63,7 @@ def results_console() -> Console:
     return _Terminal()
 
 
-def messages_console() -> Console:
+def _messages_console() -> Console:
     """Standard error, for progress and messages; silent where the command line asks for quiet."""
     return _Terminal(stderr=True, quiet=display().quiet)
 
@@ -71,7 +71,7 @@ def messages_console() -> Console:
 def print_message(text: str) -> None:
     """Write to standard error, unless the command line asks for quiet, and to the log."""
     LOG.info("%s", text)
-    messages_console().print(text, markup=False, highlight=False, soft_wrap=True)
+    _messages_console().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def print_error(text: str) -> None:
@@ -113,7 +113,7 @@ def activity(command: str, text: str) -> Iterator[Activity]:
     Yields: The activity, to be kept up to date.
     """
     LOG.info("%s: %s", command, text)
-    console, quiet = messages_console(), display().quiet
+    console, quiet = _messages_console(), display().quiet
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
         shown, ended = Activity(text, bar), Event()

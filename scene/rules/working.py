@@ -119,7 +119,7 @@ def _gas_times_in_order(minimum: float, maximum: float) -> Finding | None:
     )
 
 
-def period_covers_lag(period: float, lag: float) -> Finding | None:
+def _period_covers_lag(period: float, lag: float) -> Finding | None:
     """The sampling period is not shorter than the valve's lag."""
     if period >= lag:
         return None
@@ -190,7 +190,7 @@ CHECKS: tuple[Check, ...] = (
         when=lambda reading: not reading.given(_VAPOUR),
     ),
     check(_gas_times_in_order, *_GAS_TIMES),
-    check(period_covers_lag, "controller.period", "gas.valve_lag"),
+    check(_period_covers_lag, "controller.period", "gas.valve_lag"),
     check(limit_above_noise("amplitude_noise", "um"), "controller.limit", "sensor.amplitude_noise"),
     *(
         check(_trial_time_executed, path, *_GAS_TIMES, when=_by_trial, moot=(_gas_times_in_order,))

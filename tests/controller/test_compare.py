@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.rotor import CommonRotor, one_rotor, rotors_of
-from ringbalance.results.paired import Paired
+from ringbalance.results.requirements import Paired
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.origins import SceneFile
 

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from ringbalance.controller import compiled_loop, loop_records
-from ringbalance.scene.platform.compiled import compiled, compiled_sources
+from ringbalance.scene.platform.compiled import _compiled_sources, compiled
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -99,7 +99,7 @@ def test_every_compiled_functions_source_tells_stale_code() -> None:
     ]
     files = {Path(function.__code__.co_filename).resolve() for function in functions}
     assert "loop_records.py" in {file.name for file in files}
-    assert files <= {path.resolve() for path in compiled_sources()}
+    assert files <= {path.resolve() for path in _compiled_sources()}
 
 
 def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None:

@@ -12,7 +12,13 @@ from ringbalance.controller.balancer import Draws, Outcomes, balancer_of
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.devices import Spread, devices
+from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
+from ringbalance.controller.loop_plan import LoopPlan
+from ringbalance.controller.loop_records import NOTES
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
+from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid, residual_fill_ratio
@@ -126,3 +132,40 @@ def test_static_intervals_are_those_of_the_draws(paper_scene: Scene, calibrated:
     fills = [residual_fill_ratio(each.scene, law=each.model.flow) for each in drawn]
     static = ResidualLiquid.of(paper_scene, law=calibrate(paper_scene).flow_law)
     assert 1.96 * np.std(fills) == pytest.approx(static.fill_ratio_uncertainty, rel=0.2)
+
+
+def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
+    balancer: LiquidRingBalancer, paper_scene: Scene
+) -> None:
+    """Of several devices: a millionth of it later the driven chamber falls below."""
+    chosen = DrawnRuns(
+        scene=paper_scene,
+        model=balancer.model,
+        spread=Spread.of(paper_scene, balancer.model),
+        limit=balancer.limit,
+    )
+    made = tuple(chosen.device(number) for number in range(4))
+    for under in chosen._under(made, paper_scene.gas.pressure):
+        plant, motions, w = under.plant[0], np.zeros(2, dtype=MOTION), np.zeros(WORKSPACE)
+        rest = LoopPlan.of(
+            scene=under.scene,
+            model=under.device.model,
+            plant=under.plant,
+            controller=chosen._setting(0, {}).controller,
+            most_samples=1,
+        )
+        runs = rest.runs(1)
+        runs["speed"], runs["residual_fill"] = 1.0, under.residual
+        begun = np.zeros((1, 2 * rest.pairs + 1), dtype=MOTION)
+        rest._continued(runs, begun, rest.liquid[None], np.zeros((1, 0, 2)), np.zeros(NOTES), w, traced=False)
+        motions[0] = begun[0, 0]
+        longest = opening_within(plant, motions, 0, 1, 0, 5.0, w)
+        assert 0.0 < longest < 5.0
+        fills = []
+        for time in (longest, 1.000001 * longest):
+            motions[1] = motions[0]
+            command(plant, motions[1], 0, time)
+            advance(plant, motions[1], plant["valve_lag"] + time, w, 0, 0, w)
+            fills.append(least_later(plant, motions, 1, w))
+        assert fills[0] >= under.residual > fills[1]
+        assert opening_within(plant, motions, 0, 1, 0, longest / 2, w) == longest / 2

@@ -15,8 +15,7 @@ from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.judging.search import searched
 from ringbalance.design.hunt import _MOST, threshold
 from ringbalance.design.space import Space
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET, OPEN
+from ringbalance.results.requirements import MET, OPEN, Proportion
 from ringbalance.scene.models import Scene
 
 WIDTHS = ("disc.axial_width=14mm,26mm,38mm", "tube.bore=0.9mm", "gas.pressure=0.4MPa")

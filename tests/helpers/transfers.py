@@ -1,5 +1,5 @@
 """One operation of a pair under its flow law alone: by the program's own march, the paper's closed form and
-Eq. 20's explicit segments.
+an adaptive solver.
 
 The driven chamber's fill ratio x obeys dx/dt = -(S/V) u(x_A, x_C, p) with x_C = total - x, which is taken in
 `Drive.opposite` and nowhere else: liquid is conserved by construction.
@@ -184,39 +184,6 @@ def _parabola(drive: Drive, fill: float) -> tuple[float, float, float, bool]:
     if left <= 0.0:
         return u0, slowing, u0 / slowing, True
     return u0, slowing, 2.0 * distance / (u0 + math.sqrt(left)), False
-
-
-def explicit_segments(segments: int) -> Integrator:
-    """An integrator with n equal explicit segments, x_i = x_(i-1) - u_(i-1) S dt/V; first order in dt.
-
-    Near a stall, where u goes like the square root of the distance, a segment may step over it; the law then
-    answers with zero and the fill stays where it landed. Between segments fills lie on the straight line.
-    Source: Eq. 20 of the liquid-ring paper.
-    """
-
-    def integrate(drive: Drive, t: FloatArray) -> Transfer:
-        before = drive.flow(drive.fill, primed=drive.primed)
-        velocity, regime = float(before.velocity), Regime(int(before.regime))
-        if velocity == 0:
-            return drive.still(t, flow=before)
-        edges = np.linspace(0.0, t[-1], segments + 1)
-        x = np.full(segments + 1, drive.fill)
-        event, event_time = Event.NONE, None
-        for i, step in enumerate(np.diff(edges)):
-            x[i + 1 :] = min(max(x[i] - velocity * drive.exchange_rate * step, drive.lowest), drive.highest)
-            end = drive.lowest if velocity > 0 else drive.highest
-            if x[i + 1] == end:
-                event = drive.boundary_event(end)
-            else:
-                velocity = float(drive.flow(x[i + 1]).velocity)
-                event = Event.STALLED if velocity == 0 else Event.NONE
-            if event is not Event.NONE:
-                event_time = float(edges[i + 1])
-                break
-        fill = np.interp(t, edges, x)
-        return drive.finished(t, fill, regime_start=regime, event=event, event_time=event_time)
-
-    return integrate
 
 
 def marched(tube: Tube) -> Integrator:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from ringbalance.identification.criticism import (
     LEVEL,
     NEEDED,
-    Criticism,
-    LawComparison,
-    LinearFit,
+    _Criticism,
+    _LawComparison,
+    _LinearFit,
     _runs_probability,
     summaries,
 )
@@ -28,7 +28,7 @@ PRESSURES = np.tile([0.4, 0.6, 0.8, 1.0, 1.2, 1.4], ROWS // 6)[SHUFFLED]
 FILLS = np.repeat(np.linspace(0.1, 0.4, 10), 6)[SHUFFLED]
 
 
-def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> LinearFit:
+def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> _LinearFit:
     """Least squares with a weak prior on the first parameter as the last row."""
     prior = np.zeros(design.shape[1])
     prior[0] = 0.1
@@ -37,7 +37,7 @@ def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> Line
     if not known:
         residuals[:-1] /= np.sqrt(np.sum(residuals[:-1] ** 2) / (measured.size - design.shape[1]))
     data = np.append(np.ones(measured.size, dtype=np.bool_), False)
-    return LinearFit(
+    return _LinearFit(
         residuals=residuals,
         derivatives=rows,
         block=np.where(data, "transfer mass", ""),
@@ -46,8 +46,8 @@ def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> Line
     )
 
 
-def judged(measured: FloatArray, design: FloatArray, *, known: bool = True) -> Criticism:
-    return Criticism.of(linear_fit(measured, design, known=known))
+def judged(measured: FloatArray, design: FloatArray, *, known: bool = True) -> _Criticism:
+    return _Criticism.of(linear_fit(measured, design, known=known))
 
 
 DESIGN = np.column_stack([np.sqrt(PRESSURES), FILLS])
@@ -95,14 +95,14 @@ def test_degrees_of_freedom_do_not_depend_on_what_parameters_describe(change: tu
 
 
 def test_few_rows_are_not_judged() -> None:
-    few = LinearFit(
+    few = _LinearFit(
         residuals=np.array([1.0, -1.0, 1.0]),
         derivatives=np.ones((3, 1)),
         block=np.array(["flow flow_rate"] * 3),
         known_noise=np.ones(3, dtype=np.bool_),
         turn=np.eye(3),
     )
-    found = Criticism.of(few)
+    found = _Criticism.of(few)
     assert found.describes
     assert found.text.startswith("too few")
 
@@ -126,14 +126,14 @@ def _comparison(true: FloatArray, noise: float) -> Any:
     measured = true + noise * np.random.default_rng(4).standard_normal(24)
     own, other = np.sqrt(pressure), pressure
     factor = float(own @ measured / (own @ own))
-    fit = LinearFit(
+    fit = _LinearFit(
         residuals=(measured - factor * own) / noise,
         derivatives=own[:, None] / noise,
         block=np.array(["flow flow_rate"] * 24),
         known_noise=np.ones(24, dtype=np.bool_),
         turn=np.eye(24),
     )
-    return LawComparison.of(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
+    return _LawComparison.of(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
 
 
 def test_laws_are_told_apart_where_data_allow() -> None:
@@ -148,7 +148,7 @@ def test_laws_are_told_apart_where_data_allow() -> None:
 def test_laws_of_one_outcome_share_a_sentence() -> None:
     """The one that the data prefer comes first, with its consequence."""
     found = [
-        LawComparison(other=name, separation=separation, preference=preference)
+        _LawComparison(other=name, separation=separation, preference=preference)
         for name, separation, preference in [
             ("a", 1.0, 0.0),
             ("b", 99.0, 50.0),

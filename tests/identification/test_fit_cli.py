@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import doc_tables
 import example_measurements
-import generated_docs
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.identification.criticism import Criticism, LawComparison, Review
+from ringbalance.identification.criticism import Review, _Criticism, _LawComparison
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import bundled_scene, load_scene
@@ -114,11 +114,11 @@ def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:
 
 def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values may then be wrong by more than their intervals, so that a script must not go on with them."""
-    better = LawComparison(other="another law", separation=100.0, preference=-50.0)
+    better = _LawComparison(other="another law", separation=100.0, preference=-50.0)
     assert better.outcome == "other"
     words = (PAPER, EXAMPLES["trial_weight"])
     for laws, expected in (((), 0), ((better,), 1)):
-        found = Review(criticism=Criticism(findings=()), laws=laws)
+        found = Review(criticism=_Criticism(findings=()), laws=laws)
         monkeypatch.setattr(Review, "of", lambda _, found=found: found)
         code, out, _ = run(*words)
         assert code == expected
@@ -234,8 +234,8 @@ def test_what_cannot_be_fitted_is_refused(words: list[str], told: str, run: Run)
 
 
 def test_the_page_has_every_kind_and_its_example_can_be_read(paper_scene: Scene) -> None:
-    page = generated_docs.text_of("docs/fit.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/fit.md"]()) == page
+    page = doc_tables.text_of("docs/fit.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/fit.md"]()) == page
     example = page.split("## Files of measurements")[1].split("```")[1].lstrip("\n")
     found, faults = observations_of(example.encode(), file="example", scene=paper_scene)
     assert faults == ()

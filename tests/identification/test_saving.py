@@ -13,7 +13,7 @@ from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.fitting import FittedParameter
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import Profile
-from ringbalance.identification.saving import fitted_scene
+from ringbalance.identification.saving import _fitted_scene
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene, scene_from
 from ringbalance.scene.changes import document_of, file_text
 from ringbalance.scene.describe import scene_table
@@ -48,7 +48,7 @@ def read_again(scene: AnyScene) -> AnyScene:
 def saved(name: str, *parameters: FittedParameter) -> AnyScene:
     """A bundled scene with fitted values, written and read again."""
     scene = load_scene(bundled_scene(name))
-    return read_again(fitted_scene(scene, fitted=parameters, files=[FILE]))
+    return read_again(_fitted_scene(scene, fitted=parameters, files=[FILE]))
 
 
 BORE = fitted("tube.bore", 1.4e-3, 0.02e-3)
@@ -58,7 +58,7 @@ FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=No
 def test_values_uncertainties_and_origins() -> None:
     lag = fitted("rotor.lag_angle", -0.01, 0.05)
     loss = fitted("tube.extra_loss", 2.0, 0.5, verdict=Identified.PRACTICALLY)
-    result = fitted_scene(
+    result = _fitted_scene(
         load_scene(bundled_scene("liquid_ring_paper")),
         fitted=[BORE, FACTOR, lag, loss],
         files=[FILE],
@@ -143,6 +143,6 @@ def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
 
 def test_a_mesh_is_found_from_another_folder(tmp_path: Path) -> None:
     before = load_scene(bundled_scene("imported_chamber"))
-    content = file_text(fitted_scene(before, fitted=[], files=[FILE]), to=tmp_path)
+    content = file_text(_fitted_scene(before, fitted=[], files=[FILE]), to=tmp_path)
     (tmp_path / "disc.toml").write_bytes(content)
     assert load_scene(tmp_path / "disc.toml").values_sha256 == before.values_sha256

@@ -11,8 +11,8 @@ import pyvista
 from skfem import Mesh
 
 from ringbalance.mesh.chamber import chamber_mesh
-from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import liquid_area
+from ringbalance.reports.pictures.fields import _write_vtu
 from ringbalance.scene.models import Disc
 
 
@@ -23,7 +23,7 @@ def test_round_trip(
     chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=cells)
     mesh = chamber.mesh
     field = np.arange(chamber.grid.size) * 0.1
-    path = write_vtu(tmp_path / "a" / "ring.vtu", mesh=mesh, fields={"pressure": field})
+    path = _write_vtu(tmp_path / "a" / "ring.vtu", mesh=mesh, fields={"pressure": field})
     data: list[Any] = ["point_data"]
     stored = Mesh.load(path, out=data)
     np.testing.assert_array_equal(stored.doflocs, mesh.doflocs)
@@ -39,7 +39,7 @@ def test_vtk_measures_the_liquid_and_not_its_mirror_image(disc: Disc, tmp_path: 
     area = float(liquid_area(disc=disc, surface_radius=35e-3))
     for cells, size in (((8, 24), area), ((8, 24, 2), area * disc.axial_width)):
         chamber = chamber_mesh(disc=disc, surface_radius=35e-3, cells=cells)
-        path = write_vtu(tmp_path / "ring.vtu", mesh=chamber.mesh.scaled(chamber.length_scale))
+        path = _write_vtu(tmp_path / "ring.vtu", mesh=chamber.mesh.scaled(chamber.length_scale))
         grid = pyvista.read(path)
         measured = grid.area if len(cells) == 2 else grid.volume
         # VTK measures quadratic cells by their linear parts.

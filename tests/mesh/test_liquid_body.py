@@ -8,7 +8,7 @@ from block_discs import sector_chamber
 
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.mesh.liquid_body import jacobians, liquid_body
+from ringbalance.mesh.liquid_body import _jacobians, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import (
     Tetrahedra,
     face_nodes,
@@ -44,7 +44,7 @@ def test_it_holds_the_volume_outside_the_surface(kind: CellKind, radius: float) 
     mesh = scikit_fem_mesh(body)
     # Quadratic edges leave their arcs by R (angle / 2)^4 / 32: 2e-7 R here, over a depth of at least 0.04 R.
     assert quadratic_basis(mesh).dx.sum() == pytest.approx(exact, rel=2e-5)
-    assert jacobians(body).min() > 0
+    assert _jacobians(body).min() > 0
     assert np.abs(np.hypot(*_surface(body)[:, :2].T) - radius).max() < 1e-9
     areas = {name: side(mesh, name).weights.sum() for name in mesh.boundaries}
     assert areas[FREE_SURFACE] == pytest.approx(_ANGLE * radius * _WIDTH, rel=2e-5)
@@ -75,7 +75,7 @@ def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fi
     # Where a fillet leaves no room in a flat cell, the surface stays nearly straight over up to 7 mm: 0.16 mm
     # off on average, of 4.6 mm, over a tenth of it.
     assert quadratic_basis(scikit_fem_mesh(body)).dx.sum() == pytest.approx(exact, rel=3e-3)
-    assert jacobians(body).min() > 0
+    assert _jacobians(body).min() > 0
 
 
 def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:

@@ -10,8 +10,8 @@ from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import (
     BentTubeFlow,
     Segment,
+    _rotation_with_curvature,
     bend_shift,
-    rotation_with_curvature,
 )
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
@@ -125,7 +125,7 @@ def test_a_turning_bend_is_curvature_added_to_rotation(turn: float) -> None:
 
 def test_curvature_counts_as_rotation() -> None:
     # 2 omega' U = 2 omega U + (4/3) U^2/r with Re = U d/nu, R = omega d^2/nu.
-    assert rotation_with_curvature(reynolds=150.0, rotation_reynolds=40.0, curvature=0.5) == pytest.approx(
+    assert _rotation_with_curvature(reynolds=150.0, rotation_reynolds=40.0, curvature=0.5) == pytest.approx(
         40.0 + 4 / 3 * 150.0 * 0.25
     )
     against, along, gentle = (

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
-from ringbalance.physics.tube.draw_down import draw_down_depth
+from ringbalance.physics.tube.draw_down import _draw_down_depth
 from ringbalance.scene.arrays import FloatArray
 
 PULL = 4.88e4
@@ -23,7 +23,7 @@ def _rate(froude: float) -> float:
 
 
 def _depth(froude: float) -> float:
-    return float(draw_down_depth(flow_rate=_rate(froude), acceleration=PULL, bore=BORE))
+    return float(_draw_down_depth(flow_rate=_rate(froude), acceleration=PULL, bore=BORE))
 
 
 @pytest.mark.parametrize("froude", [1.5, 4.0, 20.0])
@@ -63,7 +63,7 @@ def test_the_two_laws_join_without_a_jump() -> None:
 
 def test_a_viscous_layer_is_deeper_by_the_head_that_feeds_the_port() -> None:
     nu, rate, feed = 3.5e-4, 5e-6, 37e-3
-    near = float(draw_down_depth(flow_rate=rate, acceleration=PULL, bore=BORE))
+    near = float(_draw_down_depth(flow_rate=rate, acceleration=PULL, bore=BORE))
     start = max(near, BORE / 2)
 
     def slope(s: float, y: FloatArray) -> FloatArray:
@@ -72,7 +72,7 @@ def test_a_viscous_layer_is_deeper_by_the_head_that_feeds_the_port() -> None:
 
     layer = solve_ivp(slope, (start, feed), [near], rtol=1e-10, atol=1e-15, dense_output=True).sol
     inside, outside = near * start**2, quad(lambda s: float(layer(s)[0]) * 2 * s, start, feed)[0]
-    depth = draw_down_depth(
+    depth = _draw_down_depth(
         flow_rate=rate, acceleration=PULL, bore=BORE, kinematic_viscosity=nu, feed_radius=feed
     )
     assert float(depth) / near > 1.3
@@ -83,7 +83,7 @@ def test_a_viscous_layer_is_deeper_by_the_head_that_feeds_the_port() -> None:
 def test_liquid_below_the_port_feeds_it_with_less_head() -> None:
     on_the_wall, above = (
         float(
-            draw_down_depth(
+            _draw_down_depth(
                 flow_rate=5e-6,
                 acceleration=PULL,
                 bore=BORE,
@@ -94,5 +94,5 @@ def test_liquid_below_the_port_feeds_it_with_less_head() -> None:
         )
         for below in (0.0, 5e-3)
     )
-    inviscid = float(draw_down_depth(flow_rate=5e-6, acceleration=PULL, bore=BORE))
+    inviscid = float(_draw_down_depth(flow_rate=5e-6, acceleration=PULL, bore=BORE))
     assert inviscid < above < inviscid + 0.02 * (on_the_wall - inviscid)

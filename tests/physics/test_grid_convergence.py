@@ -1,9 +1,6 @@
-"""Grid convergence: the published worked examples, sequences whose limit is known, and those with no
-order."""
+"""Grid convergence: sequences whose limit is known, and those with no order; a case has published ones."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,49 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.physics.convergence import GridVerdict, gci
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column of Table 1 of Celik et al. (2008), doi:10.1115/1.2960953, with its printed results."""
-
-    phi: tuple[float, float, float]
-    r21: float
-    r32: float
-    p: float
-    limit: float
-    approximate_pct: float
-    extrapolated_pct: float
-    gci_pct: float
-    oscillates: bool = False
-
-
-# 18000, 8000 and 4500 cells in two dimensions: the printed r32 of 1.333 stands for 4/3.
-REATTACHMENT = Column((6.063, 5.972, 5.863), 1.5, 4 / 3, 1.53, 6.1685, 1.5, 1.7, 2.2)
-SLOW = Column((10.788, 10.725, 10.605), 2.0, 2.143, 0.75, 10.8801, 0.6, 0.9, 1.1)
-OSCILLATORY = Column((6.0042, 5.9624, 6.0909), 2.0, 2.143, 1.51, 6.0269, 0.7, 0.4, 0.5, True)
-
-
-@pytest.mark.parametrize("column", [REATTACHMENT, SLOW, OSCILLATORY])
-def test_celik_2008_table_1(column: Column) -> None:
-    """The printed results of the three columns, within half a unit of their last digit.
-
-    The extrapolated error of the slow column is printed as 0.9 % where its own limit of 10.8801 gives 0.847
-    %: a rounding on the way, so percentages have a whole unit of their last digit.
-    """
-    sizes = (1.0, column.r21, column.r21 * column.r32)
-    found = gci(values=column.phi, sizes=sizes, formal_order=2.0)
-    assert found.observed_order == pytest.approx(column.p, abs=5e-3)
-    assert found.extrapolated == pytest.approx(column.limit, abs=5e-4)
-    assert 100 * found.approximate_error == pytest.approx(column.approximate_pct, abs=0.1)
-    assert 100 * found.extrapolated_error == pytest.approx(column.extrapolated_pct, abs=0.1)
-    assert 100 * found.index == pytest.approx(column.gci_pct, abs=0.1)
-    assert (found.verdict is GridVerdict.OSCILLATORY) == column.oscillates
-
-
-def test_celik_2008_slow_column_is_not_called_asymptotic() -> None:
-    sizes = (1.0, SLOW.r21, SLOW.r21 * SLOW.r32)
-    assert gci(values=SLOW.phi, sizes=sizes, formal_order=2.0).verdict is GridVerdict.NOT_ASYMPTOTIC
 
 
 def sequence(order: float, sizes: tuple[float, ...], scale: float = 0.1) -> list[float]:

@@ -136,56 +136,7 @@ def test_cylinder_drag_within_5e_5_at_20000_unknowns() -> None:
     assert abs(pressure) < 2e-3
 
 
-def _manufactured(space_points: np.ndarray) -> np.ndarray:
-    x, y = space_points
-    u, v = np.sin(np.pi * y), np.sin(np.pi * x)
-    return np.stack([u, v, np.cos(np.pi * x) * np.sin(np.pi * y)])
-
-
 CORIOLIS = np.array([[0.0, 0.3, 2.0], [0.0, 0.0, -1.0], [-2.0, 1.0, 0.0]])
-
-
-def _component(number: int, points: np.ndarray) -> np.ndarray:
-    """One component of the manufactured velocity."""
-    return np.asarray(_manufactured(points)[number])
-
-
-def _manufactured_force(points: np.ndarray) -> np.ndarray:
-    """Right-hand side for p = x^2 y, inertia 2, viscosity 0.1."""
-    x, y = points
-    u, v, w = _manufactured(points)
-    carried = np.stack(
-        [
-            v * np.pi * np.cos(np.pi * y),
-            u * np.pi * np.cos(np.pi * x),
-            -u * np.pi * np.sin(np.pi * x) * np.sin(np.pi * y)
-            + v * np.pi * np.cos(np.pi * x) * np.cos(np.pi * y),
-        ]
-    )
-    turning = np.einsum("cd,d...->c...", CORIOLIS, np.stack([u, v, w]))
-    gradient = np.stack([2 * x * y, x**2, np.zeros_like(x)])
-    diffusion = -0.1 * np.pi**2 * np.stack([u, v, 2 * w])
-    return np.asarray(2 * carried + turning + gradient - diffusion)
-
-
-def test_three_components_with_coriolis_converge_at_third_order() -> None:
-    errors = []
-    for cells in (4, 8):
-        conditions = [Dirichlet(boundary="wall", component=c, value=partial(_component, c)) for c in range(3)]
-        system = FlowSystem.of(
-            mesh=_square(cells),
-            components=3,
-            conditions=conditions,
-            enclosed=True,
-            body_force=_manufactured_force,
-        )
-        solution = solve_flow(
-            system=system, coefficients=Coefficients(inertia=2.0, viscosity=0.1, rotation=CORIOLIS)
-        )
-        assert solution.status.ok
-        errors.append(np.abs(solution.velocity - _manufactured(system.nodes)).max())
-    assert np.log2(errors[0] / errors[1]) > 2.7
-    assert errors[1] < 1.2e-3
 
 
 def _random_system() -> tuple[FlowSystem, np.ndarray]:

@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
-from ringbalance.physics.pressure.surface import find_surface, refined_surface, solve_with_gravity
+from ringbalance.physics.pressure.surface import _find_surface, refined_surface, solve_with_gravity
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.finite_elements import mutated_force
 
 G = 9.80665
 
@@ -60,30 +59,6 @@ def test_the_surface_is_a_circle_about_minus_g_over_omega_squared(
     assert mismatch[-1] < 5e-7
 
 
-@pytest.mark.parametrize("speed", [500.0, 3000.0])
-def test_the_surface_is_a_paraboloid_about_a_vertical_shaft(disc: Disc, speed: float) -> None:
-    liquid, spread = along(speed), []
-    for cells in ((2, 6, 1), (4, 12, 2), (8, 24, 4)):
-        solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=0.3, cells=cells)
-        assert solution.status.ok
-        spread.append(float(np.ptp(level(solution, liquid))) / disc.outer_radius)
-        assert abs(solution.statistics.extra["volume_error"]) < 1e-14
-    assert np.all(np.log2(np.array(spread[:-1]) / spread[1:]) > 2.5), spread
-    assert spread[-1] < 3e-6
-    below, above = solution.chamber.surface_radius[:, 0], solution.chamber.surface_radius[:, -1]
-    assert np.all(below < above)
-
-
-def test_pressure_with_gravity_is_that_of_the_isobars(disc: Disc) -> None:
-    liquid = across(600.0, 0.9)
-    solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=0.4, cells=(8, 24))
-    omega = liquid.angular_velocity
-    x, y = solution.chamber.places + np.array(liquid.gravity)[:, None] / omega**2
-    mean = float(np.mean(level(solution, liquid)))
-    exact = 500.0 * omega**2 * (x**2 + y**2 - mean**2)
-    np.testing.assert_allclose(solution.pressure, exact, atol=1e-6 * exact.max())
-
-
 def test_a_film_of_micrometres_is_found_at_high_speed(disc: Disc) -> None:
     depth = 5e-6
     fill = 2 * depth * disc.outer_radius / (disc.outer_radius**2 - disc.inner_radius**2)
@@ -120,23 +95,14 @@ def test_axial_gravity_that_empties_one_end_is_no_ring(disc: Disc) -> None:
 
 def test_a_start_from_the_coarser_mesh_leads_to_the_same_surface(disc: Disc) -> None:
     liquid = across(500.0, 1.0)
-    coarse = find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(4, 12))
-    cold = find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24))
+    coarse = _find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(4, 12))
+    cold = _find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24))
     start = refined_surface(coarse.chamber.surface_radius)
-    warm = find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24), start=start)
+    warm = _find_surface(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24), start=start)
     assert warm.statistics.iterations < cold.statistics.iterations
     np.testing.assert_allclose(
         warm.chamber.surface_radius, cold.chamber.surface_radius, atol=1e-9 * disc.outer_radius
     )
-
-
-@pytest.mark.parametrize("direction", ["along", "across"])
-def test_a_deliberate_fault_bends_the_surface(disc: Disc, direction: str) -> None:
-    liquid = across(1000.0, 0.5)
-    with mutated_force(**{direction: 1.01}):
-        solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=0.3, cells=(8, 24))
-    spread = float(np.ptp(level(solution, liquid))) / disc.outer_radius
-    assert spread > 1e-4
 
 
 @given(fill=st.floats(0.1, 0.9), angle=st.floats(0.0, np.pi), speed=st.floats(800.0, 20_000.0))
@@ -152,7 +118,7 @@ def test_opposite_angles_give_mirror_images(fill: float, angle: float, speed: fl
         initial_fill=0.25,
     )
     first, second = (
-        find_surface(disc=disc, liquid=across(speed, sign * angle), fill_ratio=fill, cells=(2, 6))
+        _find_surface(disc=disc, liquid=across(speed, sign * angle), fill_ratio=fill, cells=(2, 6))
         for sign in (1, -1)
     )
     assert first.status.ok

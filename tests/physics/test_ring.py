@@ -19,7 +19,6 @@ from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.finite_elements import mutated_force
 
 RHO, OMEGA = 1000.0, 10_000 * np.pi / 30
 FILLS = np.linspace(0.0, 0.5, 11)
@@ -118,29 +117,6 @@ def test_an_empty_chamber_is_exact(disc: Disc, paper_ring: RingQuantities) -> No
     assert film.moment_per_volume.value[0] == pytest.approx(limit, rel=1e-6)
 
 
-def test_three_dimensions_agree_with_two(disc: Disc) -> None:
-    arguments: dict[str, Any] = {
-        "disc": disc,
-        "density": RHO,
-        "angular_velocity": OMEGA,
-        "fill_ratio": [0.25],
-    }
-    flat = ring_quantities(**arguments)
-    deep = ring_quantities(**arguments, dimension=3)
-    for name in QUANTITIES:
-        one, other = getattr(flat, name), getattr(deep, name)
-        gap = abs(one.value[0] - other.value[0])
-        assert gap <= one.uncertainty[0] + other.uncertainty[0]
-
-
-@pytest.mark.parametrize("direction", ["along", "across"])
-def test_a_deliberate_fault_leaves_the_half_width(disc: Disc, direction: str) -> None:
-    with mutated_force(**{direction: 1.01}):
-        ring = ring_quantities(disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.25])
-    exact = closed_forms(disc, 0.25, RHO, OMEGA)["wall_pressure"]
-    assert abs(ring.wall_pressure.value[0] - exact) > 10 * ring.wall_pressure.uncertainty[0]
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -226,8 +202,3 @@ def judge(ratios: Mapping[str, FloatArray]) -> None:
 
 def test_half_widths_cover_and_are_not_padded() -> None:
     judge(coverage(20, seed=1))
-
-
-@pytest.mark.heavy
-def test_half_widths_cover_and_are_not_padded_on_many_discs() -> None:
-    judge(coverage(200, seed=2))

@@ -17,8 +17,8 @@ from rotating_friction_table import columns, run_column, settings_hash, table_se
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.rotation_table import (
-    friction_table,
-    ito_nanbu_laminar,
+    _friction_table,
+    _ito_nanbu_laminar,
     rotating_friction_ratio,
     rotation_table_covers,
     slow_first,
@@ -40,37 +40,6 @@ from ringbalance.verification.navier_stokes.tube import (
 @cache
 def _system(around: int = 8, wall_ratio: float = 15.0) -> FlowSystem:
     return SectionMesh(around=around, across=3 * around // 2, wall_ratio=wall_ratio).system()
-
-
-def _still(system: FlowSystem) -> float:
-    return friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
-
-
-def test_tube_at_rest_has_hagen_and_poiseuilles_friction() -> None:
-    assert _still(_system()) == pytest.approx(1.0, abs=5e-7)
-
-
-def test_slow_rotation_without_inertia_follows_the_series() -> None:
-    flow = solve_section_without_inertia(system=_system(), rotation_reynolds=1.0)
-    assert friction_ratio(flow) - _still(_system()) == pytest.approx(1 / 9216, rel=1e-3)
-
-
-@pytest.mark.parametrize("kl", [20.0, 60.0])
-def test_slow_rotation_with_inertia_follows_the_series(kl: float) -> None:
-    flow = solve_section(system=_system(), kl=kl, s=0.0)
-    expected = kl**2 / 16515072
-    # The next term of the series is of the order of the square of this one.
-    assert friction_ratio(flow) - _still(_system()) == pytest.approx(expected, rel=0.002 + 20 * expected)
-
-
-def test_fast_rotation_without_inertia_tends_to_the_exact_limit() -> None:
-    gaps = []
-    for rotation in (1e3, 1e4, 1e5):
-        flow = solve_section_without_inertia(system=_system(10), rotation_reynolds=rotation)
-        gaps.append(friction_ratio(flow) / (0.07863 * np.sqrt(rotation)) - 1)
-    # The gap falls as the thickness of the Ekman layer, R^(-1/2).
-    assert gaps[0] / gaps[1] == pytest.approx(np.sqrt(10), rel=0.15)
-    assert gaps[2] == pytest.approx(gaps[1] / np.sqrt(10), abs=0.005)
 
 
 def _followed(kl: float, s: float, around: int) -> float:
@@ -125,7 +94,7 @@ def test_the_committed_table_is_whole() -> None:
 
 
 def test_the_table_is_fine_enough() -> None:
-    table = friction_table()
+    table = _friction_table()
     inner = [r for r in table.rows if r["table"] == "slow" and float(r["a"]) <= slow_first(1e6)]
     assert max(float(r["uncertainty"]) / float(r["fine"]) for r in inner) < 1e-3
     assert table.interpolation_error < 2e-3
@@ -134,7 +103,7 @@ def test_the_table_is_fine_enough() -> None:
 
 @pytest.mark.parametrize(("a", "b"), [(3, 4), (9, 10)])
 def test_points_of_the_table_come_out_again(a: int, b: int) -> None:
-    settings, table = table_settings(), friction_table()
+    settings, table = table_settings(), _friction_table()
     place = (settings.slow_a[a], settings.slow_b[b])
     row = next(r for r in table.rows if r["table"] == "slow" and (float(r["a"]), float(r["b"])) == place)
     kl, s = 300 * np.expm1(place[0]), place[1] / (1 - place[1])
@@ -144,7 +113,7 @@ def test_points_of_the_table_come_out_again(a: int, b: int) -> None:
 @pytest.mark.heavy
 @pytest.mark.parametrize("index", range(len(columns(table_settings()))))
 def test_every_point_of_the_table_comes_out_again(index: int, tmp_path: Path) -> None:
-    settings, table = table_settings(), friction_table()
+    settings, table = table_settings(), _friction_table()
     column = columns(settings)[index]
     assert run_column(column=column, folder=tmp_path, settings=settings) == len(column.points)
     assert run_column(column=column, folder=tmp_path, settings=settings) == 0
@@ -239,7 +208,7 @@ def test_ito_and_nanbus_formula_holds_for_slow_rotation_only() -> None:
 
     def gap(s: float) -> float:
         value = rotating_friction_ratio(reynolds=np.sqrt(kl / s), rotation_reynolds=np.sqrt(kl * s)).value
-        return float(np.abs(ito_nanbu_laminar(kl=kl) / value - 1).max())
+        return float(np.abs(_ito_nanbu_laminar(kl=kl) / value - 1).max())
 
     assert gap(0.05) < 0.03
     assert gap(0.5) < 0.08

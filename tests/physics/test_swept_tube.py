@@ -7,13 +7,13 @@ import pytest
 from skfem import Basis, ElementHex2, FacetBasis
 
 from ringbalance.verification.navier_stokes.tube import SectionMesh
-from ringbalance.verification.reference.bent_tube import Segment, SweptTube, swept_tube
+from ringbalance.verification.reference.bent_tube import Segment, _SweptTube, swept_tube
 
 BEND = Segment(length=np.pi, turn=-np.pi / 2, cells=4)
 PATH = (Segment(length=1.5, cells=2, ratio=0.5), BEND, Segment(length=2.0, cells=2))
 
 
-def _tube() -> SweptTube:
+def _tube() -> _SweptTube:
     return swept_tube(section=SectionMesh(around=2, across=2, wall_ratio=3.0).mesh(), segments=PATH)
 
 

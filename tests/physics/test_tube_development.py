@@ -15,11 +15,11 @@ from scipy.special import jv, roots_jacobi
 from ringbalance.physics.tube.local_losses import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
 from ringbalance.physics.tube.loss import (
     DEVELOPMENT_SHARE,
+    _development_uncertainty,
     developing_length,
-    development_uncertainty,
 )
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.verification.cases.sections import decay_length, slowest_decay
+from ringbalance.verification.cases.sections import _decay_length, _slowest_decay
 from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.tube import (
@@ -53,7 +53,7 @@ def test_creeping_end_effect_has_the_exact_axisymmetric_rate() -> None:
 
     exact = 2 * complex(*root(equation, [4.5, 1.5]).x)
     assert exact == pytest.approx(2 * (4.4663 + 1.4675j), abs=1e-3)  # as printed in the literature
-    rates = slowest_decay(system=section(), reynolds=0.0, rotation_reynolds=0.0, count=12)
+    rates = _slowest_decay(system=section(), reynolds=0.0, rotation_reynolds=0.0, count=12)
     assert np.min(np.abs(rates + exact)) < 2e-3 * abs(exact)
 
 
@@ -97,7 +97,7 @@ def _axisymmetric_rates(re: float, order: int = 40) -> Array:
 
 
 def test_disturbed_poiseuille_flow_has_the_rate_of_a_spectral_solution() -> None:
-    rates = slowest_decay(system=section(), reynolds=100.0, rotation_reynolds=0.0, count=6)
+    rates = _slowest_decay(system=section(), reynolds=100.0, rotation_reynolds=0.0, count=6)
     spectral = _axisymmetric_rates(100.0)
     slowest = max(rate.real for rate in spectral if rate.real < -0.05 and abs(rate.imag) < 1e-6)
     assert np.min(np.abs(rates - slowest)) < 2e-3 * abs(slowest)
@@ -133,7 +133,7 @@ def test_the_coefficient_of_fast_rotation_is_that_of_geostrophic_flow() -> None:
 
 @pytest.mark.parametrize(("re", "rotation"), [(0.0, 100.0), (100.0, 0.0), (100.0, 100.0), (20.0, 200.0)])
 def test_developing_length_bounds_the_slowest_decay(re: float, rotation: float) -> None:
-    length = decay_length(section(), re, rotation)
+    length = _decay_length(section(), re, rotation)
     assert length <= 1.05 * bound(re, rotation) <= 1.05 * 3 * length
 
 
@@ -143,7 +143,7 @@ def test_developing_length_bounds_the_slowest_decay_everywhere(rotation: float) 
     fine = section(8, 12, 20.0)
     for re in (0.0, 3.0, 30.0, 300.0, 2000.0):
         if re * rotation <= 3e5:
-            length = decay_length(fine, re, rotation)
+            length = _decay_length(fine, re, rotation)
             assert length <= 1.05 * bound(re, rotation) <= 1.05 * 3 * length, (re, rotation)
 
 
@@ -175,7 +175,7 @@ def test_kinetic_factor_has_its_exact_ends() -> None:
 
 def test_what_development_adds_never_exceeds_rotations_share() -> None:
     lengths = np.geomspace(1e-3, 1e3, 50)
-    spread = development_uncertainty(length=0.1, bore=1e-3, developing=lengths, rotation_loss=-8.0)
+    spread = _development_uncertainty(length=0.1, bore=1e-3, developing=lengths, rotation_loss=-8.0)
     assert np.all(np.diff(spread) > 0)
     assert spread[-1] == pytest.approx(8.0, rel=0.06)
     assert spread[0] == pytest.approx(8 * DEVELOPMENT_SHARE * 1e-5, rel=1e-6)

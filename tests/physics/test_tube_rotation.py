@@ -9,8 +9,8 @@ from numpy.polynomial import chebyshev
 from scipy.linalg import solve, toeplitz
 
 from ringbalance.physics.tube.friction import (
+    _curved_friction_ratio,
     critical_reynolds,
-    curved_friction_ratio,
     turbulent_friction_ratio,
     turbulent_ratio_uncertainty,
 )
@@ -182,7 +182,7 @@ def test_literature_turbulent_formula_of_ito_and_nanbu() -> None:
 def test_literature_curved_tube_of_mori_and_nakayama() -> None:
     re, ratio_of_diameters = 2e4, 0.05
     published = helical_turbulent_fd_Mori_Nakayama(re, 1.0, 1 / ratio_of_diameters)
-    found = float(curved_friction_ratio(curvature_number=re * ratio_of_diameters**2))
+    found = float(_curved_friction_ratio(curvature_number=re * ratio_of_diameters**2))
     assert found == pytest.approx(published / (0.3164 * re**-0.25), rel=1e-9)
 
 
@@ -194,12 +194,12 @@ def test_turbulent_half_width_reaches_from_no_effect_to_the_curved_tube() -> Non
     low, high = found - width, found + width
     for other in (
         1.0,
-        curved_friction_ratio(curvature_number=kt),
-        curved_friction_ratio(curvature_number=kt / 4),
+        _curved_friction_ratio(curvature_number=kt),
+        _curved_friction_ratio(curvature_number=kt / 4),
     ):
         assert np.all((low <= other + 1e-12) & (high >= other - 1e-12))
     # The recalled formula lies near the analogy, which shares nothing with it but the physics.
     strong = kt > 10
-    assert np.max(np.abs(found / curved_friction_ratio(curvature_number=kt / 4) - 1)[strong]) < 0.06
+    assert np.max(np.abs(found / _curved_friction_ratio(curvature_number=kt / 4) - 1)[strong]) < 0.06
     assert np.max((width / (found - 1))[strong]) < 1.5
     assert float(turbulent_ratio_uncertainty(reynolds=1e4, rotation_reynolds=0.0)) == 0.0

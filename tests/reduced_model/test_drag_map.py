@@ -13,7 +13,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reports.pages.drag_map import DragMap, liquids_in_tube, velocity_paper
+from ringbalance.reports.pages.drag_map import DragMap, _velocity_paper, liquids_in_tube
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
@@ -105,7 +105,7 @@ def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calib
     nu, bore = drag.kinematic_viscosity[25], drag.bores_for(drag.point.apparent_k)[25]
     assert bore is not None
     one = DragMap.of(calibration=calibration, bore=[bore], kinematic_viscosity=[nu])
-    printed = velocity_paper(calibration.scene.liquid.density, calibration.scene.gas.pressure)
+    printed = _velocity_paper(calibration.scene.liquid.density, calibration.scene.gas.pressure)
     assert printed / one.point.velocity[0, 0] == pytest.approx(1, abs=2e-3)
     np.testing.assert_allclose(
         printed / drag.point.velocity, np.sqrt((drag.point.apparent_k + 1) / 51), rtol=1e-10

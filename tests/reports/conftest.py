@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
-from golden_pages import page_text
 from matplotlib.figure import Figure
+from report_texts import page_text
 
 from ringbalance.reports.page import page_content, render, render_pages
 from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of

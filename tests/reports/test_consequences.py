@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.reports import summary
 from ringbalance.reports.page import render
-from ringbalance.reports.pages.consequences import SECTION
+from ringbalance.reports.pages.loop import CONSEQUENCES
 
 Record = dict[str, Any]
 Said = Callable[[Record, str], str]
@@ -40,7 +40,7 @@ def test_both_laws_stand_beside_each_other(evidence: Record, said: Said) -> None
 def test_the_page_has_the_section_only_with_its_evidence(evidence: Record) -> None:
     without = {key: value for key, value in evidence.items() if key != "consequences"}
     assert "consequences-title" not in render(without)["annex.html"]
-    assert SECTION.view({}) is None
+    assert CONSEQUENCES.view({}) is None
 
 
 @pytest.mark.usefixtures("unwritten")

@@ -14,8 +14,8 @@ import pytest
 
 from ringbalance.reports.page import render
 from ringbalance.reports.pages.cases import LONG, is_long, table_file
-from ringbalance.reports.pages.standing import evidence_text, symbols_and_sources
-from ringbalance.reports.report import csv_tables
+from ringbalance.reports.pages.standing import _symbols_and_sources, evidence_text
+from ringbalance.reports.report import _csv_tables
 from ringbalance.reports.saved import provenance
 
 Record = dict[str, Any]
@@ -35,7 +35,7 @@ def test_symbols_are_those_of_the_glossary() -> None:
         if line.startswith("|")
     ]
     for balancer in ("liquid_ring", "eccentric_mass"):
-        symbols = symbols_and_sources()[balancer]["symbols"]
+        symbols = _symbols_and_sources()[balancer]["symbols"]
         assert len(symbols) > 5
         assert [entry for entry in symbols if (entry[2], entry[0], entry[1]) not in rows] == []
 
@@ -76,7 +76,7 @@ def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
     case = evidence["verification"][0]
     case["tables"] = [table, short]
     assert (is_long(table), is_long(short)) == (True, False)
-    found = csv_tables(evidence)
+    found = _csv_tables(evidence)
     assert table_file(case, table) == "claim_01_settled_after__by_period.csv"
     rows = list(csv.reader(io.StringIO(found[table_file(case, table)])))
     assert rows[0] == ["period [s]", "ending [1]"]

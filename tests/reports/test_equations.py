@@ -7,7 +7,7 @@ import lzma
 import re
 from xml.etree import ElementTree
 
-import generated_docs
+import doc_tables
 import pytest
 import typesetting
 
@@ -26,9 +26,9 @@ def test_every_equation_is_set_in_the_text_colour(name: str) -> None:
 
 
 def test_the_kept_equations_are_those_of_the_program_as_set_today() -> None:
-    kept, now = generated_docs.EQUATIONS.read_bytes(), generated_docs.equations()
+    kept, now = doc_tables.EQUATIONS.read_bytes(), doc_tables.equations()
     same = json.loads(lzma.decompress(kept)) == json.loads(lzma.decompress(now))
-    assert same, "run tools/generated_docs.py --write"
+    assert same, "run tools/generate.py --write docs"
 
 
 def test_glyphs_are_shared_and_all_found() -> None:

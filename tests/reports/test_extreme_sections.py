@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ringbalance.reports.pages import chamber
-from ringbalance.reports.pages.studies import EXTREMES
+from ringbalance.reports.pages.cases import EXTREMES
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
 

@@ -11,19 +11,19 @@ import pytest
 from skfem import Mesh
 
 from ringbalance.reports.pictures.fields import (
-    ChamberField,
+    _ChamberField,
     chamber_field,
 )
 from ringbalance.scene import Scene
 
 
 @pytest.fixture(scope="module")
-def field(paper_scene: Scene) -> ChamberField:
+def field(paper_scene: Scene) -> _ChamberField:
     """The paper's disc, its chamber half full."""
     return chamber_field(paper_scene, fill_ratio=0.5)
 
 
-def test_the_profile_is_that_of_liquid_at_rest(paper_scene: Scene, field: ChamberField) -> None:
+def test_the_profile_is_that_of_liquid_at_rest(paper_scene: Scene, field: _ChamberField) -> None:
     profile = field.pressure_profile(scene=paper_scene)
     radius, pressure = np.array(profile["radius_m"]), np.array(profile["pressure_Pa"])
     factor = paper_scene.liquid.density * paper_scene.rotor.speed**2 / 2
@@ -32,7 +32,7 @@ def test_the_profile_is_that_of_liquid_at_rest(paper_scene: Scene, field: Chambe
     assert pressure == pytest.approx(factor * (radius**2 - radius[0] ** 2), rel=1e-6, abs=1e-3)
 
 
-def test_the_papers_profile_ends_at_equation_12(paper_scene: Scene, field: ChamberField) -> None:
+def test_the_papers_profile_ends_at_equation_12(paper_scene: Scene, field: _ChamberField) -> None:
     profile, disc = field.pressure_profile(scene=paper_scene), paper_scene.disc
     # V' = 33.84 ml, half of the chamber's 67.69 ml; Eq. 12 by hand.
     volume = 0.5 * 67.68766e-6
@@ -42,7 +42,7 @@ def test_the_papers_profile_ends_at_equation_12(paper_scene: Scene, field: Chamb
     assert profile["paper_radius_m"][0] > profile["radius_m"][0]
 
 
-def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: ChamberField) -> None:
+def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: _ChamberField) -> None:
     data: list[Any] = ["point_data"]
     stored = Mesh.load(field.write(path=tmp_path / "field.vtu"), out=data)
     factor = paper_scene.liquid.density * paper_scene.rotor.speed**2 / 2
@@ -56,7 +56,7 @@ def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: Cha
     assert {"free_surface", "outer_wall", "end_front"} <= set(stored.boundaries)
 
 
-def test_the_mesh_is_reported(field: ChamberField) -> None:
+def test_the_mesh_is_reported(field: _ChamberField) -> None:
     record = field.record
     assert record["unknowns"] == math.prod(2 * count + 1 for count in record["cells"])
     assert 0.5 < record["minimum_scaled_jacobian"] <= 1

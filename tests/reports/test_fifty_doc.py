@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from generated_docs import PARTS, fresh, text_of
+from doc_tables import PARTS, fresh, text_of
 
 PAGE = "docs/is-k-50-right.md"
 
 
 def test_the_page_says_what_the_program_finds() -> None:
     page = text_of(PAGE)
-    assert fresh(page, PARTS[PAGE]()) == page, "run tools/generated_docs.py --write"
+    assert fresh(page, PARTS[PAGE]()) == page, "run tools/generate.py --write docs"

@@ -10,7 +10,7 @@ import pytest
 
 from ringbalance.reports.judged import settings_lines
 from ringbalance.reports.page import terminal_lines
-from ringbalance.reports.pages.first_page import SECTION, SETTINGS, requirement_record
+from ringbalance.reports.pages.first_page import SECTION, SETTINGS, _requirement_record
 from ringbalance.scene import Scene
 from ringbalance.scene.toml import read_toml
 
@@ -105,10 +105,10 @@ def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Said) -> N
 
 def test_the_residual_s_grade_follows_from_the_mass(paper_scene: Scene) -> None:
     assert (
-        requirement_record(paper_scene, limit=paper_scene.controller.limit)["grade_at_residual_m_s"] is None
+        _requirement_record(paper_scene, limit=paper_scene.controller.limit)["grade_at_residual_m_s"] is None
     )
     heavy = replace(paper_scene, rotor=replace(paper_scene.rotor, mass=10.0))
-    record = requirement_record(heavy, limit=heavy.controller.limit)
+    record = _requirement_record(heavy, limit=heavy.controller.limit)
     # U omega/m by hand: 0.05 um over 0.0108 um/(g mm) at 10 000 rpm on 10 kg.
     assert record["grade_at_residual_m_s"] == pytest.approx(0.05 / 0.0108 * 1e-6 * 1047.2 / 10, rel=1e-4)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from check_traces import apart, traces, untrue
-from golden_pages import FOLDER, NAMES, kept_evidence, report_text
+from report_texts import FOLDER, NAMES, kept_evidence, report_text
 
 from ringbalance.reports.page import render
 from ringbalance.reports.traced import evidence_at
@@ -26,7 +26,7 @@ def evidence_of(name: str) -> dict[str, Any]:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_pages_say_what_they_said(name: str) -> None:
     golden = (FOLDER / f"{name}.txt").read_text(encoding="utf-8")
-    assert report_text(evidence_of(name)) == golden, "run tools/golden_pages.py, if meant"
+    assert report_text(evidence_of(name)) == golden, "run tools/generate.py --write reports, if meant"
 
 
 @pytest.mark.usefixtures("unwritten")

@@ -11,7 +11,7 @@ import pyvista
 from block_discs import imported
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reports.pictures.fields import ChamberField, chamber_field
+from ringbalance.reports.pictures.fields import _ChamberField, chamber_field
 from ringbalance.scene.models import Scene
 
 _FILL = 0.4
@@ -23,11 +23,13 @@ def scene(paper_scene: Scene) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def field(scene: Scene) -> ChamberField:
+def field(scene: Scene) -> _ChamberField:
     return chamber_field(scene, fill_ratio=_FILL)
 
 
-def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(scene: Scene, field: ChamberField) -> None:
+def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(
+    scene: Scene, field: _ChamberField
+) -> None:
     shown = field.pressure_profile(scene=scene)
     radius, scale = np.array(shown["radius_m"]), scene.liquid.density * scene.rotor.speed**2 / 2
     assert radius[[0, -1]] == pytest.approx([field.surface_radius, scene.disc.outer_radius], rel=1e-5)
@@ -39,7 +41,7 @@ def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(scene: Scene,
     assert shown["pressure_Pa"] == pytest.approx(exact, abs=1e-3 * exact[-1])
 
 
-def test_its_file_holds_the_liquid(scene: Scene, field: ChamberField, tmp_path: Path) -> None:
+def test_its_file_holds_the_liquid(scene: Scene, field: _ChamberField, tmp_path: Path) -> None:
     volume = _FILL * chamber_volume(disc=scene.disc)
     grid = pyvista.read(field.write(path=tmp_path / "field.vtu"))
     # VTK and drawings take straight edges for curved ones: 16 cells along 84 degrees, 1 % of the depth.

@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.evidence import scene_record
+from ringbalance.reports.evidence import _scene_record
 from ringbalance.reports.page import render
 from ringbalance.reports.pages import eccentric
 from ringbalance.reports.pages.measured import SECTION
 from ringbalance.scene.models import Scene
-from ringbalance.scene.origins import Measured, MeasuredFile, MeasuredFinding, MeasuredQuantity
+from ringbalance.scene.origins import Measured, MeasuredFile, MeasuredFinding, _MeasuredQuantity
 
 MEASURED = Measured(
     files=(MeasuredFile(file="run_7.csv", kind="trial_weight", rows=31, sha256="ab" * 32),),
     quantities=(
-        MeasuredQuantity(
+        _MeasuredQuantity(
             quantity="tube.bore",
             unit="mm",
             before=1.5,
@@ -31,7 +31,7 @@ MEASURED = Measured(
             profile=(1.46, 1.47, 1.48),
             rise=(1.0, 0.0, 1.02),
         ),
-        MeasuredQuantity(
+        _MeasuredQuantity(
             quantity="disc.lambda_factor",
             unit="1",
             before=1.0,
@@ -83,9 +83,9 @@ def test_without_measurements_there_is_no_section(evidence: dict[str, Any]) -> N
 
 
 def test_the_evidence_has_what_the_scene_says(paper_scene: Scene) -> None:
-    assert scene_record(paper_scene, "")["measured"] is None
+    assert _scene_record(paper_scene, "")["measured"] is None
     scene = replace(paper_scene, measured=MEASURED)
-    assert scene_record(scene, "")["measured"]["files"][0]["rows"] == 31
+    assert _scene_record(scene, "")["measured"]["files"][0]["rows"] == 31
 
 
 def test_both_balancers_show_it() -> None:

@@ -11,9 +11,9 @@ import pytest
 
 from ringbalance.reports.figure import NARROW, Drawing
 from ringbalance.reports.pages.loop import LOOP
-from ringbalance.reports.pages.operation import SECTION, _disc_section, _operating_map, letter_radius
+from ringbalance.reports.pages.operation import SECTION, _disc_section, _letter_radius, _operating_map
 from ringbalance.reports.pages.standing import CONDITIONS
-from ringbalance.reports.run_figures import reachable, residual_polar
+from ringbalance.reports.run_figures import _reachable, residual_polar
 from ringbalance.reports.section import Work
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 
@@ -113,7 +113,7 @@ def test_the_residual_ends_within_its_circle() -> None:
 
 @pytest.mark.parametrize(("pairs", "corners"), [(1, 2), (2, 4), (3, 6)])
 def test_pairs_together_cancel_the_sum_of_what_each_does(pairs: int, corners: int) -> None:
-    found = reachable(1.0, 0.4, pairs)
+    found = _reachable(1.0, 0.4, pairs)
     assert len(found) == corners
     # The farthest corner of n equal vectors spread over half a turn lies at 1/sin(pi/2n).
     assert np.abs(found).max() == pytest.approx(1 / math.sin(math.pi / 2 / pairs))
@@ -136,5 +136,5 @@ def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
 @pytest.mark.parametrize("crest", [None, 15.0, 22.0, 31.5, 38.0, 43.0])
 def test_a_chambers_letter_stands_in_its_gas_beside_the_tube(crest: float | None) -> None:
     size = {"inner_radius": 20.0, "free_surface_radius": 40.0}
-    found = letter_radius(size if crest is None else {**size, "crest_radius": crest})
+    found = _letter_radius(size if crest is None else {**size, "crest_radius": crest})
     assert min(found - 20.0, 40.0 - found, abs(found - (crest or 0.0))) >= 5.0

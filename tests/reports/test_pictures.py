@@ -13,7 +13,7 @@ from PIL import Image
 from ringbalance.reports.cli import plot
 from ringbalance.reports.pictures.draw import PICTURE, THEMES
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
-from ringbalance.reports.pictures.process import start_drawing, write_fields
+from ringbalance.reports.pictures.process import _start_drawing, _write_fields
 from ringbalance.scene import Scene, bundled_scene
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -69,7 +69,7 @@ def test_the_colour_bar_runs_from_end_to_end(drawn: Path) -> None:
 @needs_opengl
 def test_a_drawing_that_fails_is_reported(tmp_path: Path, paper_scene: Scene) -> None:
     missing = {"pressure": tmp_path / "none.vtu", "disc": tmp_path / "none.vtu"}
-    record = start_drawing(scene=paper_scene, fields=missing, folder=tmp_path).finish()
+    record = _start_drawing(scene=paper_scene, fields=missing, folder=tmp_path).finish()
     assert record["drawn"] is False
     assert record["files"] == []
     assert "ended with code 1" in record["text"]
@@ -77,7 +77,7 @@ def test_a_drawing_that_fails_is_reported(tmp_path: Path, paper_scene: Scene) ->
 
 
 def test_without_opengl_nothing_is_started(tmp_path: Path, paper_scene: Scene) -> None:
-    drawing = start_drawing(scene=paper_scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
+    drawing = _start_drawing(scene=paper_scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
     assert drawing.process is None
     assert drawing.finish() == {"drawn": False, "text": NO_OPENGL.text, "files": []}
     drawing.stop()
@@ -95,4 +95,4 @@ def test_plot_without_opengl_writes_the_fields(
 
 def test_fields_are_written_at_two_fills(tmp_path: Path, paper_scene: Scene) -> None:
     empty = dataclasses.replace(paper_scene, disc=dataclasses.replace(paper_scene.disc, initial_fill=0.0))
-    assert set(write_fields(scene=empty, folder=tmp_path)) == {"pressure", "disc"}
+    assert set(_write_fields(scene=empty, folder=tmp_path)) == {"pressure", "disc"}

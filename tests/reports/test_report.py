@@ -21,7 +21,7 @@ from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
 from ringbalance.reports.page import render
-from ringbalance.reports.pages import consequences, first_page
+from ringbalance.reports.pages import first_page, loop
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases
@@ -57,7 +57,7 @@ def few_cases(kept: Path) -> Iterator[None]:
         patch.setattr(tune, "tried_remedies", lambda *_, **__: ())
         patch.setattr(first_page, "choice_records", lambda _: [])
         patch.setattr(first_page, "judged", partial(judged, most=16))
-        patch.setattr(consequences, "judged", partial(judged, most=16))
+        patch.setattr(loop, "judged", partial(judged, most=16))
         yield
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.pages.loop import frames_of, injections_until
+from ringbalance.reports.pages.loop import _frames_of, _injections_until
 
 RUN: dict[str, Any] = {
     "time_s": [0.0, 1.0, 30.0],
@@ -19,10 +19,10 @@ RUN: dict[str, Any] = {
 
 
 def test_injections_that_begin_together_are_one_frame() -> None:
-    assert [(title.split(",")[0], time) for title, time in frames_of(RUN)] == [
+    assert [(title.split(",")[0], time) for title, time in _frames_of(RUN)] == [
         ("start", 0.0),
         ("B and C", 0.4),
         ("A", pytest.approx(2.1)),
         ("end", 30.0),
     ]
-    assert injections_until(RUN) == pytest.approx(2.1)
+    assert _injections_until(RUN) == pytest.approx(2.1)

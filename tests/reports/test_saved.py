@@ -8,6 +8,7 @@ import pytest
 
 import ringbalance.reports.saved as saved_module
 from ringbalance.reports.saved import keep_cases, kept_cases, saved_cases
+from ringbalance.scene.platform import program
 from ringbalance.scene.platform.kept_code import write_checked
 
 
@@ -55,22 +56,22 @@ def test_results_of_another_form_are_not_taken(
 
 def test_results_of_another_program_are_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(saved_module, "code_root", lambda: tmp_path)
-    monkeypatch.setattr(saved_module, "_program", lambda: "old")
+    monkeypatch.setattr(saved_module, "program_digest", lambda: "old")
     keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
-    monkeypatch.setattr(saved_module, "_program", lambda: "new")
+    monkeypatch.setattr(saved_module, "program_digest", lambda: "new")
     assert kept_cases() == {}
 
 
 def test_another_file_of_the_program_or_package_counts_as_another_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(saved_module, "files", lambda _: tmp_path)
+    monkeypatch.setattr(program, "files", lambda _: tmp_path)
     found = set()
     for content in ("one", "other"):
         (tmp_path / "module.py").write_text(content)
-        found.add(saved_module._program.__wrapped__())
-    monkeypatch.setattr(saved_module, "versions", lambda: {"numpy": "9.9"})
-    found.add(saved_module._program.__wrapped__())
+        found.add(program.program_digest.__wrapped__())
+    monkeypatch.setattr(program, "version_of", lambda _: "9.9")
+    found.add(program.program_digest.__wrapped__())
     assert len(found) == 3
 
 

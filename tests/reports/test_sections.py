@@ -88,7 +88,7 @@ def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Re
     dry["separated"] = None
     for record in dry["liquids"]:
         record["runs"] = False
-        record["verdict"] = fifty.verdict_on_fifty(record)
+        record["verdict"] = fifty._verdict_on_fifty(record)
     page = render({**evidence, "fifty": dry})["annex.html"]
     assert "no k can be given" in page
     assert "there is no map to draw" in page
@@ -105,7 +105,7 @@ def test_a_prescribed_k_is_named(evidence: Record, fifty_record: Record) -> None
 def test_the_velocity_decides_whether_fifty_is_right() -> None:
     record = {"runs": True, "velocity_m_s": 5.0, "velocity_uncertainty": 0.5}
     for paper, verdict in ((5.4, "right"), (4.6, "right"), (5.6, "too low"), (4.4, "too high")):
-        assert fifty.verdict_on_fifty({**record, "velocity_paper_m_s": paper}) == verdict
+        assert fifty._verdict_on_fifty({**record, "velocity_paper_m_s": paper}) == verdict
 
 
 @pytest.fixture(scope="module")

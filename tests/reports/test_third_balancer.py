@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from ball_balancer.scene_keys import EXAMPLE
 from check_traces import traces, untrue
-from golden_pages import page_text
+from report_texts import page_text
 
 from ringbalance.reports.cli import report
 from ringbalance.reports.report import write_report

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ringbalance.reports.pages.studies import TRADE
+from ringbalance.reports.pages.cases import TRADE
 
 
 def test_models_are_listed_with_error_and_speed() -> None:

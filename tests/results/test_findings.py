@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-import generated_docs
+import doc_tables
 import pytest
 
 from ringbalance.results import rows
 from ringbalance.results.numbers import SCALES
-from ringbalance.results.rows import Finding, Quantity, Sentence, Value, sentences
+from ringbalance.results.rows import Finding, Quantity, Value, _Sentence, sentences
 
 PLACES = re.compile(r"\{(\w+)(?::([^};]*))?(?:;(\d))?\}")
 
@@ -27,13 +27,13 @@ def test_a_sentence_fills_its_numbers_in_units_that_exist(code: str) -> None:
 
 
 def test_the_documentation_lists_every_code_as_the_program_has_it() -> None:
-    page = generated_docs.text_of("docs/findings.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/findings.md"]()) == page
+    page = doc_tables.text_of("docs/findings.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/findings.md"]()) == page
 
 
 def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     made_up = {
-        "late": Sentence(severity="warning", text="after {time:s;2}", change={"run.time_limit": "raise"})
+        "late": _Sentence(severity="warning", text="after {time:s;2}", change={"run.time_limit": "raise"})
     }
     monkeypatch.setattr(rows, "sentences", lambda: made_up)
     with pytest.raises(KeyError, match="time"):
@@ -65,6 +65,6 @@ def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -
 def test_one_filter_writes_every_value(
     value: Value, unit: str, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sentence = Sentence(severity="info", text=f"{{it:{unit}}}")
+    sentence = _Sentence(severity="info", text=f"{{it:{unit}}}")
     monkeypatch.setattr(rows, "sentences", lambda: {"it": sentence})
     assert Finding(code="it", values={"it": value}).sentence() == text

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from ringbalance.results.proportion import Proportion
-from ringbalance.results.requirements import MET, MISSED, OPEN
+from ringbalance.results.requirements import MET, MISSED, OPEN, Proportion
 
 
 def test_wilsons_bounds() -> None:

@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.scene.platform.processes import Workers, beside
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import scene_reference
-from generated_docs import fresh, text_of
+from doc_tables import fresh, text_of
 
 from ringbalance.controller.eccentric_mass.scene_records import CHECKS, ECCENTRIC_MASS
 from ringbalance.scene import Scene, loop_models, models
@@ -29,7 +29,7 @@ def _keys(table: str) -> set[str]:
 
 def test_document_holds_the_reference() -> None:
     page = text_of("docs/scene-file.md")
-    assert fresh(page, scene_reference.tables()) == page, "run tools/generated_docs.py --write"
+    assert fresh(page, scene_reference.tables()) == page, "run tools/generate.py --write docs"
 
 
 @pytest.mark.parametrize(("schema", "inside_lists"), [(LIQUID_RING, 32), (ECCENTRIC_MASS, 23)])

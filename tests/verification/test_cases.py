@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from generated_docs import fresh, standing_table, text_of
+from doc_tables import fresh, standing_table, text_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
 

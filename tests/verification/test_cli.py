@@ -13,7 +13,7 @@ from ringbalance.cli import main
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.cli import exit_code, verify
+from ringbalance.verification.cli import _exit_code, verify
 from ringbalance.verification.evidence import Found
 from ringbalance.verification.runner import run_definition
 
@@ -84,13 +84,13 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     )
     assert refuted.verdict == "refuted"
     assert failed.verdict == "failed"
-    assert exit_code([refuted]) == 0
-    assert exit_code([solution]) == 0
-    assert exit_code([refuted, failed]) == 1
+    assert _exit_code([refuted]) == 0
+    assert _exit_code([solution]) == 0
+    assert _exit_code([refuted, failed]) == 1
     blind = made_up_code(defect=lambda found, _, __: found)
     broken = run_definition(claim, blind, scene=paper_scene, mutations=True)
-    assert exit_code([broken]) == 1
-    assert exit_code([dataclasses.replace(broken, mutations=())]) == 0
+    assert _exit_code([broken]) == 1
+    assert _exit_code([dataclasses.replace(broken, mutations=())]) == 0
 
 
 _VESSEL = (

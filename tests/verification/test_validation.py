@@ -9,13 +9,13 @@ from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
-import generated_docs
+import doc_tables
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
 from ringbalance.identification.kinds import bench
-from ringbalance.identification.kinds.bench import laminar_ratio, tank_frequency
+from ringbalance.identification.kinds.bench import _tank_frequency, laminar_ratio
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS, read_observations
 from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
@@ -32,7 +32,7 @@ from ringbalance.verification.navier_stokes.tube import (
 )
 from ringbalance.verification.validation.comparison import (
     Comparison,
-    ModelStatistics,
+    _ModelStatistics,
     compare,
     friction,
     measurements,
@@ -57,7 +57,7 @@ def test_a_data_set_says_where_it_comes_from_and_what_it_supports(name: str) -> 
 
 def _synthetic(
     rng: np.random.Generator, *, bias: float, scatter: float, count: int = 4000
-) -> ModelStatistics:
+) -> _ModelStatistics:
     true = rng.uniform(1, 10, count)
     series = np.repeat(np.array([f"rig {i}" for i in range(20)]), count // 20)
     measured = true * np.exp(0.01 * rng.standard_normal(count))
@@ -231,7 +231,7 @@ def test_end_losses_that_are_left_out_are_noticed() -> None:
 @pytest.mark.parametrize("depth", [0.06, 0.3, 1.5])
 def test_a_chamber_of_large_radius_is_a_tank(depth: float) -> None:
     exact = math.sqrt(math.pi * math.tanh(math.pi * depth))
-    assert tank_frequency(depth) == pytest.approx(exact, rel=1e-4)
+    assert _tank_frequency(depth) == pytest.approx(exact, rel=1e-4)
 
 
 def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
@@ -257,7 +257,7 @@ def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None
 
 
 def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
-    page = generated_docs.text_of("docs/measurements.md")
-    assert generated_docs.fresh(page, generated_docs.PARTS["docs/measurements.md"]()) == page
+    page = doc_tables.text_of("docs/measurements.md")
+    assert doc_tables.fresh(page, doc_tables.PARTS["docs/measurements.md"]()) == page
     example = page.split("```text\n")[1].split("```")[0]
     assert len(compare(parsed(example)).measured) == 3

@@ -111,7 +111,7 @@ class _Balanced(NamedTuple):
     """Mean amplitude in the last second of the run, m."""
 
 
-def balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> _Balanced:
+def _balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> _Balanced:
     """Balance the two imbalances of the paper's Fig. 7."""
     level = at_constant_speed(scene, time_limit=time_limit)
     runs = {
@@ -128,7 +128,7 @@ def balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> _
     )
 
 
-def beside_the_targets(scene: EccentricScene) -> EccentricScene:
+def _beside_the_targets(scene: EccentricScene) -> EccentricScene:
     """With masses that stop 10 degrees beside their targets, then trials alone, as in Fig. 8."""
     return changed(scene, "supervisor", target_error=(_BESIDE, _BESIDE), correction="trials")
 
@@ -142,8 +142,8 @@ def _in_check(run: EccentricRun) -> float:
 
 def positioning(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Two imbalances balanced at constant speed: amplitudes before, on the way and after, Fig. 7."""
-    given = scene if defect is None else beside_the_targets(scene)
-    found = balanced_at_constant_speed(given, time_limit=30.0)
+    given = scene if defect is None else _beside_the_targets(scene)
+    found = _balanced_at_constant_speed(given, time_limit=30.0)
     runs = list(found.runs.values())
     shown = runs[0].time <= _SHOWN
     angles = figure(
@@ -170,7 +170,7 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
 def fine_tuning(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Masses ten degrees beside their targets, then tuned by trial, Fig. 8."""
     time_limit = 200.0 if defect is None else 25.0
-    found = balanced_at_constant_speed(beside_the_targets(scene), time_limit=time_limit)
+    found = _balanced_at_constant_speed(_beside_the_targets(scene), time_limit=time_limit)
     settled = [run.settling_time or run.time[-1] for run in found.runs.values()]
     return Evidence(
         found=as_found(
@@ -194,9 +194,9 @@ def bound(scene: EccentricScene, level: Level, defect: str | None = None) -> Evi
     """
     speed = scene.rotor.speed_profile[0].speed
     parameters = PlantParameters.of(scene)
-    turning = motion_bound(parameters, speed=speed, rate=_RATE)
-    judged = motion_bound(parameters, speed=0.0, rate=_RATE) if defect == "rotor_at_rest" else turning
-    runs = balanced_at_constant_speed(scene, time_limit=30.0).runs.values()
+    turning = _motion_bound(parameters, speed=speed, rate=_RATE)
+    judged = _motion_bound(parameters, speed=0.0, rate=_RATE) if defect == "rotor_at_rest" else turning
+    runs = _balanced_at_constant_speed(scene, time_limit=30.0).runs.values()
     largest = max(run.worst_amplitude for run in runs)
     return Evidence(
         found=as_found(
@@ -217,7 +217,7 @@ class _MotionBound(NamedTuple):
     """Bound on |Z| once the start's transient is gone, m."""
 
 
-def motion_bound(parameters: PlantParameters, *, speed: float, rate: float) -> _MotionBound:
+def _motion_bound(parameters: PlantParameters, *, speed: float, rate: float) -> _MotionBound:
     """Bound the rotor's motion for masses that move with at most a given rate.
 
     M Z'' + C_B Z' + K_B Z = F with |F| <= Y = U W^2 + 2 b (W + w)^2, so |Z| <= Y int |h| dt, where
@@ -290,7 +290,7 @@ class _FigureFour(NamedTuple):
 
 def imbalance_ends(scene: EccentricScene) -> Evidence:
     """With honest covariances alone."""
-    return Evidence(found=_judged(figure_four(scene, scales=(1.0,))))
+    return Evidence(found=_judged(_figure_four(scene, scales=(1.0,))))
 
 
 def _judged(found: _FigureFour, time: float | None = None) -> dict[str, Found]:
@@ -301,7 +301,7 @@ def _judged(found: _FigureFour, time: float | None = None) -> dict[str, Found]:
 
 def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """How fast four imbalances become known, and under which covariances that takes the printed time."""
-    found = figure_four(scene)
+    found = _figure_four(scene)
     reached = np.isfinite(found.scaled_time)
     scales, times = found.scales[reached], found.scaled_time[reached]
     scale = np.exp(np.interp(_PRINTED, times, np.log(scales)))
@@ -332,7 +332,7 @@ def _estimates(found: _FigureFour) -> Series:
     return figure(name, ("time", "s", thinned(found.time[shown])), *curves)
 
 
-def imbalance_record(scene: EccentricScene, *, duration: float) -> _ImbalanceRecord:
+def _imbalance_record(scene: EccentricScene, *, duration: float) -> _ImbalanceRecord:
     """Measure a rotor that starts at its centre, the masses locked at their first angles.
 
     Returns: One sample for each step of the sensor, without the instant of the start.
@@ -350,7 +350,7 @@ def imbalance_record(scene: EccentricScene, *, duration: float) -> _ImbalanceRec
     )
 
 
-def estimate_imbalance(
+def _estimate_imbalance(
     scene: EccentricScene, record: _ImbalanceRecord, *, scale: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """States, shape (n, 6), and covariances, shape (n, 6, 6), of the scene's filter over a record."""
@@ -365,14 +365,14 @@ def estimate_imbalance(
     )
 
 
-def figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _SCALES) -> _FigureFour:
+def _figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _SCALES) -> _FigureFour:
     """Estimates of the four imbalances of the paper's Fig. 4, and of one under dishonest covariances."""
     turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _TURNED]
-    records = [imbalance_record(one, duration=_RECORD) for one in turned]
+    records = [_imbalance_record(one, duration=_RECORD) for one in turned]
     pairs = list(zip(turned, records, strict=True))
-    found = [estimate_imbalance(*pair) for pair in pairs]
+    found = [_estimate_imbalance(*pair) for pair in pairs]
     first, record = pairs[0]
-    scaled = (estimate_imbalance(first, record, scale=scale)[0] for scale in scales)
+    scaled = (_estimate_imbalance(first, record, scale=scale)[0] for scale in scales)
     return _FigureFour(
         time=record.time,
         true=np.array([[one.imbalance.real, one.imbalance.imag] for one in records]),
@@ -391,7 +391,7 @@ def _time_of(record: _ImbalanceRecord, states: FloatArray) -> float:
 
 def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Two friction arms found while both masses go round: their errors and the time they take."""
-    runs = friction_runs(scene)
+    runs = _friction_runs(scene)
     wrong = 1.1 if defect == "another_friction" else 1.0
     errors = [
         np.max(np.abs(run.history["friction_arm"][-1] / (wrong * arm) - 1)) for arm, run in runs.items()
@@ -414,7 +414,7 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
     )
 
 
-def friction_runs(scene: EccentricScene) -> Mapping[float, EccentricRun]:
+def _friction_runs(scene: EccentricScene) -> Mapping[float, EccentricRun]:
     """Runs by their true friction arm, m. Source: Fig. 5 of the paper on eccentric masses."""
     level = at_constant_speed(scene, time_limit=_FRICTION_TIME)
     return {a: simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in _ARMS}

@@ -52,7 +52,7 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are
     not in it: what the regulator has to do is the move itself and the friction that compensation leaves.
     """
-    found = efforts(scene, step=_STEP[level])
+    found = _efforts(scene, step=_STEP[level])
     grown = {name: growth(each) for name, each in found.items()}
     # The first mass ratio at the third weight, near the paper's own choice.
     shown = {name: each[0, 2] for name, each in found.items()}
@@ -79,7 +79,7 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
 
 def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Growth of the same efforts with q/r and with the mass ratio."""
-    found = efforts(scene, step=_STEP[level])
+    found = _efforts(scene, step=_STEP[level])
     # The largest over the smallest q/r, and the larger over the smaller mass ratio.
     over_weight = {name: each[:, -1] / each[:, 0] for name, each in found.items()}
     over_mass = {name: each[0] / each[1] for name, each in found.items()}
@@ -99,7 +99,7 @@ def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     )
 
 
-def efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
+def _efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
     """Effort J(q, r) of one move, N m s, by the way in which friction is compensated: the paper's Fig. 6.
 
     Returns: Of shape (mass ratios, weight ratios, speed ratios).
@@ -146,7 +146,7 @@ def _move(
         for i in range(2):
             asked[i] = regulator_torque(law, angle[i], rate[i], 0.0)
             if printed:
-                extra = printed_compensation(law, believed_arm, speed, angle[i], rate[i])
+                extra = _printed_compensation(law, believed_arm, speed, angle[i], rate[i])
             else:
                 extra = friction_torque(law, believed_arm, 0.0, speed, rate[i], -angle[i])
             net = asked[i] + extra - law.track.damping * rate[i]
@@ -159,7 +159,7 @@ def _move(
 
 
 @compiled
-def printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float, rate: float) -> float:
+def _printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float, rate: float) -> float:
     """Friction's torque by the paper, N m: the angle stands for the rate, and a resting mass gets none.
 
     Source: part (b) of Eq. 39 of the paper on eccentric masses.

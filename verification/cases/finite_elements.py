@@ -206,8 +206,8 @@ def coverage(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
     Random discs and fills, finite elements against the closed form; the same discs every time.
     """
-    ratios = error_ratios(_COUNT, _SEED) / _WIDTHS[defect]
-    fared = {name: how_fared(column) for name, column in zip(_QUANTITIES, ratios.T, strict=True)}
+    ratios = _error_ratios(_COUNT, _SEED) / _WIDTHS[defect]
+    fared = {name: _how_fared(column) for name, column in zip(_QUANTITIES, ratios.T, strict=True)}
     table = Table(
         name=f"{_COUNT} random discs, seed {_SEED}",
         columns={
@@ -241,7 +241,7 @@ class _Fared(NamedTuple):
     """Largest |error| over half-width."""
 
 
-def how_fared(ratios: FloatArray) -> _Fared:
+def _how_fared(ratios: FloatArray) -> _Fared:
     """Args: `ratios`: |error| over half-width; nan where the error is at round-off, and so held."""
     judged = ratios[~np.isnan(ratios)]
     share = 1 - float(np.mean(ratios > 1))
@@ -251,7 +251,7 @@ def how_fared(ratios: FloatArray) -> _Fared:
 
 
 @lru_cache(maxsize=2)
-def error_ratios(count: int, seed: int) -> FloatArray:
+def _error_ratios(count: int, seed: int) -> FloatArray:
     """|error| over half-width on random discs, shape (count, quantities); nan where it is at round-off."""
     generator = np.random.default_rng(seed)
     return np.array([_ratios_of_one(generator) for _ in range(count)])

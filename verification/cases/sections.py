@@ -244,13 +244,13 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
     """Decay rates along the turning tube: creeping flow at rest, fast rotation, the bound that k(u) uses."""
     coarse, fine = (cells.system() for cells in _MESHES[level])
     speed = 0.7 if defect == "coriolis_too_weak" else 1.0
-    rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12)
+    rates = _slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12)
     exact = _CREEPING / (2 if defect == "radius_for_bore" else 1)
-    fast = [decay_length(fine, 0.0, speed * rotation) ** -1 * rotation**0.5 for rotation in _FAST]
+    fast = [_decay_length(fine, 0.0, speed * rotation) ** -1 * rotation**0.5 for rotation in _FAST]
     # The limit is approached as R^(-1/4), which two rates take off.
     step = (_FAST[1] / _FAST[0]) ** 0.25
     points = _POINTS[level]
-    lengths = [decay_length(coarse, *point) for point in points]
+    lengths = [_decay_length(coarse, *point) for point in points]
     bounds = [_length_bound(*point) for point in points]
     shares = np.divide(lengths, bounds)
     table = Table(
@@ -274,13 +274,13 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
     )
 
 
-def decay_length(system: FlowSystem, reynolds: float, rotation_reynolds: float) -> float:
+def _decay_length(system: FlowSystem, reynolds: float, rotation_reynolds: float) -> float:
     """Way on which the slowest disturbance falls by e, in diameters."""
-    rates = slowest_decay(system=system, reynolds=reynolds, rotation_reynolds=rotation_reynolds, count=1)
+    rates = _slowest_decay(system=system, reynolds=reynolds, rotation_reynolds=rotation_reynolds, count=1)
     return -1 / float(rates[0].real)
 
 
-def slowest_decay(
+def _slowest_decay(
     *, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int
 ) -> ComplexArray:
     """Rates per diameter of the slowest disturbances downstream of laminar developed flow, mirror-symmetric.

@@ -272,7 +272,7 @@ class StepRule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FlowPath:
+class _FlowPath:
     """Flows at the targets that were reached, in order."""
 
     solutions: tuple[FlowSolution, ...]
@@ -334,7 +334,7 @@ def follow(
     start_at: float,
     targets: Sequence[float],
     rule: StepRule | None = None,
-) -> FlowPath:
+) -> _FlowPath:
     """Flows at the targets, each reached from the one before; a failed step is halved, an easy one grows.
 
     Args: `start`: a converged flow. `start_at`: its parameter. `targets`: parameters to reach, in monotone
@@ -348,9 +348,9 @@ def follow(
             text = f"the path ended at {walk.at:.6g} on its way to {target:.6g}"
             remedy = "refine the mesh or take smaller steps"
             status = Status(code=StatusCode.NOT_CONVERGED, text=f"{text}; {remedy}")
-            return FlowPath(solutions=tuple(reached), status=status, failures=walk.failures)
+            return _FlowPath(solutions=tuple(reached), status=status, failures=walk.failures)
         reached.append(walk.flow)
-    return FlowPath(solutions=tuple(reached), status=Status(), failures=walk.failures)
+    return _FlowPath(solutions=tuple(reached), status=Status(), failures=walk.failures)
 
 
 def flow_at(*, solve: Solve, parameter: float, first: float) -> FlowSolution:

@@ -69,7 +69,7 @@ class Segment:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SweptTube:
+class _SweptTube:
     """A swept mesh with what its structure is good for."""
 
     mesh: Any
@@ -126,7 +126,7 @@ def _prism(section: Any, slabs: int) -> Any:
     return MeshHex2.from_mesh(MeshHex1(points, cells))
 
 
-def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
+def swept_tube(*, section: Any, segments: Sequence[Segment]) -> _SweptTube:
     """Mesh of a tube along a path.
 
     Args: `section`: `skfem.MeshQuad2` in (y, z), z >= 0.
@@ -157,7 +157,7 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
         "symmetry": on_symmetry,
     }
     mesh = MeshHex2(np.ascontiguousarray(points), prism.t)
-    return SweptTube(
+    return _SweptTube(
         mesh=mesh.with_boundaries(named_facets(prism, named)),
         section_node=np.asarray(node, dtype=np.int64),
         half_station=half,
@@ -182,7 +182,7 @@ def coefficients(*, reynolds: float, rotation_reynolds: float) -> Coefficients:
 class BentTubeFlow:
     """Flow in half a bent tube, and the developed flow that enters it."""
 
-    tube: SweptTube
+    tube: _SweptTube
     system: FlowSystem
     solution: FlowSolution
     developed: FlowSolution
@@ -271,7 +271,7 @@ class BentTubeFlow:
         return float(first - last)
 
 
-def _swept_velocity(tube: SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
+def _swept_velocity(tube: _SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
     """The section's velocity at every node of the tube, Cartesian components (3, nodes)."""
     left, up, along = developed.velocity[:, tube.section_node]
     tangent = tube.direction[:, tube.half_station]
@@ -279,13 +279,13 @@ def _swept_velocity(tube: SweptTube, developed: FlowSolution, reynolds: float) -
     return np.asarray(np.vstack([along * tangent + left / reynolds * normal, up / reynolds]))
 
 
-def _pressure_nodes(tube: SweptTube) -> tuple[IntArray, IntArray]:
+def _pressure_nodes(tube: _SweptTube) -> tuple[IntArray, IntArray]:
     """Section node and station of every pressure node: the mesh's vertices."""
     count = tube.mesh.nvertices
     return tube.section_node[:count], tube.half_station[:count] // 2
 
 
-def _swept_pressure(tube: SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
+def _swept_pressure(tube: _SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
     """Developed pressure along the tube, zero at the outlet but for the section's own variation."""
     node, station = _pressure_nodes(tube)
     s = tube.arc_length[::2]
@@ -294,7 +294,7 @@ def _swept_pressure(tube: SweptTube, developed: FlowSolution, reynolds: float) -
 
 
 def _outlet_load(
-    tube: SweptTube, system: FlowSystem, section: FlowSystem, pressure: FloatArray
+    tube: _SweptTube, system: FlowSystem, section: FlowSystem, pressure: FloatArray
 ) -> FloatArray:
     """Integral over the outlet of minus the section's pressure times normal and shape functions."""
     normal_force = section.load(np.asarray(section.pressure.interpolate(pressure)))
@@ -305,7 +305,7 @@ def _outlet_load(
     return load
 
 
-def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSystem:
+def _system(tube: _SweptTube, section: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSystem:
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
     system = FlowSystem.of(mesh=tube.mesh, conditions=conditions)
@@ -317,18 +317,18 @@ def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reyno
     return replace(system, fixed_values=fixed, source=load)
 
 
-def _guess(tube: SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:
+def _guess(tube: _SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:
     velocity = _swept_velocity(tube, developed, reynolds)
     return FlowSolution.of(system, np.append(velocity.ravel(), _swept_pressure(tube, developed, reynolds)))
 
 
-def _mean_pressure(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
+def _mean_pressure(tube: _SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
     node, station = _pressure_nodes(tube)
     share = section.mean_load / section.mean_load.sum()
     return np.bincount(station, weights=share[node] * solution.pressure).astype(np.float64)
 
 
-def _energy_flux(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
+def _energy_flux(tube: _SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
     """Integral of |u|^2 times the velocity along the path, over the section, at the stations."""
     at = np.flatnonzero(tube.half_station % 2 == 0)
     speeds = np.zeros((tube.arc_length[::2].size, 4, section.velocity.N))
@@ -342,7 +342,7 @@ def _energy_flux(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -
     return np.array([np.sum(weights * (field[:3] ** 2).sum(axis=0) * field[3]) for field in fields])
 
 
-def rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvature: float) -> float:
+def _rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvature: float) -> float:
     """Rotation Reynolds number of the straight tube in which liquid is driven aside as strongly.
 
     R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa, to first order; negative where
@@ -362,7 +362,7 @@ def bend_shift(
     Range: R well above Re d/r; the stream's recovery behind the bend is left out.
     """
     curvature = (1.0 if with_rotation else -1.0) / radius
-    shifted = rotation_with_curvature(
+    shifted = _rotation_with_curvature(
         reynolds=reynolds, rotation_reynolds=rotation_reynolds, curvature=curvature
     )
     ratios = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=[abs(shifted), rotation_reynolds])

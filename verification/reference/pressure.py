@@ -97,7 +97,7 @@ class _ExactRing:
         return np.asarray(scale * ((square - self.level**2) / 2 - depth))
 
 
-def exact_ring(
+def _exact_ring(
     *,
     disc: Disc,
     density: float,
@@ -172,7 +172,7 @@ def gravity_study(
     cells = refined_cells(scene.disc, levels[level], dimension=3 if shaft == "vertical" else 2)
     disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
     true = tilted_liquid(disc=disc, density=scene.liquid.density, fill_ratio=fill, shaft=shaft)
-    exact = exact_ring(
+    exact = _exact_ring(
         disc=disc,
         density=true.density,
         angular_velocity=true.angular_velocity,

@@ -36,7 +36,7 @@ _HELD: Final = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelStatistics:
+class _ModelStatistics:
     """How a model stands to measurements, relative to the measured values."""
 
     points: int
@@ -53,7 +53,7 @@ class ModelStatistics:
     """Factor on both uncertainties at which they hold 95 % of the points."""
 
     def numbers(self) -> dict[str, float]:
-        """Numbers for a case's text, by the names of `ModelStatistics`."""
+        """Numbers for a case's text, by the names of `_ModelStatistics`."""
         return {key: float(value) for key, value in vars(self).items()}
 
 
@@ -88,7 +88,7 @@ class Comparison:
         return Comparison(**own, columns={name: column[chosen] for name, column in self.columns.items()})
 
     @property
-    def statistics(self) -> ModelStatistics:
+    def statistics(self) -> _ModelStatistics:
         """Statistics of ln(predicted/measured).
 
         bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the
@@ -99,7 +99,7 @@ class Comparison:
         ratio, used, names = np.log(self.predicted / self.measured), self.used, np.unique(self.series)
         means = np.array([np.mean(ratio[self.series == name]) for name in names])
         unexplained = float(np.var(ratio, ddof=1) - np.mean((self.uncertainty / 2) ** 2))
-        return ModelStatistics(
+        return _ModelStatistics(
             points=ratio.size,
             series=names.size,
             bias=self.bias,

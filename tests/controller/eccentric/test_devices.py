@@ -19,7 +19,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.judging.tune import tuned
-from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import Proportion
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.papers import at_constant_speed, changed
 

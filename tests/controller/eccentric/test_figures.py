@@ -17,22 +17,22 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.verification.cases import driven_balancing
 from ringbalance.verification.cases.driven_balancing import (
-    balanced_at_constant_speed,
-    beside_the_targets,
-    estimate_imbalance,
-    figure_four,
-    friction_runs,
+    _balanced_at_constant_speed,
+    _beside_the_targets,
+    _estimate_imbalance,
+    _figure_four,
+    _friction_runs,
+    _imbalance_record,
+    _motion_bound,
     friction_time,
-    imbalance_record,
-    motion_bound,
     run_up,
 )
-from ringbalance.verification.cases.driven_positioning import efforts, growth, printed_compensation
+from ringbalance.verification.cases.driven_positioning import _efforts, _printed_compensation, growth
 from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
 def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> None:
-    found = figure_four(paper)
+    found = _figure_four(paper)
     np.testing.assert_allclose(found.estimate[:, -1], found.true, atol=1e-4)
     assert max(found.honest_time) < 0.3
     assert np.all(found.covariance_norm[:, -1] < 1e-6 * found.covariance_norm[:, 0])
@@ -43,13 +43,13 @@ def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> No
 
 
 def test_figure_five_finds_both_friction_arms(paper: EccentricScene) -> None:
-    for arm, run in friction_runs(paper).items():
+    for arm, run in _friction_runs(paper).items():
         assert run.history["friction_arm"][-1] == pytest.approx((arm, arm), rel=0.02)
         assert friction_time(run, arm) < 1.0
 
 
 def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricScene) -> None:
-    found = efforts(paper, step=5e-4)
+    found = _efforts(paper, step=5e-4)
     np.testing.assert_allclose(growth(found["exact"]), 1.0, rtol=1e-3)
     assert np.all(growth(found["short"]) > 1.5)
     assert np.all(growth(found["without"]) > 3)
@@ -59,7 +59,7 @@ def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricSce
 
 
 def test_figure_seven_balances_both_imbalances(paper: EccentricScene) -> None:
-    found = balanced_at_constant_speed(paper, time_limit=20.0)
+    found = _balanced_at_constant_speed(paper, time_limit=20.0)
     plant = PlantParameters.of(paper)
     expected = abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.before == pytest.approx((expected, expected))
@@ -69,7 +69,7 @@ def test_figure_seven_balances_both_imbalances(paper: EccentricScene) -> None:
 
 
 def test_figure_eight_is_mended_by_fine_tuning(paper: EccentricScene) -> None:
-    found = balanced_at_constant_speed(beside_the_targets(paper), time_limit=200.0)
+    found = _balanced_at_constant_speed(_beside_the_targets(paper), time_limit=200.0)
     plant = PlantParameters.of(paper)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
     expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
@@ -117,10 +117,10 @@ def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
 def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(paper: EccentricScene) -> None:
     plant = PlantParameters.of(paper)
     natural = math.sqrt(plant.stiffness / plant.mass)
-    still = motion_bound(plant._replace(moment=0.0), speed=natural, rate=0.0)
+    still = _motion_bound(plant._replace(moment=0.0), speed=natural, rate=0.0)
     whirl = plant.unbalance * natural**2 / (plant.damping * natural)
     assert whirl <= still.amplitude <= 4 / math.pi * whirl * 1.1
-    turning = motion_bound(plant, speed=10.47, rate=0.52)
+    turning = _motion_bound(plant, speed=10.47, rate=0.52)
     assert turning.printed_force < turning.force - 2 * plant.moment * 10.47**2 * 0.99
     half = plant.damping / (2 * plant.mass)
     damped = math.sqrt(natural**2 - half**2)
@@ -137,15 +137,15 @@ def test_the_run_is_below_the_corrected_bound_and_above_that_of_a_rotor_at_rest(
 ) -> None:
     """The claim is refuted by its force, so that no defect of the other quantity can show in its verdict."""
     assert driven_balancing.bound(paper, "light").found["amplitude_ratio"].value < 1
-    at_rest = motion_bound(PlantParameters.of(paper), speed=0.0, rate=1.0)
-    monkeypatch.setattr(driven_balancing, "motion_bound", lambda *_, **__: at_rest)
+    at_rest = _motion_bound(PlantParameters.of(paper), speed=0.0, rate=1.0)
+    monkeypatch.setattr(driven_balancing, "_motion_bound", lambda *_, **__: at_rest)
     assert driven_balancing.bound(paper, "light").found["amplitude_ratio"].value > 1
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e4])
 def test_the_bound_wants_a_rotor_that_swings(paper: EccentricScene, damping: float) -> None:
     with pytest.raises(ValueError, match="damping"):
-        motion_bound(PlantParameters.of(paper)._replace(damping=damping), speed=1.0, rate=0.0)
+        _motion_bound(PlantParameters.of(paper)._replace(damping=damping), speed=1.0, rate=0.0)
 
 
 @pytest.mark.parametrize("key", ["assumed_mass", "assumed_stiffness", "assumed_damping"])
@@ -154,13 +154,13 @@ def test_a_wrong_assumption_shifts_the_estimate_by_the_ratio_of_stiffnesses(
     paper: EccentricScene, key: str, change: float
 ) -> None:
     """In a steady whirl z = W^2 theta/D, so that a filter which assumes another D finds theta D_assumed/D."""
-    record = imbalance_record(paper, duration=16.0)
+    record = _imbalance_record(paper, duration=16.0)
     # A filter that assumes wrong also misreads the transient of the start.
     late = record.time > 12.0
     record = replace(record, time=record.time[late], samples=record.samples[late])
     wrong = changed(paper, "imbalance_filter", **{key: getattr(paper.imbalance_filter, key) * (1 + change)})
     ratio = stiffness(wrong, record.speed) / stiffness(paper, record.speed)
-    x = estimate_imbalance(wrong, record)[0][-1]
+    x = _estimate_imbalance(wrong, record)[0][-1]
     assert abs(complex(x[4], x[5]) / record.imbalance - ratio) < 2e-3
     assert abs(ratio - 1) > 5e-3
 
@@ -195,7 +195,7 @@ def test_the_printed_compensation_takes_the_angle_for_the_rate(paper: EccentricS
     arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
     friction = -arm * law.track.moment * (speed + rate) ** 2
     assert friction_torque(law, arm, 0.0, speed, rate, 0.0) == pytest.approx(friction)
-    assert printed_compensation(law, arm, speed, angle, rate) / friction > 1.7
+    assert _printed_compensation(law, arm, speed, angle, rate) / friction > 1.7
     # At rest, a radian away from the goal, only one of them pushes.
     assert friction_torque(law, arm, 0.0, speed, 0.0, 1.0) > 0
-    assert printed_compensation(law, arm, speed, angle, 0.0) == 0
+    assert _printed_compensation(law, arm, speed, angle, 0.0) == 0

@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 from ringbalance.controller.balancer import Outcomes, settles_within
 from ringbalance.controller.judging.judge import Judgement
-from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import Proportion
 from ringbalance.scene.arrays import FloatArray
 
 

@@ -1,30 +1,38 @@
 """Pages are programs: their code and commands run in order, and what they print stands below them.
 
-python tools/page_programs.py PAGE ...            exit code 1 where a page prints something else than it shows
-python tools/page_programs.py --write PAGE ...    writes what it prints
-
 A block of `python` or `sh` is run in an empty folder with the bundled `scenes`. A block after a line that
 ends in a file's name in code type and a colon becomes that file. A block of `text` straight after a block
 that was run is what that one printed; in it a line `...` stands for lines left out. A block after
 `<!-- not run: REASON -->` is not run. A picture (SVG) that a page shows is the one that its blocks write
 under that name.
+
+Each page, and each line that is one command of the program, is run in a copy of one process that has loaded
+the program already; a line with more of the shell in it is the shell's.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.scene import write_whole
+import ringbalance as rb
+from ringbalance import cli
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FENCE: Final = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -36,6 +44,7 @@ _PICTURE: Final = re.compile(r"!\[[^\]]*\]\(([\w./-]+\.svg)\)")
 _NUMBER: Final = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d{1,2}(?!\d))?")
 _NAME: Final = re.compile(r"""id="[^"]*"|href="#[^"]*"|url\(#[^)]*\)""")
 """Within a picture: made from the shapes that it names."""
+_COMMAND: Final = re.compile(r"ringbalance ([^|&;<>$`()]*?)( 2>&1)?(?: > ([\w./-]+))?")
 
 
 class PageError(ValueError):
@@ -51,7 +60,9 @@ class Session:
 
     def run(self, language: str, code: str) -> str:
         """What a block prints. Raises: PageError: a command that fails."""
-        return self._python(code) if language == "python" else self._commands(code)
+        if language == "python":
+            return self._python(code)
+        return "".join(self._command(line) for line in code.replace("\\\n", " ").splitlines())
 
     def _python(self, code: str) -> str:
         printed = io.StringIO()
@@ -59,19 +70,61 @@ class Session:
             exec(compile(code, "<page>", "exec"), self.names)
         return printed.getvalue()
 
-    def _commands(self, code: str) -> str:
+    def _command(self, line: str) -> str:
+        own = _COMMAND.fullmatch(line.strip())
+        ended, printed, said = self._program(*own.groups()) if own else self._shell(line)
+        if ended:
+            raise PageError(f"{line} ends with {ended}:\n{printed}{said}")
+        return printed
+
+    def _program(self, words: str, joined: str | None, target: str | None) -> tuple[int, str, str]:
+        """A command of the program; its messages too where they are joined, nothing where it has a target."""
+        with contextlib.chdir(self.folder):
+            ended, printed, said = forked(partial(cli.main, shlex.split(words)), joined=bool(joined))
+            if target and not ended:
+                Path(target).write_text(printed, encoding="utf-8")
+        return ended, "" if target else printed, said
+
+    def _shell(self, line: str) -> tuple[int, str, str]:
         path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
         done = subprocess.run(
-            ["sh", "-c", code],
+            ["sh", "-c", line],
             capture_output=True,
             text=True,
             check=False,
             cwd=self.folder,
-            env={**os.environ, "PATH": path, "COLUMNS": "100"},
+            env={**os.environ, "PATH": path},
         )
-        if done.returncode:
-            raise PageError(f"{code}ends with {done.returncode}:\n{done.stdout}{done.stderr}")
-        return done.stdout
+        return done.returncode, done.stdout, done.stderr
+
+
+def forked(act: Callable[[], int], *, joined: bool = False) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of an act in a copy of this process."""
+    with tempfile.TemporaryFile("w+") as printed, tempfile.TemporaryFile("w+") as said:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        child = os.fork()
+        if not child:
+            os.dup2(printed.fileno(), 1)
+            os.dup2(printed.fileno() if joined else said.fileno(), 2)
+            _ended_with(act)
+        ended = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        for file in (printed, said):
+            file.seek(0)
+        return ended, printed.read(), said.read()
+
+
+def _ended_with(act: Callable[[], int]) -> None:
+    """End this process with the exit code of an act; 1 after an exception, which is printed."""
+    code = 1
+    try:
+        code = act()
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
 
 
 def numbers_agree(first: str, second: str) -> bool:
@@ -171,20 +224,49 @@ def fresh_picture(path: Path, drawn: str) -> str:
     return kept if _skeleton(first) == _skeleton(second) and numbers_agree(first, second) else drawn
 
 
-def main(arguments: list[str]) -> int:
-    """Run pages, and write or name what changed."""
-    stale = 0
-    for name in (each for each in arguments if each != "--write"):
-        for path, text in fresh(Path(name)).items():
-            if path.exists() and path.read_text(encoding="utf-8") == text:
+def pages() -> list[Path]:
+    """The documents with a block that is run, or left out for a reason."""
+    return sorted(
+        path
+        for path in (ROOT / "docs").rglob("*.md")
+        if any(language in RUN for language, _ in FENCE.findall(path.read_text(encoding="utf-8")))
+    )
+
+
+def files(words: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """Pages, all or those named, and their pictures, as they are printed and drawn now.
+
+    Raises: PageError: of a page that does not run; the text has all of them.
+    """
+    _load()
+    paths = [Path(word).resolve() for word in words] or pages()
+    failed = []
+    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+        for path, (ended, printed, said) in zip(paths, pool.map(_page_apart, paths), strict=True):
+            if ended:
+                failed.append(f"{path.name}: {said}")
                 continue
-            print(f"{name} prints or draws something else than {path.name} shows")
-            stale += 1
-            if "--write" in arguments:
-                path.parent.mkdir(exist_ok=True)
-                write_whole(path, text.encode())
-    return int(bool(stale) and "--write" not in arguments)
+            for name, text in json.loads(printed).items():
+                yield Path(name), text.encode()
+    if failed:
+        raise PageError("\n".join(failed))
 
 
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+def _load() -> None:
+    """Have the program in this process, compiled code included, for all that is forked from it."""
+    # Read by every console of the program.
+    os.environ["COLUMNS"] = "100"
+    # Pages run side by side, so that none starts processes of its own to do so.
+    os.cpu_count = lambda: 1
+    for command in cli.COMMANDS.values():
+        import_module(command[0].partition(":")[0])
+    rb.simulate(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
+
+
+def _page_apart(path: Path) -> tuple[int, str, str]:
+    return forked(partial(_print_page, path))
+
+
+def _print_page(path: Path) -> int:
+    print(json.dumps({str(name): text for name, text in fresh(path).items()}))
+    return 0

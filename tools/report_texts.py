@@ -1,15 +1,11 @@
-"""What the pages of two kept reports say, as plain text: what tests compare the templates' words with.
-
-python tools/golden_pages.py              after a change of words: rewrites tests/reports/golden/*.txt
-python tools/golden_pages.py RING MASSES  after a change of evidence: of two folders of `ringbalance report`
-"""
+"""What the pages of two kept reports say, as plain text: what tests compare the templates' words with."""
 
 from __future__ import annotations
 
 import json
 import lzma
 import re
-import sys
+from collections.abc import Iterator, Sequence
 from html import unescape
 from pathlib import Path
 from typing import Any, Final
@@ -70,24 +66,18 @@ def _left_out(value: Any) -> bool:
     return isinstance(value, dict) and "verdict" in value and "claim" in value and value["id"] not in CASES
 
 
-def _keep(name: str, folder: Path) -> None:
+def packed(folder: Path) -> bytes:
+    """Evidence of a report's folder as it is kept, without three dates and a commit that change daily."""
     document = _shortened(json.loads((folder / "evidence.json").read_bytes()))
-    # Three dates and a commit that change from day to day.
     document["times"] |= {"date": "2030-01-02", "kept_cases": {}}
     document["provenance"] |= {"commit": "0123456789abcdef", "dirty": False, "machine": "a machine"}
     document["pictures"] |= {"drawn": False, "files": []}
-    packed = lzma.compress(json.dumps(document).encode(), preset=9)
-    (FOLDER / f"{name}.json.xz").write_bytes(packed)
+    return lzma.compress(json.dumps(document).encode(), preset=9)
 
 
-def main(folders: list[Path]) -> None:
-    """Keep evidence, if any is given, and write what the pages say of it."""
-    FOLDER.mkdir(exist_ok=True)
-    for name, folder in zip(NAMES, folders, strict=False):
-        _keep(name, folder)
+def files(words: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
+    """Words of both reports; first, of the folders of new reports on their scenes, the evidence to keep."""
+    for name, folder in zip(NAMES, words, strict=False):
+        yield FOLDER / f"{name}.json.xz", packed(Path(folder))
     for name in NAMES:
-        (FOLDER / f"{name}.txt").write_text(report_text(kept_evidence(name)), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main([Path(argument) for argument in sys.argv[1:]])
+        yield FOLDER / f"{name}.txt", report_text(kept_evidence(name)).encode()

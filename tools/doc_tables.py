@@ -1,7 +1,4 @@
-"""Write every generated part of the documents, and the equations as they are set.
-
-python tools/generated_docs.py            exit code 1 where one of them is not what the program says now
-python tools/generated_docs.py --write    writes them
+"""Every generated part of the documents, and the equations as they are set.
 
 A part stands in its page between `<!-- table: NAME -->` and `<!-- end -->`.
 """
@@ -11,8 +8,7 @@ from __future__ import annotations
 import json
 import lzma
 import re
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -27,7 +23,6 @@ from ringbalance.identification.reading import KINDS
 from ringbalance.reports.prose import equations as report_equations
 from ringbalance.reports.saved import saved_cases
 from ringbalance.results.rows import sentences
-from ringbalance.scene import write_whole
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.result import definition_document
 from ringbalance.verification.runner import paper_scene, run_case
@@ -140,17 +135,10 @@ def _documents() -> list[dict[str, Any]]:
     ]
 
 
-def main(arguments: list[str]) -> int:
-    """Write what changed, or say so."""
-    written = {name: fresh(text_of(name), tables()).encode() for name, tables in PARTS.items()}
-    written[str(EQUATIONS.relative_to(ROOT))] = equations()
-    stale = [name for name, content in written.items() if (ROOT / name).read_bytes() != content]
-    for name in stale:
-        print(name)
-        if "--write" in arguments:
-            write_whole(ROOT / name, written[name])
-    return int(bool(stale) and "--write" not in arguments)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+def files(words: Sequence[str] = ()) -> Iterator[tuple[Path, bytes]]:
+    """Documents with their parts written again, all or those named, and the equations."""
+    for name, tables in PARTS.items():
+        if not words or name in words:
+            yield ROOT / name, fresh(text_of(name), tables()).encode()
+    if not words:
+        yield EQUATIONS, equations()

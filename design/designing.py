@@ -6,8 +6,9 @@ What the search finds is judged as `tune` judges: on devices on which nothing wa
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -34,6 +35,8 @@ _MOST: Final = 10
 """Designs that are judged at the most, but for one."""
 _FEW: Final = 512
 """Devices at the most that choose between them; the verdict takes as many as `tune` does."""
+_SLOPE: Final = 3
+"""Designs to both sides over which the growth of the fraction is taken."""
 _MOVED: Final = 0.05
 """By which a key is moved to either side, relative."""
 _DEVICES: Final = 64
@@ -79,6 +82,12 @@ class Design(PresentedResult):
     """Changes of the scene; of the design that comes nearest where none meets what is required."""
     judgement: Judgement | None
     """Of it under its best settings; None: no design can work."""
+    smaller: tuple[float, Proportion] | None
+    """Size, m^3, of the next smaller design that was judged, with the fraction of devices that it served;
+    None: none was, or the size does not vary."""
+    doubt: float | None
+    """By how much other drawn devices would move the size, relative (95 %); None: the fraction of devices
+    does not grow with the size, or that does not vary."""
     front: tuple[Candidate, ...]
     """Of those that meet it on the devices of the search, none better than another in size, time and gas."""
     effects: tuple[Effect, ...]
@@ -127,6 +136,7 @@ def run_design(
         place, judged = _best(space, found, crew, told)
         best, judgement = (found.finalists[place], judged[place]) if judged else (None, None)
         effects: tuple[Effect, ...] = ()
+        smaller = _smaller(found, place, judged) if judged and space.sized else None
         if best is not None and judgement is not None:
             told("the verdict, and what changes of it would do")
             whole = partial(judged_design, scene, best.point, settings=judgement.settings)
@@ -145,6 +155,8 @@ def run_design(
         reach=reach,
         point=found.static.reach_point if best is None else best.point,
         judgement=judgement,
+        smaller=smaller,
+        doubt=_doubt(found, place, judgement) if judgement is not None and space.sized else None,
         front=_front(found, asked, least=0.0 if best is None else best.size),
         effects=effects,
         ranking=ranking,
@@ -181,8 +193,7 @@ def _best(
     def met() -> list[int]:
         return [at for at, each in judged.items() if each.verdict == MET]
 
-    if found.finalists:
-        judge(found.start, found.start - 1)
+    judge(found.start, found.start - 1)
     while met() and (least := min(met())) > 0 and len(judged) < _MOST:
         judge(least - 1, least - 2)
         if min(met()) == least:
@@ -199,6 +210,22 @@ def _judging(space: Space, found: Hunt, at: int) -> Callable[[], Judgement | Non
     finalist = found.finalists[at]
     search = found.whole and not space.sets_controller
     return partial(judged_design, space.hasty, finalist.point, place=finalist.place, search=search, most=_FEW)
+
+
+def _smaller(found: Hunt, place: int, judged: Mapping[int, Judgement]) -> tuple[float, Proportion] | None:
+    below = [at for at in judged if found.finalists[at].size < found.finalists[place].size]
+    if not below:
+        return None
+    at = max(below, key=lambda each: found.finalists[each].size)
+    return found.finalists[at].size, judged[at].fraction
+
+
+def _doubt(found: Hunt, place: int, judgement: Judgement) -> float | None:
+    """Half-width of the fraction over its growth per logarithm of the size, by the surface."""
+    rows, share = found.finalists, judgement.fraction
+    low, high = rows[max(place - _SLOPE, 0)], rows[min(place + _SLOPE, len(rows) - 1)]
+    rise = high.promise - low.promise
+    return (share.high - share.low) / 2 * math.log(high.size / low.size) / rise if rise > 0 else None
 
 
 def _effects(

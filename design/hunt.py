@@ -39,7 +39,7 @@ POINTS: Final = 2048
 _WHOLE: Final = 256
 """Points up to which a space of lists is tried whole."""
 _TOGETHER: Final = 256
-_SMALLEST, _SPREAD = 18, 18
+_SMALLEST, _SPREAD = 12, 14
 """Of the points that can work: the smallest, and as many over all sizes, that race at first."""
 _BLOCKS: Final = 8
 """Of devices, over which designs are spread: what one block has by chance does not lead the search."""
@@ -142,7 +142,7 @@ class Hunt:
         nearest."""
         promises = [each.promise for each in self.finalists]
         enough = (i for i, promise in enumerate(promises) if promise >= self.threshold)
-        return next(enough, int(np.argmax(promises)))
+        return next(enough, int(np.argmax(promises)) if promises else 0)
 
 
 def threshold(asked: float) -> float:

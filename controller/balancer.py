@@ -24,7 +24,6 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
@@ -431,10 +430,9 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
     found = []
     for table, content in scene_kind(scene.balancer).schema.tables.items():
         for key, declared in content.keys.items():
-            takes = declared.takes
             value = getattr(getattr(scene, table), key) if declared.uncertain else None
-            dimension = takes.dimension if isinstance(takes, Reader) else None
-            unit = next(iter(DIMENSIONS[dimension].units)) if dimension else "1"
+            dimension = declared.takes.dimension
+            unit = DIMENSIONS[dimension].si_unit if dimension else "1"
             several = enumerate(value) if isinstance(value, tuple) else ((None, value),)
             for entry, each in several:
                 path = f"{table}.{key}" if entry is None else f"{table}.{key}[{entry}]"

@@ -90,7 +90,7 @@ def continue_runs(
             if loop.sensed == 0:
                 _sense(loop, run, noise[i, k, 0], noise[i, k, 1])
             if loop.algorithm != OWN:
-                _decide(loop, assumed, run, liquid[i], notes[0], w)
+                decide(loop, assumed, run, liquid[i], notes[0], w)
             _watch(loop, run)
             run.cause = _cause(loop, plant, run, motions[i])
             _keep_sample(loop, run, samples)
@@ -132,7 +132,7 @@ def _sense(loop: Record, run: Record, amplitude_noise: float, phase_noise: float
 
 
 @in_place
-def _decide(
+def decide(
     loop: Record, assumed: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
 ) -> None:
     """One step of the algorithm on what the sensor shows."""

@@ -391,14 +391,14 @@ def _lasting(run: Simulation) -> Quantity:
     """Speed down to which the fullest chamber keeps its liquid with the gas off, by hydrostatics."""
     name = "correction lasts without gas down to"
     fill = max(float(each[-1]) for each in run.fill_ratio.values())
-    speed = lasting_speed(run.scene, fill)
+    speed = _lasting_speed(run.scene, fill)
     if speed is None:
         finding = Holding.of(run.scene, fill_ratio=fill).finding
         return _row("lasting_speed", name, None, "rad/s", status=finding.code if finding else "ok")
     return _row("lasting_speed", name, speed, "rad/s")
 
 
-def lasting_speed(scene: Scene, fill_ratio: float) -> float | None:
+def _lasting_speed(scene: Scene, fill_ratio: float) -> float | None:
     """Lowest speed at which a full tube parts over the crest before it drains a chamber of a fill, rad/s, the
     gas off; None where it does not part at the scene's.
 

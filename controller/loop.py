@@ -165,14 +165,24 @@ class _Outside:
         show(run, seen)
         self.measurements.append(seen)
         if self.controller is not None:
-            self.memory, command = self.controller.step(self.memory, seen)
+            self.memory, command = self._stepped(self.controller, seen)
             _write(run, command, self.chambers // 2)
             self.commands.append(command)
+
+    def _stepped(self, controller: Controller[Any], seen: Measurement | None) -> tuple[Any, Command]:
+        match controller.step(self.memory, seen):
+            case (state, Command() as command):
+                return state, command
+            case other:
+                wanted = "the next state and a Command, as in return state, rb.Command(...)"
+                raise TypeError(f"{type(controller).__name__}.step returns {wanted}; it returned {other!r}")
 
 
 def _write(run: np.void, command: Command, half: int) -> None:
     run["asked"], run["resting"] = 0.0, command.resting
     for valve in command.valves:
+        if valve.chamber >= 2 * half:
+            raise ValueError(f"chamber {valve.chamber}: this disc has chambers 0 to {2 * half - 1}")
         pair, side = valve.chamber % half, valve.chamber // half
         if run["asked"][pair] > 0:
             raise ValueError(f"gas into chambers {pair} and {pair + half} of one pair at once")

@@ -13,6 +13,7 @@ from ringbalance.controller.liquid_ring.plant import (
     LiquidRing,
     starting_pressure,
 )
+from ringbalance.controller.rotor import assumed_rotor
 from ringbalance.controller.simulation import NOISE_DEVIATIONS, Outcome, Simulation
 from ringbalance.controller.terms import dead_time
 from ringbalance.reduced_model.residual_liquid import Holding
@@ -34,7 +35,7 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
         code = unmoved.get(outcome, code)
     numbers = _numbers(run)
     ended = Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
-    return (ended, *_required(run), *_causes(run), *_shortened(run))
+    return (ended, *_required(run), *_causes(run), *_shortened(run), *assumed_rotor(run.scene))
 
 
 def _required(run: Simulation) -> Iterator[Finding]:

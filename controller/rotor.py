@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
@@ -20,12 +20,16 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.reduced_model.law.flow_law import MomentCurve
+from ringbalance.results.rows import Finding
 from ringbalance.scene import loop_models
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.origins import SceneFile
 
 MAX_CHAMBERS: Final = len(ascii_uppercase)
+_OF_ONE_ROTOR: Final = ("influence_coefficient", "lag_angle", "initial_vibration")
+"""Keys of a rotor whose defaults are those of one machine."""
 Sensor = Callable[[float, complex], Measurement | None]
 """Takes the time (s) and the vibration (m, complex); None is a dropped sample."""
 
@@ -218,3 +222,16 @@ def vibrating(scene: SceneFile, rotor: CommonRotor) -> CommonRotor:
         problem = "it does not vibrate: there is nothing to compare"
         raise rotor_fault(scene, "rotor", problem, "an unbalance")
     return rotor
+
+
+def assumed_rotor(scene: SceneFile) -> Iterator[Finding]:
+    """What a scene leaves to a default that holds for one rotor alone."""
+    keys = LIQUID_RING.tables["rotor"].keys
+    defaults = {key: keys[key].presence.default for key in _OF_ONE_ROTOR if f"rotor.{key}" in scene.defaulted}
+    if defaults:
+        texts = [f"rotor.{key} {_plain(default)}" for key, default in defaults.items()]
+        yield Finding(code="rotor_assumed", values={"values": texts})
+
+
+def _plain(default: object) -> str:
+    return " at ".join(map(str, default.values())) if isinstance(default, Mapping) else str(default)

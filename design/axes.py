@@ -19,6 +19,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.results.numbers import given as given_text
+from ringbalance.results.numbers import plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean
@@ -37,6 +39,10 @@ MOST_POINTS: Final = 1_000_000
 NAME: Final = "name"
 """Column of a CSV file that names a row, where the table has no such key."""
 _SAMPLES: Final = ("sobol", "latin")
+_OFTEN_WRONG: Final = frozenset({"length", "pressure"})
+"""Dimensions whose numbers are often thought of in a unit a thousand or a million times as large or small."""
+_FAR: Final = 100.0
+"""Times a scene's value beyond which no sweep over it lies as a whole."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,9 +256,27 @@ def _values(scene: SceneFile, path: str, given: Any) -> tuple[str, Range | list[
     if isinstance(given, str):
         given = given.split(",")
     given = given.tolist() if hasattr(given, "tolist") else list(given)
+    _check_scale(scene, path, given, reader)
     if len(given) == 1 and isinstance(given[0], str) and ":" in given[0]:
         return path, _range(path, given[0], reader)
     return path, [_checked(path, each, reader) for each in given]
+
+
+def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: Reader) -> None:
+    """Raises: SceneError: bare numbers that are all as far from the scene's own value as a wrong unit is."""
+    table, _, key = path.partition(".")
+    own, dimension = getattr(getattr(scene, table), key, None), reader.dimension
+    bare = all(isinstance(each, int | float) and each > 0 for each in values)
+    if dimension not in _OFTEN_WRONG or not values or not bare or not isinstance(own, float) or own <= 0:
+        return
+    ratios = [each / own for each in values]
+    if min(ratios) > _FAR or max(ratios) < 1 / _FAR:
+        unit = unit_of_path(scene, path)
+        shown = plain(given_text(own, unit))
+        problem = f"bare numbers are in {unit}, and all are far from the scene's {shown}"
+        raise _fault(
+            f"{path}={values[0]:g}", problem, f'numbers in {unit}, or text with its unit, as "{shown}"'
+        )
 
 
 def _range(path: str, text: str, reader: Reader) -> Range:

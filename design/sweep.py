@@ -55,6 +55,15 @@ class Sweep(Result):
         >>> table = rb.sweep(scene, {"tube.bore": [1e-3, 1.5e-3]})
         >>> table.point_scene(table.best).tube.bore
         0.001
+        >>> columns = table.columns()
+        >>> list(columns)[:4]
+        ['row', 'tube.bore [m]', 'lambda [m]', 'lambda half-width [m]']
+        >>> [f"{velocity:.3g}" for velocity in columns["velocity [m/s]"]]
+        ['13', '14.9']
+        >>> table.to_csv().splitlines()[0][:29]
+        'row,tube.bore [m],lambda [m],'
+        >>> [file.name for file in table.plot("figures")]
+        ['sweep-reach.svg', 'sweep-velocity.svg', 'sweep-loop-factor.svg']
     """
 
     scene: SceneFile
@@ -71,6 +80,8 @@ class Sweep(Result):
     """By quantity, of what the array core leaves out, see `trade.errors`; empty where nothing was checked."""
     designs_per_second: Mapping[str, float]
     """Of what this run computed, "static" and "runs"; wall time."""
+    resumed: Mapping[str, int]
+    """Points whose answers an earlier run had kept, likewise."""
 
     @property
     def verdicts(self) -> tuple[str, ...]:
@@ -101,7 +112,13 @@ class Sweep(Result):
         return point_scene(self.scene, self.points[row])
 
     def columns(self) -> dict[str, list[Any]]:
-        """The table, by name with SI unit: changed keys, values, half-widths, verdicts, hash of the scene."""
+        """The table, one list a column, by name with SI unit such as "velocity [m/s]".
+
+        In this order: `row`; the changed keys by path; static answers, each with the half-width of its
+        interval (95 %, by the uncertain inputs; only with `intervals`); with runs `devices`, `fraction` with
+        its bounds, and `settling_time` with its upper one; `status`, `verdict`, `finding` (why a point has no
+        answer) and `scene sha256`. None where a value is not known.
+        """
         return {f"{name} [{unit}]" if unit else name: values for name, unit, values in self.fields()}
 
     def fields(self) -> list[tuple[str, str, list[Any]]]:
@@ -139,7 +156,9 @@ class Sweep(Result):
         ]
 
     def to_csv(self) -> str:
-        """`columns` as comma-separated values; an empty cell is not known."""
+        """`columns` as comma-separated values, as `ringbalance sweep` writes table.csv; an empty cell is not
+        known.
+        """
         return csv_text(self.columns())
 
     def to_pandas(self) -> Any:
@@ -166,9 +185,11 @@ class Sweep(Result):
         return dataset(variables, coords=coords, attrs=source | {"scene_sha256": self.scene.sha256})
 
     def sensitivity(self, *, total: bool = False) -> dict[str, dict[str, tuple[float, float]]]:
-        """By result and varied number: the share of the variance that it explains, and its half-width.
+        """By result and varied number: the share of the variance that it explains, and its half-width (95 %).
 
-        Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.
+        Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.  A share
+        below zero, or shares that sum to more than 1, are noise of the sample: an interval that holds zero
+        shows no influence, and more points narrow it.
         Args: `total`: whether what it explains together with others counts too, see `total_order`.
         """
         columns = {name: _array(values) for name, _, values in self.fields()}
@@ -214,6 +235,7 @@ class Sweep(Result):
             "best": None if best is None else {"row": best, "changes": dict(self.points[best])},
             "left_out": list(self.errors),
             "times": dict(self.designs_per_second),
+            "resumed": dict(self.resumed),
             **self.rows().document(),
         }
 
@@ -240,6 +262,8 @@ class Sweep(Result):
         count, total, best = sum(self.feasible), len(self.points), self.best
         numbers = {"count": count, "total": total, "runs": self.runs}
         found = [Finding(code="sweep_met" if self.runs else "sweep_flows", values=numbers)]
+        for what, kept in self.resumed.items():
+            found.append(Finding(code="sweep_resumed", values={"count": kept, "what": what}))
         if best is not None:
             found.append(Finding(code="sweep_best", values={"row": best, "changes": self._change_text(best)}))
         if failed := [text for text in self.failures if text]:
@@ -298,10 +322,13 @@ def run_sweep(
     """Answer every point of a plan; see `sweep`."""
     points = plan.points()
     rates: dict[str, float] = {}
+    resumed: dict[str, int] = {}
 
     def shown(done: Done) -> None:
         if done.computed:
             rates[done.what] = done.rate
+        elif done.points:
+            resumed[done.what] = done.points
         if progress is not None:
             progress(done)
 
@@ -329,4 +356,5 @@ def run_sweep(
         runs=runs,
         errors=tuple(left_out),
         designs_per_second=rates,
+        resumed=resumed,
     )

@@ -63,6 +63,8 @@ class Block:
     facts: str
     """What it holds and how exact it is."""
     constants: Numbers
+    pieces: tuple[Numbers, ...]
+    """Rows of polynomials, likewise; none for a block without a law."""
     start: Numbers
     """The row before the first step."""
     modules: tuple[ModuleType, ...]
@@ -76,6 +78,11 @@ class Block:
         """What some functions need; default the one that a host calls."""
         return Source.of_modules(self.modules, entries or (self.steps,))
 
+    @property
+    def size(self) -> int:
+        """Of the constants, bytes."""
+        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
+
     def outputs(self, row: list[float]) -> dict[str, float]:
         """By name, of a row that is up to date."""
         return {each.name: row[each.place] for each in self.variables if not each.input}
@@ -86,7 +93,8 @@ class Block:
         for name, value in inputs.items():
             row[places[name]] = float(value)
         step = getattr(self.modules[-1], self.steps)
-        step(self.constants, row, *((time,) if self.timed else ()))
+        rows = (self.constants, self.pieces) if self.pieces else (self.constants,)
+        step(*rows, row, *((time,) if self.timed else ()))
         return self.outputs(row)
 
 
@@ -100,6 +108,7 @@ def law_block(law: CompactLaw) -> Block:
         scene=law.scene,
         facts=law_facts(law),
         constants=law.constants,
+        pieces=law.pieces,
         start=tuple(row),
         modules=(point,),
         steps="answer_all",
@@ -111,7 +120,7 @@ def law_block(law: CompactLaw) -> Block:
 def law_facts(law: CompactLaw) -> str:
     """What a law holds and how exact it is, in sentences."""
     return (
-        f"{len(law.constants)} constants, {8 * len(law.constants)} bytes; velocities {RANGE}, beyond\n"
+        f"{law.size // 8} constants, {law.size} bytes; velocities {RANGE}, beyond\n"
         f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
         f"   {law.level_error:.1e} Pa of a chamber's level; both are part of the uncertainty."
     )
@@ -134,7 +143,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
     for pair in range(half):
         at = disc.FIRST_PAIR + disc.PER_PAIR * pair
         row[at : at + disc.STATES] = [fill, ambient, ambient, content, content]
-    disc.show(constants, row)
+    disc.show(constants, compact.pieces, row)
 
     def place(offset: str, chamber: int | None) -> int:
         value = int(getattr(disc, offset))
@@ -148,6 +157,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
         scene=scene.file,
         facts=law_facts(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
         constants=tuple(constants),
+        pieces=compact.pieces,
         start=tuple(row),
         modules=(point, disc),
         steps="step",
@@ -219,6 +229,7 @@ def controller_block(scene: Scene) -> Block:
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
         constants=_settings(scene),
+        pieces=(),
         start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
         modules=(point, controller),
         steps="step",

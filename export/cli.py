@@ -81,7 +81,7 @@ def export(
             (folder / file).write_bytes(content)
     for file in files:
         results_console().print(str(out / file), highlight=False)
-    size = f"{8 * len(made.constants)} bytes of constants"
+    size = f"{made.size} bytes of constants"
     exact = f", velocities within {compact.departure:.1e} of the calibrated law's" if compact else ""
     print_message(size + exact)
     return 0

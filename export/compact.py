@@ -1,24 +1,26 @@
 """The calibrated law as some four hundred numbers, from which every host answers with the same bits.
 
-Velocity over the square root of the head stands as cubic Hermite pieces along the head's eighth root, levels
-as quintic ones along the fill ratio, with knots where the tolerance asks for them; beside them is what
+Velocity over the square root of its pressure stands as polynomials of degree five along the pressure's eighth
+root, levels alike along the fill ratio, each piece as long as the tolerance allows; beside them is what
 decides on regime, status and uncertainty.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from ringbalance.export import point
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables import HermiteTable
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.reduced_model.tube.regime import CLEARING, TubePath
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -32,14 +34,19 @@ _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
 _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 26
-"""Knots; a level from a mesh that asks for more is less exact, and says so in its half-width."""
-_OF_SHARE: Final = 5e-4
-_OF_CHAMBER: Final = 1e-5
+_MOST_LEVELS: Final = 16
+"""Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
+_OF_SHARE: Final = 1e-3
+_OF_CHAMBER: Final = 2e-6
 """Of the largest squared radius and moment."""
-_OF_WIDTHS: Final = 0.05
+_OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
+_OF_MOMENT_WIDTH: Final = 0.1
 _SAMPLES: Final = 2001
+_CELLS: Final = 8
+"""Of equal length, each of which knows at which piece to begin looking."""
+_EDGE: Final = 1e-9
+"""Of a cell, by which rounding may not lead before the first."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""
 
@@ -68,12 +75,19 @@ class CompactLaw:
     """File that it was calibrated from."""
     constants: tuple[float, ...]
     """At the places that `point` names."""
+    pieces: tuple[tuple[float, ...], ...]
+    """Rows of nine numbers, likewise."""
     head_error: float
     """Largest relative error of a velocity for a given head against the calibrated law."""
     level_error: float
     """Largest error of a level's pressure, Pa; part of its half-width."""
     departure: float = 0.0
     """Largest relative difference of a velocity from the calibrated law's, in drawn conditions."""
+
+    @property
+    def size(self) -> int:
+        """Of all numbers, bytes."""
+        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
 
     @property
     def max_fill_ratio(self) -> float:
@@ -95,7 +109,7 @@ class CompactLaw:
         opposite = self.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         query = [0.0] * point.PLACES_OF_QUERY
         query[:4] = fill_ratio, opposite, gas_pressure, float(primed)
-        point.answer(self.constants, query)
+        point.answer(self.constants, self.pieces, query, True)
         velocity, width, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
         return Answer(
             velocity=velocity,
@@ -118,13 +132,19 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    row = [0.0] * point.PLACES
-    level_error = _append_levels(row, law)
-    _append_chamber(row, scene, law)
-    missed = _append_tube(row, law)
+    builder = _Builder(numbers=[0.0] * point.PLACES, rows=[])
+    missed = _add_tube(builder, law)
+    level_error = _add_levels(builder, law)
+    _add_chamber(builder, scene, law)
     for at, value in _scalars(law, missed).items():
-        row[at] = float(value)
-    made = CompactLaw(scene=scene.file, constants=tuple(row), head_error=missed, level_error=level_error)
+        builder.numbers[at] = float(value)
+    made = CompactLaw(
+        scene=scene.file,
+        constants=tuple(builder.numbers),
+        pieces=tuple(map(tuple, builder.rows)),
+        head_error=missed,
+        level_error=level_error,
+    )
     return replace(made, departure=_departure(made, law))
 
 
@@ -150,11 +170,11 @@ def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
 
 def _scalars(law: CalibratedLaw, missed: float) -> dict[int, float]:
     path, inputs = law.path, law.inputs
+    by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
     return {
         point.LARGEST_FILL: law.max_fill_ratio,
         point.AMBIENT: law.ambient_pressure,
         point.GAS_FACTOR: law.gas_factor,
-        point.DENSITY: law.density,
         point.PORT: path.port_pressure,
         point.CREST: path.crest,
         point.COLUMN: path.column_pressure,
@@ -162,14 +182,13 @@ def _scalars(law: CalibratedLaw, missed: float) -> dict[int, float]:
         point.VAPOUR: path.vapour_pressure,
         point.RELEASED: path.released,
         point.CAVITY_KNOWN: path.cavity_fitted,
-        point.FROUDE: path.froude_velocity,
-        point.STAYS: path.clearing_velocities[0],
-        point.CLEARS: path.clearing_velocities[1],
-        point.OF_DENSITY: inputs.relative_density,
-        point.OF_SPEED: inputs.relative_speed,
-        point.OF_GAS: inputs.relative_gas_pressure,
-        point.OF_CREST: float(np.hypot(inputs.hump_pressure, inputs.vapour_pressure)),
-        point.TABULATION: _AT_CREST * missed,
+        point.OF_DENSITY: by_density,
+        point.OF_BLOWN: by_density + inputs.relative_gas_pressure**2,
+        point.OF_SPEED: by_speed,
+        point.OF_GAS: inputs.relative_gas_pressure**2,
+        point.OF_CREST: inputs.hump_pressure**2 + inputs.vapour_pressure**2,
+        point.OF_LIQUID: by_density + by_speed,
+        point.TABULATION: (_AT_CREST * missed) ** 2,
         point.LOWEST: VELOCITIES[0],
         point.HIGHEST: VELOCITIES[1],
     }
@@ -177,149 +196,171 @@ def _scalars(law: CalibratedLaw, missed: float) -> dict[int, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class _Column:
-    """A quantity over samples, with derivatives by the table's x as far as its pieces need them."""
+    """A quantity over samples, as polynomials."""
 
     value: FloatArray
     """Shape (samples,)."""
-    allowed: FloatArray | float
-    """Largest error."""
-    slope: FloatArray | None = None
-    """None: straight between the knots."""
-    curvature: FloatArray | None = None
+    allowed: FloatArray
+    """Largest error, shape (samples,)."""
+    degree: int = point.C5 - point.C0
 
-    @property
-    def stored(self) -> tuple[FloatArray, ...]:
-        return tuple(each for each in (self.value, self.slope, self.curvature) if each is not None)
+    def polynomial(self, x: FloatArray, first: int, last: int) -> FloatArray:
+        """Coefficients in (x - end)/length from the samples between two, both of which are met.
+
+        The samples are those next to the extrema of a Chebyshev polynomial.
+        """
+        extrema = (1 - np.cos(np.pi * np.arange(self.degree + 1) / self.degree)) / 2
+        at = np.unique(np.rint(first + (last - first) * extrema).astype(int))
+        t = (x[at] - x[last]) / (x[last] - x[first])
+        found = np.linalg.solve(np.vander(t, increasing=True), self.value[at])
+        return np.pad(found, (0, self.degree + 1 - at.size))
 
     def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
-        """Of one piece between two samples, at the samples that it spans."""
-        ends, inside = [first, last], slice(first, last + 1)
-        width = float(x[last] - x[first])
-        t, y = (x[inside] - x[first]) / width, self.value[ends]
-        if self.slope is None:
-            return np.asarray(y[0] + t * (y[1] - y[0]) - self.value[inside])
-        slope = width * self.slope[ends]
-        if self.curvature is None:
-            bend = 3 * (y[1] - y[0]) - 2 * slope[0] - slope[1]
-            piece = slope[0] + t * (bend + t * (y[1] - y[0] - slope[0] - bend))
-        else:
-            half = width * width * self.curvature[ends] / 2
-            rise = y[1] - y[0] - slope[0] - half[0]
-            turn, bend = slope[1] - slope[0] - 2 * half[0], half[1] - half[0]
-            third, fourth = 10 * rise - 4 * turn + bend, 7 * turn - 15 * rise - 2 * bend
-            piece = slope[0] + t * (half[0] + t * (third + t * (fourth + t * (6 * rise - 3 * turn + bend))))
-        return np.asarray(y[0] + t * piece - self.value[inside])
+        """Of one piece, at the samples that it spans."""
+        inside = slice(first, last + 1)
+        t = (x[inside] - x[last]) / (x[last] - x[first])
+        return np.asarray(polyval(t, self.polynomial(x, first, last)) - self.value[inside])
+
+    def largest(self, x: FloatArray, ends: list[int], of: FloatArray | float = 1.0) -> float:
+        """Error of all pieces. Args: `of`: what it is relative to, at the samples."""
+        scale = np.broadcast_to(of, x.shape)
+        return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairwise(ends))
 
 
-def _append_levels(row: list[float], law: CalibratedLaw) -> float:
+@dataclass(frozen=True, kw_only=True)
+class _Builder:
+    """The law's numbers and pieces, as far as they are."""
+
+    numbers: list[float]
+    rows: list[list[float]]
+
+    def add(self, x: FloatArray, ends: list[int], columns: Sequence[_Column], *, ended: bool = True) -> None:
+        """Pieces in powers of the distance from their ends, and these before them if they are asked for."""
+        for first, last in pairwise(ends if columns else ()):
+            row = [float(x[last])] if ended else []
+            for column in columns:
+                powers = (x[last] - x[first]) ** np.arange(column.degree + 1)
+                row += (column.polynomial(x, first, last) / powers).tolist()
+            self.rows.append([*row, *[0.0] * (point.WIDTH_SLOPE + 1 - len(row))])
+
+    def add_cells(self, x: FloatArray, ends: list[int]) -> tuple[float, float]:
+        """Cells for the pieces that are added next. Returns: cells for one of x, and the place of x = 0."""
+        scale = _CELLS / (x[-1] - x[0])
+        place = len(self.numbers)
+        for edge in np.linspace(x[0], x[-1], _CELLS + 1)[:-1]:
+            self.numbers.append(float(len(self.rows) + np.searchsorted(x[ends[1:]], edge, side="right")))
+        self.numbers.append(float(len(self.rows) + len(ends) - 2))
+        return float(scale), float(place - x[0] * scale + _EDGE)
+
+
+def _add_levels(builder: _Builder, law: CalibratedLaw) -> float:
     """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
     table = law.hydrostatic_pressure
     # Every node of the law's table is a sample, so that a table with few nodes is met exactly.
     parts = max(1, round(_SAMPLES / (table.value.size - 1)))
     x = np.linspace(0.0, law.max_fill_ratio, parts * (table.value.size - 1) + 1)
     slowest = float(np.exp(law.heads.head(np.log(VELOCITIES[0])))) * law.density
-    value, slope = table.with_slope(x)
-    level = _Column(
-        value=value,
-        allowed=_OF_LEVELS * slowest,
-        slope=slope,
-        curvature=_curvature(table, x),
-    )
-    width = np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0)
-    while (knots := _knots(x, [level, _half_width(width)])).size > _MOST_LEVELS:
-        level = replace(level, allowed=2 * np.asarray(level.allowed))
-    error = _largest(x, level, knots)
-    _append(row, point.FILLS, x, knots, [level, replace(_half_width(width), value=np.hypot(width, error))])
+    level = _Column(value=table(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
+    while len(ends := _ends(x, [level, width])) > _MOST_LEVELS + 1:
+        level = replace(level, allowed=2 * level.allowed)
+    error = level.largest(x, ends)
+    cells = builder.add_cells(x, ends)
+    builder.numbers[point.LEVEL_SCALE], builder.numbers[point.LEVEL_CELLS] = cells
+    builder.add(x, ends, [level, replace(width, value=np.hypot(width.value, error))])
     return error
 
 
-def _curvature(table: HermiteTable, x: FloatArray) -> FloatArray:
-    cell = np.clip(np.floor((x - table.start) / table.step), 0, table.value.size - 2).astype(int)
-    t = (x - table.start) / table.step - cell
-    c = table.coefficients[:, cell]
-    return np.asarray((2 * c[2] + t * (6 * c[3] + t * (12 * c[4] + t * 20 * c[5]))) / table.step**2)
-
-
-def _append_chamber(row: list[float], scene: Scene, law: CalibratedLaw) -> None:
+def _add_chamber(builder: _Builder, scene: Scene, law: CalibratedLaw) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
     x = np.linspace(0.0, law.max_fill_ratio, _SAMPLES)
-    square = surface_radius(disc=scene.disc, fill_ratio=x) ** 2
-    moment, slope = law.moment.chamber_moment.with_slope(x)
-    columns = [
-        _Column(
-            value=square,
-            allowed=_OF_CHAMBER * float(np.max(square)),
-            slope=np.gradient(square, x, edge_order=2),
-        ),
-        _Column(value=moment, allowed=_OF_CHAMBER * float(np.max(np.abs(moment))), slope=slope),
-        _half_width(np.maximum(law.moment.half_width(x), 0.0)),
-    ]
-    _append(row, point.CHAMBER, x, _knots(x, columns), columns)
+    columns = []
+    for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
+        allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
+        columns.append(_Column(value=value, allowed=allowed, degree=2))
+    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
+    ends = _ends(x, columns)
+    cells = builder.add_cells(x, ends)
+    builder.numbers[point.CHAMBER_SCALE], builder.numbers[point.CHAMBER_CELLS] = cells
+    builder.add(x, ends, columns)
 
 
-def _append_tube(row: list[float], law: CalibratedLaw) -> float:
-    """Velocities over heads. Returns: their largest relative error."""
+def _add_tube(builder: _Builder, law: CalibratedLaw) -> float:
+    """Velocities over pressures. Returns: their largest relative error."""
     heads, log_u = law.heads, np.log(np.geomspace(*VELOCITIES, _SAMPLES))
     ways = [way for way in (heads.hump_head, heads.return_hump_head) if way is not None]
-    alike = len(ways) == 2 and np.array_equal(ways[0].value, ways[1].value)
-    ways = ways[:1] if alike else ways
-    s, ratio, by_s = _velocities(heads.head, log_u)
-    columns = [ratio, _half_width(heads.uncertainty(log_u))]
+    if len(ways) == 2 and np.array_equal(ways[0].value, ways[1].value):
+        del ways[1]
+    builder.numbers[point.WAY_BACK] = float(len(ways))
+    builder.rows.extend([] for _ in range(1 + len(ways)))
+    beside = [_share(heads.head, way, log_u, degree=3 - at) for at, way in enumerate(ways)]
     if ways:
-        columns.append(_half_width(heads.fraction_uncertainty(log_u) + _OF_SHARE))
-        columns += [_share(heads.head, way, log_u, by_s) for way in ways]
-    tables = [(point.SIPHON, s, columns)]
-    for at, way in zip((point.THERE, point.BACK), ways, strict=False):
-        s, ratio, _ = _velocities(way, log_u)
-        tables.append((at, s, [ratio, _half_width(heads.hump_uncertainty(log_u))]))
-    missed = []
-    for at, x, each in tables:
-        knots = _knots(x, each)
-        _append(row, at, x, knots, each)
-        missed.append(_largest(x, each[0], knots, relative=True))
-    row[point.BACK_SHARE] = point.SHARE_COLUMN + (0 if alike else 2)
-    if alike:
-        row[point.BACK : point.BACK + 2] = row[point.THERE : point.THERE + 2]
+        beside.insert(1, _half_width(np.hypot(heads.fraction_uncertainty(log_u), _OF_SHARE)))
+    columns = _velocities(law, heads.head, heads.uncertainty(log_u), log_u)
+    missed = [_add_velocities(builder, point.SIPHON, *columns, beside)]
+    for at, way in enumerate(ways, start=point.THERE):
+        columns = _velocities(law, way, heads.hump_uncertainty(log_u), log_u)
+        missed.append(_add_velocities(builder, at, *columns))
+        builder.rows[at] += [*law.path.clearing_velocities, *_carried(law.path)]
     return max(missed)
 
 
-def _velocities(head: HermiteTable, log_u: FloatArray) -> tuple[FloatArray, _Column, FloatArray]:
-    """Eighth root of the head, u/sqrt(head) over it, and d(ln u)/d(eighth root)."""
-    value, slope = head.with_slope(log_u)
-    s, ratio = np.exp(value / 8), np.exp(log_u - value / 2)
-    by_s = 8 / (s * slope)
-    column = _Column(value=ratio, allowed=_OF_HEADS * ratio, slope=ratio * (1 - slope / 2) * by_s)
-    return s, column, by_s
+def _carried(path: TubePath) -> tuple[float, float]:
+    """Factor of the velocity, and what is taken from it, for how far it carries gas out."""
+    low, high = CLEARING
+    froude = path.froude_velocity * (high - low)
+    return (1.0 / froude, low / (high - low)) if froude else (0.0, -1.0)
 
 
-def _share(head: HermiteTable, way: HermiteTable, log_u: FloatArray, by_s: FloatArray) -> _Column:
-    """Part of the head that is lost up to the crest, over the eighth root of the head."""
-    (whole, slope), (part, part_slope) = head.with_slope(log_u), way.with_slope(log_u)
-    share = np.exp(part - whole)
-    return _Column(value=share, allowed=_OF_SHARE * share, slope=share * (part_slope - slope) * by_s)
+def _velocities(
+    law: CalibratedLaw, head: HermiteTable, loss: FloatArray, log_u: FloatArray
+) -> tuple[FloatArray, list[_Column]]:
+    """Eighth root of the pressure; velocity over its square root, and squared half-width of the loss."""
+    log_pressure = head(log_u) + np.log(law.density)
+    ratio = np.exp(log_u - log_pressure / 2)
+    return np.exp(log_pressure / 8), [_Column(value=ratio, allowed=_OF_HEADS * ratio), _half_width(loss**2)]
 
 
-def _half_width(value: FloatArray) -> _Column:
-    return _Column(value=value, allowed=_OF_WIDTHS * (value + 0.1 * float(np.max(value))) + 1e-300)
+def _add_velocities(
+    builder: _Builder, way: int, x: FloatArray, columns: list[_Column], beside: Sequence[_Column] = ()
+) -> float:
+    """Pieces of one way with those beside them, and its own row. Returns: their largest relative error."""
+    ends = _ends(x, [*columns, *beside])
+    scale, cells = builder.add_cells(x, ends)
+    builder.add(x, ends, columns)
+    builder.add(x, ends, beside, ended=False)
+    lowest, ratio = float(x[0]), columns[0]
+    builder.rows[way] = [lowest**8, float(ratio.value[0]) / lowest**4, float(x[-1]), scale, cells]
+    if way == point.SIPHON:
+        builder.rows[way] += [float(len(ends) - 1), 0.0, 0.0, 0.0]
+    return ratio.largest(x, ends, of=ratio.value)
 
 
-def _knots(x: FloatArray, columns: list[_Column]) -> IntArray:
-    """Samples at which pieces meet, each piece as long as its errors allow."""
+def _share(head: HermiteTable, way: HermiteTable, log_u: FloatArray, *, degree: int) -> _Column:
+    """Part of the pressure that is lost up to the crest."""
+    share = np.exp(way(log_u) - head(log_u))
+    return _Column(value=share, allowed=_OF_SHARE * share, degree=degree)
+
+
+def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
+    allowed = of * (value + 0.1 * float(np.max(value))) + 1e-300
+    return _Column(value=value, allowed=allowed, degree=1)
+
+
+def _ends(x: FloatArray, columns: Sequence[_Column]) -> list[int]:
+    """Samples at which pieces meet, each piece as long as its errors allow, and those at both ends."""
 
     def fits(first: int, last: int) -> bool:
+        inside = slice(first, last + 1)
         return all(
-            bool(np.all(np.abs(column.errors(x, first, last)) <= _inside(column.allowed, first, last)))
+            bool(np.all(np.abs(column.errors(x, first, last)) <= column.allowed[inside]))
             for column in columns
         )
 
-    knots = [0]
-    while knots[-1] < x.size - 1:
-        knots.append(_furthest(lambda last: fits(knots[-1], last), knots[-1] + 1, x.size - 1))
-    return np.array(knots)
-
-
-def _inside(allowed: FloatArray | float, first: int, last: int) -> FloatArray | float:
-    return allowed[first : last + 1] if isinstance(allowed, np.ndarray) and allowed.ndim else allowed
+    ends = [0]
+    while ends[-1] < x.size - 1:
+        ends.append(_furthest(lambda last: fits(ends[-1], last), ends[-1] + 1, x.size - 1))
+    return ends
 
 
 def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:
@@ -328,20 +369,3 @@ def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:
         middle = (low + high + 1) // 2
         low, high = (middle, high) if fits(middle) else (low, middle - 1)
     return low
-
-
-def _largest(x: FloatArray, column: _Column, knots: IntArray, *, relative: bool = False) -> float:
-    """Error of a column between its knots."""
-    return max(
-        float(np.max(np.abs(column.errors(x, a, b) / (column.value[a : b + 1] if relative else 1.0))))
-        for a, b in pairwise(knots.tolist())
-    )
-
-
-def _append(row: list[float], at: int, x: FloatArray, knots: IntArray, columns: list[_Column]) -> None:
-    """Put a table behind a row, and where it begins, with its number of knots, into its places."""
-    row[at], row[at + 1] = float(len(row)), float(knots.size)
-    row += x[knots].tolist()
-    for column in columns:
-        for values in column.stored:
-            row += values[knots].tolist()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from io import BytesIO
+from itertools import chain
 from typing import Final
 from xml.etree import ElementTree as ET
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
@@ -158,7 +159,7 @@ def _xml(root: ET.Element) -> bytes:
 
 def guid_of(block: Block) -> str:
     """One for each block: other numbers make another unit."""
-    text = ",".join(number_text(value) for value in (*block.constants, *block.start))
+    text = ",".join(number_text(value) for value in (*block.constants, *chain(*block.pieces), *block.start))
     return hashlib.sha256(f"{block.kind},{text}".encode()).hexdigest()[:32]
 
 

@@ -8,7 +8,7 @@ from string import Template
 from typing import Final
 
 from ringbalance.export.blocks import RANGE, Block, Variable
-from ringbalance.export.translate import c_functions, number_text, python_functions, st_functions
+from ringbalance.export.translate import PER_PIECE, c_functions, number_text, python_functions, st_functions
 
 _PER_LINE: Final = 4
 _OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
@@ -34,7 +34,7 @@ def block_c_files(block: Block, name: str) -> dict[str, str]:
     """The same with the names that all blocks have."""
     upper = name.upper()
     places = [f"    {upper}_{each.name.upper()} = {each.place}" for each in block.variables]
-    run = f"{block.steps}(CONSTANTS, s->w{', time' if block.timed else ''});"
+    run = f"{block.steps}({_rows(block)}, s->w{', time' if block.timed else ''});"
     source = filled("block_c", block, name, head=_head(block, name), run=run)
     header = filled("block_h", block, name, places=",\n".join(places))
     return {f"{name}.h": header, f"{name}.c": source}
@@ -47,7 +47,8 @@ def _head(block: Block, name: str, entries: tuple[str, ...] = ()) -> str:
 
 def st_files(block: Block, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
-    sizes = {"Law": len(block.constants), "Query": len(block.start)}
+    ends = {"Law": f"0..{len(block.constants) - 1}", "Query": f"0..{len(block.start) - 1}"}
+    sizes = {**ends, "Pieces": f"0..{len(block.pieces) - 1}, 0..{PER_PIECE - 1}"}
     entries = ("answer", *_OF_CHAMBER) if block.kind == "law" else ()
     functions = st_functions(block.source(entries), prefix=name, sizes=sizes)
     if block.kind == "law":
@@ -62,9 +63,13 @@ def st_files(block: Block, name: str) -> dict[str, str]:
         outputs="\n".join(map(_st_declared, outputs)),
         set="\n".join(map(_st_set, inputs)),
         get="\n".join(map(_st_get, outputs)),
-        steps=block.steps,
+        run=f"{block.steps}({'c, p' if block.pieces else 'c'}, w, elapsed)",
     )
     return {f"{name}.st": text}
+
+
+def _rows(block: Block) -> str:
+    return "CONSTANTS, PIECES" if block.pieces else "CONSTANTS"
 
 
 def _sides(block: Block) -> tuple[list[Variable], list[Variable]]:
@@ -98,11 +103,27 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     if law:
         return {f"{name}.py": filled("python", block, name, source=source)}
     inputs, outputs = ("\n".join(f'    "{v.name}": {v.place},' for v in side) for side in _sides(block))
-    run = f"{block.steps}(CONSTANTS, self.w, time)"
+    run = f"{block.steps}({_rows(block)}, self.w, time)"
     text = filled(
         "block_python", block, name, source=source, inputs=inputs, outputs=outputs, run=run, kind=block.kind
     )
     return {f"{name}.py": text}
+
+
+_DECLARED: Final = {
+    "c": ("static const double PIECES[{count}][{width}] = {{\n{rows}\n}};\n", "    {{{}}}"),
+    "st": ("    p : ARRAY[0..{last}, 0..{end}] OF LREAL := [\n{rows}\n    ];\n", "    {}"),
+    "python": ("PIECES = (\n{rows},\n)\n", "    ({})"),
+}
+"""How a language declares rows of polynomials, and one of them."""
+
+
+def _pieces(block: Block, language: str) -> str:
+    whole, one = _DECLARED[language]
+    rows = ",\n".join(one.format(", ".join(map(number_text, row))) for row in block.pieces)
+    count = len(block.pieces)
+    sizes = {"count": count, "last": count - 1, "width": PER_PIECE, "end": PER_PIECE - 1}
+    return whole.format(rows=rows, **sizes) if rows else ""
 
 
 def filled(template: str, block: Block, name: str, **parts: str) -> str:
@@ -121,6 +142,7 @@ def filled(template: str, block: Block, name: str, **parts: str) -> str:
         row=len(block.start),
         last_of_row=len(block.start) - 1,
         constants=_lines(block.constants),
+        pieces=_pieces(block, next((each for each in _DECLARED if template.endswith(each)), "c")),
         start=_lines(block.start),
         **parts,
     )

@@ -1,49 +1,58 @@
 """One query of the compact law, in + - * / sqrt and comparisons, which IEEE 754 fixes to the last bit.
 
 The one source of every host: Python runs it as it stands, `translate` writes it in other languages, so it
-keeps to numbers, rows of numbers, `if`, `while` and functions.  `c` is the law, `w` a query with its answer
-and all between; the names below are places in them.  A table in `c` has its knots first and behind them each
-column, of as many numbers.  Gauge pressures in Pa, velocities in m/s, heads in m^2/s^2; upstream is the
-chamber that gives liquid.  Source: `tube.regime` and `tube.directed_flow`, whose conditions and half-widths
-these are.
+keeps to numbers, rows of numbers, `if`, `while` and functions.  `c` holds the law's numbers, `p` its pieces,
+`w` a query with its answer and all between; the names below are places in them.  A piece is a polynomial of
+degree five in the distance from its end; cells of equal length say at which piece to begin looking.  Gauge
+pressures in Pa, velocities in m/s, half-widths at 95 %; upstream is the chamber that gives liquid.  Source:
+`tube.regime` and `tube.directed_flow`, whose conditions and half-widths these are.
 """
 
 from collections.abc import Sequence
 from math import sqrt
 
 Law = Sequence[float]
+Pieces = Sequence[Sequence[float]]
 Query = list[float]
 
 # fmt: off
-# Of the law.
-LARGEST_FILL, AMBIENT, GAS_FACTOR, DENSITY, PORT, CREST, COLUMN, TRAPPED = 0, 1, 2, 3, 4, 5, 6, 7
-VAPOUR, RELEASED, CAVITY_KNOWN, FROUDE, STAYS, CLEARS = 8, 9, 10, 11, 12, 13
-OF_DENSITY, OF_SPEED, OF_GAS, OF_CREST, TABULATION, LOWEST, HIGHEST = 14, 15, 16, 17, 18, 19, 20
-# Where a table begins, and behind it the number of its knots.
-FILLS, CHAMBER, SIPHON, THERE, BACK = 21, 23, 25, 27, 29
-# Column of the way back in the table of the siphon; where a block that builds on the law has its own numbers.
-BACK_SHARE, BLOCK, PLACES = 31, 32, 33
-# Columns: value, slope and curvature, or values that are straight between knots.
-LEVEL_WIDTH_COLUMN, MOMENT_COLUMN, MOMENT_WIDTH_COLUMN = 4, 3, 5
-LOSS_COLUMN, SHARE_WIDTH_COLUMN, SHARE_COLUMN = 3, 4, 5
+# Of the law; OF_...: squared half-widths, relative but for that of the crest.
+LARGEST_FILL, AMBIENT, GAS_FACTOR, PORT, CREST, COLUMN, TRAPPED, VAPOUR = 0, 1, 2, 3, 4, 5, 6, 7
+RELEASED, CAVITY_KNOWN, OF_DENSITY, OF_BLOWN, OF_SPEED, OF_GAS, OF_CREST = 8, 9, 10, 11, 12, 13, 14
+OF_LIQUID, TABULATION, LOWEST, HIGHEST, LEVEL_SCALE, LEVEL_CELLS = 15, 16, 17, 18, 19, 20
+# Row of the way back; where a block that builds on the law has its own numbers.
+CHAMBER_SCALE, CHAMBER_CELLS, WAY_BACK, BLOCK, PLACES = 21, 22, 23, 24, 25
+
+# Rows of the pieces that say where velocities are found: of the whole tube, and up to the crest.
+SIPHON, THERE = 0, 1
+# In them: pressure below which a flow creeps, velocity over it there, largest eighth root of one, cells; then
+# of the whole tube rows from a piece to what is beside it, of a way velocities at which gas is carried.
+SLOWEST, CREEP, LAST, SCALE, CELLS, SHARES = 0, 1, 2, 3, 4, 5
+STAYS, CLEARS, CARRY, CARRY_FROM = 5, 6, 7, 8
+# In a piece: its end, the polynomial, and a half-width that is straight; of a chamber two polynomials.
+END, C0, C1, C2, C3, C4, C5, WIDTH, WIDTH_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7, 8
+SQUARE_0, SQUARE_1, SQUARE_2, MOMENT_0, MOMENT_1, MOMENT_2 = 1, 2, 3, 4, 5, 6
+# Beside a piece of the whole tube: part of its pressure that is lost up to the crest, there and back.
+SHARE_0, SHARE_1, SHARE_2, SHARE_3, OFF, OFF_SLOPE, BACK_0, BACK_1, BACK_2 = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 # Of a query, and of its answer.
 FILL, OPPOSITE_FILL, PRESSURE, PRIMED = 0, 1, 2, 3
 VELOCITY, UNCERTAINTY, REGIME, STATUS, PRIMED_AFTER = 4, 5, 6, 7, 8
 # In one direction: pressures at the tube's ends, half-widths of levels, and what lies over the crest.
-UP_GAS, DOWN_GAS, UP_LEVEL, UP_WIDTH, DOWN_LEVEL, DOWN_WIDTH = 9, 10, 11, 12, 13, 14
-DISCHARGE, DRIVING, RESTING, CAVITY, LEAST, MOST, GAS_THERE = 15, 16, 17, 18, 19, 20, 21
-# Velocities with d ln(velocity)/d ln(head), half-width of the loss, knot before, and place behind it.
-FULL, BROKEN, OTHER = 22, 27, 32
+UP_GAS, DOWN_GAS, UP_LEVEL, UP_WIDTH, DOWN_LEVEL, DOWN_WIDTH, LEVEL_WIDTH = 9, 10, 11, 12, 13, 14, 15
+DISCHARGE, DRIVING, ABOVE, RESTING, CAVITY, LEAST, MOST, GAS_THERE = 16, 17, 18, 19, 20, 21, 22, 23
+# Of the last velocity: eighth root of its pressure, its piece, the distance from its end, the value there.
+ROOT, ROW, TO_END, VALUE = 24, 25, 26, 27
+FULL, FULL_ROOT, FULL_ROW, FULL_TO_END, FULL_VALUE = 28, 29, 30, 31, 32
+# Of the column up to the crest: pressure that holds it, at first before gas is carried out, and velocity.
+HOLDS, AT_FIRST, BROKEN, SLOWER, SWEPT = 33, 34, 35, 36, 37
 # Of the driven chamber, where these are asked for too.
-RADIUS, MOMENT, PLACES_OF_QUERY = 37, 38, 39
-EXPONENT, LOSS, KNOT, BEHIND = 1, 2, 3, 4
+RADIUS, MOMENT, PLACES_OF_QUERY = 38, 39, 40
 
 BLOCKED, SIPHONING, SEPARATED, REVERSE, UNDECIDED = 0.0, 1.0, 2.0, 3.0, 4.0
 OK, EXTRAPOLATED, STANDS, UNSURE, INVALID = 0.0, 1.0, 2.0, 3.0, 4.0
 
 GREATEST_PRESSURE, FILL_SLACK, NO_PRESSURE = 1e12, 1e-9, 1e-100
-GAS_STAYS, GAS_GOES = 0.6, 1.1
 # fmt: on
 
 
@@ -61,119 +70,122 @@ def smaller(a: float, b: float) -> float:
     return b
 
 
-def knot_before(c: Law, table: int, x: float) -> int:
-    """Place of the first knot of the piece that holds x, or of the nearest piece."""
-    low = int(c[table])
-    count = int(c[table + 1]) - 1
-    while count > 1:
-        half = count // 2
-        # Without a branch to guess wrong, where a compiler moves by condition.
-        if x >= c[low + half]:
-            low = low + half
-        count = count - half
-    return low
+def within(c: Law, fill: float) -> float:
+    """A fill ratio within the law's range; its end for what is not a number."""
+    return larger(0.0, smaller(fill, c[LARGEST_FILL]))
 
 
-def place_behind(c: Law, knot: int, x: float) -> float:
-    """How far x lies in the piece behind a knot, from 0 to 1."""
-    return larger(0.0, smaller((x - c[knot]) / (c[knot + 1] - c[knot]), 1.0))
+def piece(p: Pieces, first: float, x: float) -> int:
+    """Row of the piece that holds x, from that of the cell on."""
+    row = int(first)
+    while x > p[row][END]:
+        row = row + 1
+    return row
 
 
-def straight(c: Law, at: int, t: float) -> float:
-    """Between two numbers of a column."""
-    return c[at] + t * (c[at + 1] - c[at])
+def quintic(p: Pieces, row: int, t: float) -> float:
+    """Value of a piece."""
+    return p[row][C0] + t * (
+        p[row][C1] + t * (p[row][C2] + t * (p[row][C3] + t * (p[row][C4] + t * p[row][C5])))
+    )
 
 
-def cubic(c: Law, table: int, column: int, knot: int, t: float) -> float:
-    """A Hermite piece from values and slopes at both ends."""
-    at = knot + column * int(c[table + 1])
-    slope = at + int(c[table + 1])
-    width = c[knot + 1] - c[knot]
-    rise = c[at + 1] - c[at]
-    first = width * c[slope]
-    bend = 3.0 * rise - 2.0 * first - width * c[slope + 1]
-    return c[at] + t * (first + t * (bend + t * (rise - first - bend)))
+def width(p: Pieces, row: int, t: float) -> float:
+    """Half-width of a piece, or its square."""
+    return p[row][WIDTH] + t * p[row][WIDTH_SLOPE]
 
 
-def growth(c: Law, table: int, column: int, knot: int, t: float) -> float:
-    """Its slope."""
-    at = knot + column * int(c[table + 1])
-    slope = at + int(c[table + 1])
-    width = c[knot + 1] - c[knot]
-    rise = c[at + 1] - c[at]
-    first = width * c[slope]
-    bend = 3.0 * rise - 2.0 * first - width * c[slope + 1]
-    return (first + t * (2.0 * bend + t * 3.0 * (rise - first - bend))) / width
+def chamber_piece(c: Law, p: Pieces, fill: float) -> int:
+    """Row of a chamber's surface and moment that holds a fill within the range."""
+    return piece(p, c[int(fill * c[CHAMBER_SCALE] + c[CHAMBER_CELLS])], fill)
 
 
-def quintic(c: Law, table: int, knot: int, t: float) -> float:
-    """A piece from values, slopes and curvatures in the first three columns."""
-    count = int(c[table + 1])
-    at = knot + count
-    width = c[knot + 1] - c[knot]
-    first = width * c[at + count]
-    second = width * width * c[at + 2 * count] / 2.0
-    rise = c[at + 1] - c[at] - first - second
-    turn = width * c[at + count + 1] - first - 2.0 * second
-    bend = width * width * c[at + 2 * count + 1] / 2.0 - second
-    third = 10.0 * rise - 4.0 * turn + bend
-    fourth = 7.0 * turn - 15.0 * rise - 2.0 * bend
-    fifth = 6.0 * rise - 3.0 * turn + bend
-    return c[at] + t * (first + t * (second + t * (third + t * (fourth + t * fifth))))
-
-
-def surface_radius(c: Law, fill: float) -> float:
+def surface_radius(c: Law, p: Pieces, fill: float) -> float:
     """Radius of a chamber's concentric free surface, m."""
-    knot = knot_before(c, CHAMBER, fill)
-    return sqrt(larger(cubic(c, CHAMBER, 1, knot, place_behind(c, knot, fill)), 0.0))
+    x = within(c, fill)
+    row = chamber_piece(c, p, x)
+    t = x - p[row][END]
+    return sqrt(larger(p[row][SQUARE_0] + t * (p[row][SQUARE_1] + t * p[row][SQUARE_2]), 0.0))
 
 
-def moment(c: Law, fill: float) -> float:
+def moment(c: Law, p: Pieces, fill: float) -> float:
     """Balancing moment of one chamber, kg m; a pair's is the difference of two."""
-    knot = knot_before(c, CHAMBER, fill)
-    return cubic(c, CHAMBER, MOMENT_COLUMN, knot, place_behind(c, knot, fill))
+    x = within(c, fill)
+    row = chamber_piece(c, p, x)
+    t = x - p[row][END]
+    return p[row][MOMENT_0] + t * (p[row][MOMENT_1] + t * p[row][MOMENT_2])
 
 
-def moment_uncertainty(c: Law, fill: float) -> float:
+def moment_uncertainty(c: Law, p: Pieces, fill: float) -> float:
     """Expanded uncertainty (95 %) of `moment`, kg m."""
-    knot = knot_before(c, CHAMBER, fill)
-    at = knot + MOMENT_WIDTH_COLUMN * int(c[CHAMBER + 1])
-    return straight(c, at, place_behind(c, knot, fill))
+    x = within(c, fill)
+    row = chamber_piece(c, p, x)
+    return width(p, row, x - p[row][END])
 
 
-def set_level(c: Law, w: Query, fill: float, at: int) -> None:
-    """Hydrostatic pressure of a chamber's liquid and its half-width."""
-    knot = knot_before(c, FILLS, fill)
-    t = place_behind(c, knot, fill)
-    w[at] = larger(quintic(c, FILLS, knot, t), 0.0)
-    w[at + 1] = straight(c, knot + LEVEL_WIDTH_COLUMN * int(c[FILLS + 1]), t)
+def level(c: Law, p: Pieces, w: Query, fill: float) -> float:
+    """Hydrostatic pressure of a chamber's liquid, with its half-width; a fill within the range."""
+    row = piece(p, c[int(fill * c[LEVEL_SCALE] + c[LEVEL_CELLS])], fill)
+    t = fill - p[row][END]
+    w[LEVEL_WIDTH] = width(p, row, t)
+    return larger(quintic(p, row, t), 0.0)
 
 
-def set_velocity(c: Law, w: Query, table: int, pressure: float, at: int) -> None:
-    """Velocity that a pressure drives: root of its head times a tabulated ratio; creeping below the table."""
-    s = sqrt(sqrt(sqrt(larger(pressure, 0.0) / c[DENSITY])))
-    knot = knot_before(c, table, s)
-    t = place_behind(c, knot, s)
-    ratio = cubic(c, table, 1, knot, t)
-    w[at] = s * s * s * s * ratio
-    w[at + EXPONENT] = 0.5
-    w[at + LOSS] = straight(c, knot + LOSS_COLUMN * int(c[table + 1]), t)
-    w[at + KNOT] = float(knot)
-    w[at + BEHIND] = t
-    first = int(c[table])
-    if s < c[first]:
-        less = (s / c[first]) * (s / c[first])
-        w[at] = w[at] * (less * less)
-        w[at + EXPONENT] = 1.0
-    elif s < c[first + int(c[table + 1]) - 1]:
-        w[at + EXPONENT] = 0.5 + 0.125 * s * growth(c, table, 1, knot, t) / ratio
+def set_levels(c: Law, p: Pieces, w: Query, up: float, down: float) -> None:
+    """Levels of both chambers; fills within the range."""
+    w[UP_LEVEL] = level(c, p, w, up)
+    w[UP_WIDTH] = w[LEVEL_WIDTH]
+    w[DOWN_LEVEL] = level(c, p, w, down)
+    w[DOWN_WIDTH] = w[LEVEL_WIDTH]
 
 
-def set_pressures(c: Law, w: Query) -> None:
-    """What drives the tube, and what the crest's pressure at rest stands against."""
+def ratio(c: Law, p: Pieces, w: Query, way: int, s: float) -> float:
+    """Velocity over the root of the pressure whose eighth root is s."""
+    row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
+    w[ROOT] = s
+    w[ROW] = float(row)
+    w[TO_END] = s - p[row][END]
+    return quintic(p, row, w[TO_END])
+
+
+def velocity(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
+    """Velocity that a pressure drives: its root times a tabulated ratio; creeping below the table."""
+    if pressure < p[way][SLOWEST]:
+        w[VALUE] = ratio(c, p, w, way, sqrt(sqrt(sqrt(p[way][SLOWEST]))))
+        w[ROOT] = 0.0
+        return larger(pressure, 0.0) * p[way][CREEP]
+    root = sqrt(sqrt(pressure))
+    w[VALUE] = ratio(c, p, w, way, smaller(sqrt(root), p[way][LAST]))
+    return root * root * w[VALUE]
+
+
+def relative_square(p: Pieces, w: Query, driven: float, square: float) -> float:
+    """Squared half-width of the last velocity over its square, by its loss and by what drives it.
+
+    Args: `driven`: its pressure, Pa. `square`: of what is known of it, Pa^2.
+    """
+    row = int(w[ROW])
+    t = w[TO_END]
+    if w[ROOT] == 0.0:
+        pressure = larger(driven, NO_PRESSURE)
+        return width(p, row, t) + square / (pressure * pressure)
+    growth = p[row][C1] + t * (
+        2.0 * p[row][C2] + t * (3.0 * p[row][C3] + t * (4.0 * p[row][C4] + t * (5.0 * p[row][C5])))
+    )
+    exponent = 0.5 + 0.125 * w[ROOT] * growth / w[VALUE]
+    return exponent * exponent * (width(p, row, t) + square / (driven * driven))
+
+
+def set_drive(c: Law, w: Query) -> None:
+    """What drives the tube."""
     w[DISCHARGE] = larger(w[DOWN_LEVEL], c[PORT])
     w[DRIVING] = w[UP_GAS] - w[DOWN_GAS] + w[UP_LEVEL] - w[DISCHARGE]
-    w[RESTING] = w[UP_GAS] + w[UP_LEVEL] - c[COLUMN]
+
+
+def set_crest(c: Law, w: Query) -> None:
+    """The crest's pressure at rest, and what it stands against."""
+    w[ABOVE] = w[UP_LEVEL] - c[COLUMN]
+    w[RESTING] = w[UP_GAS] + w[ABOVE]
     low = c[VAPOUR]
     if w[DOWN_LEVEL] < c[PORT]:
         low = w[DOWN_GAS]
@@ -198,188 +210,238 @@ def crest_margin(w: Query) -> float:
     return w[RESTING] - larger(w[GAS_THERE], w[CAVITY])
 
 
-def flows(c: Law, w: Query) -> bool:
-    """Whether liquid flows: port covered, driving pressure positive, crest passed."""
-    if w[UP_LEVEL] < c[PORT] or w[DRIVING] <= 0.0:
-        return False
-    return c[CREST] == 0.0 or crest_margin(w) > 0.0
+def full_square(c: Law, p: Pieces, w: Query) -> float:
+    """`relative_square` of the last velocity, that of the whole tube."""
+    gas = w[UP_GAS] - w[DOWN_GAS]
+    fall = w[UP_LEVEL] - w[DISCHARGE]
+    square = w[UP_WIDTH] * w[UP_WIDTH] + w[DOWN_WIDTH] * w[DOWN_WIDTH]
+    return relative_square(p, w, w[DRIVING], square + c[OF_BLOWN] * gas * gas + c[OF_SPEED] * fall * fall)
 
 
-def stays_full(c: Law, w: Query) -> bool:
-    """Whether a primed column in which nothing flows is still there: below a level, or in exact balance."""
-    if w[PRIMED] == 0.0 or w[UP_LEVEL] < c[PORT]:
-        return False
-    return c[CREST] == 0.0 or (w[DRIVING] == 0.0 and w[RESTING] - w[CAVITY] > 0.0)
+def set_full(c: Law, p: Pieces, w: Query, widths: bool) -> None:
+    """The answer of a tube without a crest in which liquid flows."""
+    w[VELOCITY] = velocity(c, p, w, SIPHON, w[DRIVING])
+    w[REGIME] = SIPHONING
+    w[PRIMED_AFTER] = 1.0
+    if widths:
+        w[UNCERTAINTY] = w[VELOCITY] * sqrt(full_square(c, p, w) + c[TABULATION])
 
 
-def cleared(c: Law, velocity: float) -> float:
-    """How far the flow has carried gas out from over the crest, from 0 to 1."""
-    if c[FROUDE] == 0.0:
-        return 1.0
-    part = (velocity / c[FROUDE] - GAS_STAYS) / (GAS_GOES - GAS_STAYS)
-    part = larger(0.0, smaller(part, 1.0))
-    return part * part * (3.0 - 2.0 * part)
+def carried(p: Pieces, way: int, speed: float) -> float:
+    """How far a flow is from leaving gas over the crest, 0, to carrying it out, 1, and beyond."""
+    return speed * p[way][CARRY] - p[way][CARRY_FROM]
 
 
-def width_of(c: Law, w: Query, at: int, driven: float, gas: float, levels: float, crest: float) -> float:
-    """Half-width of a velocity by its loss and by what drives it.
-
-    Args: `driven`: its pressure. `gas`: what the density matters for. `levels`: what grows as the square of
-        the speed. `crest`: half-width of the pressure at the crest.
-    """
-    pressure = larger(driven, NO_PRESSURE)
-    blown = w[UP_GAS] - w[DOWN_GAS]
-    if at == BROKEN:
-        blown = w[UP_GAS]
-    square = w[UP_WIDTH] * w[UP_WIDTH] + w[DOWN_WIDTH] * w[DOWN_WIDTH] + crest * crest
-    part = c[OF_DENSITY] * gas
-    square = square + part * part
-    part = c[OF_SPEED] * 2.0 * levels
-    square = square + part * part
-    part = c[OF_GAS] * blown
-    square = square + part * part
-    loss = w[at + LOSS]
-    return w[at] * w[at + EXPONENT] * sqrt(loss * loss + square / (pressure * pressure))
+def set_swept(c: Law, p: Pieces, w: Query, way: int) -> None:
+    """The column up to the crest, out of which the flow carries gas."""
+    gas = larger(w[GAS_THERE], w[MOST])
+    if w[BROKEN] < p[way][CLEARS]:
+        w[MOST] = gas
+        if w[BROKEN] < p[way][STAYS]:
+            w[LEAST] = gas
+    part = smaller(carried(p, way, w[BROKEN]), 1.0)
+    gain = w[RESTING] - w[CAVITY] - w[HOLDS]
+    if part > 0.0:
+        if part > 0.5 and carried(p, way, w[FULL]) > 0.5:
+            w[SWEPT] = 1.0
+        if gain > 0.0:
+            w[HOLDS] = w[HOLDS] + part * part * (3.0 - 2.0 * part) * gain
+            w[BROKEN] = velocity(c, p, w, way, w[HOLDS])
 
 
-def undecided(c: Law, w: Query, share_at: int, held: float, spread: float) -> bool:
+def set_slower(c: Law, w: Query) -> None:
+    """The slower of the whole tube and the column up to the crest."""
+    w[REGIME] = SIPHONING
+    w[VELOCITY] = w[FULL]
+    w[PRIMED_AFTER] = w[SWEPT]
+    if w[BROKEN] < w[FULL]:
+        w[REGIME] = SEPARATED
+        w[VELOCITY] = w[BROKEN]
+        if w[DOWN_LEVEL] < c[PORT]:
+            w[PRIMED_AFTER] = 0.0
+
+
+def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
+    """Part of the driving pressure that is lost up to the crest; `row`: beside a piece of the whole tube."""
+    if way == THERE:
+        return p[row][SHARE_0] + t * (p[row][SHARE_1] + t * (p[row][SHARE_2] + t * p[row][SHARE_3]))
+    return p[row][BACK_0] + t * (p[row][BACK_1] + t * p[row][BACK_2])
+
+
+def velocity_held(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
+    """Velocity of the column up to the crest, which is known at the first pressure that holds it."""
+    if pressure == w[AT_FIRST]:
+        return w[SLOWER]
+    return velocity(c, p, w, way, pressure)
+
+
+def undecided(c: Law, p: Pieces, w: Query, row: int, lost: float, known: float) -> bool:
     """Whether what is known of the crest's pressure allows both a siphon and a separated column.
 
-    Args: `share_at`: column of what part of the driving pressure is lost up to the crest. `held`: pressure
-        that holds the column together. `spread`: by how much it may be off.
+    Args: `lost`: part of the driving pressure that is lost up to the crest. `known`: squared half-width of
+        the pressure there by the gas and the levels.
     """
-    knot = int(w[FULL + KNOT])
-    count = int(c[SIPHON + 1])
-    share = cubic(c, SIPHON, share_at, knot, w[FULL + BEHIND])
-    liquid = w[UP_LEVEL] - c[COLUMN] + share * (w[DISCHARGE] - w[UP_LEVEL])
-    part = straight(c, knot + SHARE_WIDTH_COLUMN * count, w[FULL + BEHIND]) * w[DRIVING]
-    square = part * part + spread * spread + c[OF_CREST] * c[OF_CREST]
-    part = (1.0 - share) * w[UP_WIDTH]
-    square = square + part * part
-    part = share * w[DOWN_WIDTH]
-    square = square + part * part
-    part = (1.0 - share) * c[OF_GAS] * w[UP_GAS]
-    square = square + part * part
-    part = c[OF_DENSITY] * liquid
-    square = square + part * part
-    part = 2.0 * c[OF_SPEED] * liquid
-    square = square + part * part
-    margin = held - share * w[DRIVING]
-    return margin * margin < square
+    liquid = w[ABOVE] - lost * (w[UP_LEVEL] - w[DISCHARGE])
+    part = (p[row][OFF] + w[FULL_TO_END] * p[row][OFF_SLOPE]) * w[DRIVING]
+    margin = w[HOLDS] - lost * w[DRIVING]
+    return margin * margin < known + c[OF_CREST] + c[OF_LIQUID] * liquid * liquid + part * part
 
 
-def over_crest(c: Law, w: Query, way: int, share_at: int) -> None:
-    """The answer of a tube with a crest in which liquid flows; `way`: table of the column up to the crest."""
-    held = crest_margin(w)
-    low = w[LEAST]
-    high = w[MOST]
-    carried = 0.0
-    set_velocity(c, w, way, held, BROKEN)
-    if w[PRIMED] == 0.0:
-        carried = cleared(c, w[BROKEN])
-        gas = larger(w[GAS_THERE], high)
-        if w[BROKEN] < c[CLEARS]:
-            high = gas
-        if w[BROKEN] < c[STAYS]:
-            low = gas
-        held = held + carried * larger(w[RESTING] - w[CAVITY] - held, 0.0)
-        set_velocity(c, w, way, held, BROKEN)
-    full = w[FULL]
-    if w[BROKEN] < full:
-        above = w[UP_LEVEL] - c[COLUMN]
-        w[UNCERTAINTY] = width_of(c, w, BROKEN, held, w[UP_GAS] - w[CAVITY], above, c[OF_CREST])
-        w[VELOCITY] = w[BROKEN]
-        w[REGIME] = SEPARATED
-    set_velocity(c, w, way, w[RESTING] - high, OTHER)
-    off = larger(w[VELOCITY] - smaller(w[OTHER], full), 0.0)
-    set_velocity(c, w, way, w[RESTING] - low, OTHER)
-    off = larger(off, smaller(w[OTHER], full) - w[VELOCITY])
-    w[UNCERTAINTY] = sqrt(w[UNCERTAINTY] * w[UNCERTAINTY] + off * off)
-    spread = larger(held - (w[RESTING] - high), w[RESTING] - low - held)
-    if undecided(c, w, share_at, held, spread):
+def set_widths(c: Law, p: Pieces, w: Query, way: int) -> None:
+    """Half-width of the answer over a crest, and whether it allows another regime."""
+    row = int(w[FULL_ROW] + p[SIPHON][SHARES])
+    lost = lost_part(p, row, w[FULL_TO_END], way)
+    kept = 1.0 - lost
+    up = w[UP_WIDTH] * w[UP_WIDTH] + c[OF_GAS] * w[UP_GAS] * w[UP_GAS]
+    down = w[DOWN_WIDTH] * w[DOWN_WIDTH]
+    lower = w[RESTING] - w[MOST]
+    upper = w[RESTING] - w[LEAST]
+    part = 0.0
+    if w[REGIME] == SEPARATED:
+        gas = w[UP_GAS] - w[CAVITY]
+        square = up + down + c[OF_CREST] + c[OF_DENSITY] * gas * gas + c[OF_SPEED] * w[ABOVE] * w[ABOVE]
+        square = relative_square(p, w, w[HOLDS], square)
+        if lower < w[HOLDS]:
+            part = w[VELOCITY] - velocity_held(c, p, w, way, lower)
+        if upper > w[HOLDS]:
+            part = larger(part, smaller(velocity(c, p, w, way, upper), w[FULL]) - w[VELOCITY])
+    else:
+        w[ROOT] = w[FULL_ROOT]
+        w[ROW] = w[FULL_ROW]
+        w[TO_END] = w[FULL_TO_END]
+        w[VALUE] = w[FULL_VALUE]
+        square = full_square(c, p, w)
+        if lower < lost * w[DRIVING]:
+            part = larger(w[VELOCITY] - velocity_held(c, p, w, way, lower), 0.0)
+    w[UNCERTAINTY] = sqrt(w[VELOCITY] * w[VELOCITY] * (square + c[TABULATION]) + part * part)
+    part = larger(w[HOLDS] - lower, upper - w[HOLDS])
+    if undecided(c, p, w, row, lost, part * part + kept * kept * up + lost * lost * down):
         w[REGIME] = UNDECIDED
         w[STATUS] = UNSURE
-    w[PRIMED_AFTER] = 0.0
-    swept = carried > 0.5 and cleared(c, full) > 0.5
-    if (w[PRIMED] != 0.0 or swept) and (w[BROKEN] >= full or w[DOWN_LEVEL] >= c[PORT]):
-        w[PRIMED_AFTER] = 1.0
 
 
-def set_flow(c: Law, w: Query) -> None:
-    """The answer where liquid flows, seen from the chamber that gives it, but for `over_crest`."""
-    gas = w[UP_GAS] - w[DOWN_GAS]
-    set_velocity(c, w, SIPHON, w[DRIVING], FULL)
-    w[VELOCITY] = w[FULL]
-    w[UNCERTAINTY] = width_of(c, w, FULL, w[DRIVING], gas, w[UP_LEVEL] - w[DISCHARGE], 0.0)
-    w[REGIME] = SIPHONING
-    w[STATUS] = OK
-    w[PRIMED_AFTER] = 1.0
+def over_crest(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
+    """The answer of a tube with a crest, if liquid flows; `way`: row of the column up to the crest."""
+    set_crest(c, w)
+    w[HOLDS] = crest_margin(w)
+    if w[HOLDS] <= 0.0:
+        return
+    w[FULL] = velocity(c, p, w, SIPHON, w[DRIVING])
+    w[FULL_ROOT] = w[ROOT]
+    w[FULL_ROW] = w[ROW]
+    w[FULL_TO_END] = w[TO_END]
+    w[FULL_VALUE] = w[VALUE]
+    w[AT_FIRST] = w[HOLDS]
+    w[BROKEN] = velocity(c, p, w, way, w[HOLDS])
+    w[SLOWER] = w[BROKEN]
+    w[SWEPT] = w[PRIMED]
+    if w[PRIMED] == 0.0:
+        set_swept(c, p, w, way)
+    set_slower(c, w)
+    if widths:
+        set_widths(c, p, w, way)
 
 
-def turn(c: Law, w: Query) -> None:
+def turn(w: Query) -> None:
     """Look from the other chamber."""
-    at = UP_LEVEL
-    while at < DOWN_LEVEL:
-        kept = w[at]
-        w[at] = w[at + 2]
-        w[at + 2] = kept
-        at = at + 1
+    kept = w[UP_LEVEL]
+    w[UP_LEVEL] = w[DOWN_LEVEL]
+    w[DOWN_LEVEL] = kept
+    kept = w[UP_WIDTH]
+    w[UP_WIDTH] = w[DOWN_WIDTH]
+    w[DOWN_WIDTH] = kept
     kept = w[UP_GAS]
     w[UP_GAS] = w[DOWN_GAS]
     w[DOWN_GAS] = kept
-    set_pressures(c, w)
 
 
-def set_answer(c: Law, w: Query) -> None:
-    """The answer to a valid query, velocities positive and status of the range apart."""
+def set_flow(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
+    """The answer where something drives liquid out of the upstream chamber, whose port must be covered."""
+    if w[UP_LEVEL] >= c[PORT]:
+        if c[CREST] == 0.0:
+            set_full(c, p, w, widths)
+        else:
+            over_crest(c, p, w, way, widths)
+
+
+def stays_full(c: Law, w: Query) -> bool:
+    """Whether a primed column that nothing drives is still there: below a level, or in exact balance."""
+    if w[PRIMED] == 0.0 or w[UP_LEVEL] < c[PORT]:
+        return False
+    if c[CREST] == 0.0:
+        return True
+    set_crest(c, w)
+    return w[DRIVING] == 0.0 and w[RESTING] > w[CAVITY]
+
+
+def set_answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
+    """Velocity, positive, regime and primed afterwards; with `widths` half-width and whether it is undecided.
+
+    At most one direction flows: what drives one holds the other.
+    """
+    w[VELOCITY] = 0.0
+    w[REGIME] = BLOCKED
     w[PRIMED_AFTER] = 0.0
-    set_pressures(c, w)
+    set_drive(c, w)
+    if w[DRIVING] > 0.0:
+        set_flow(c, p, w, THERE, widths)
+        return
     if stays_full(c, w):
         w[PRIMED_AFTER] = 1.0
-    if flows(c, w):
-        set_flow(c, w)
-        if c[CREST] != 0.0:
-            over_crest(c, w, THERE, SHARE_COLUMN)
-        return
-    turn(c, w)
-    if flows(c, w):
-        set_flow(c, w)
-        if c[CREST] != 0.0:
-            over_crest(c, w, BACK, int(c[BACK_SHARE]))
-        w[REGIME] = REVERSE
+    turn(w)
+    set_drive(c, w)
+    if w[DRIVING] > 0.0:
+        set_flow(c, p, w, int(c[WAY_BACK]), widths)
+        if w[REGIME] != BLOCKED:
+            w[REGIME] = REVERSE
 
 
-def answer(c: Law, w: Query) -> None:
-    """Velocity out of the driven chamber, its half-width (95 %), m/s, regime, status, primed afterwards."""
+def fill_status(c: Law, fill: float) -> float:
+    """What a fill is worth for which the nearest within the range is taken."""
+    if fill != fill:
+        return INVALID
+    if fill < -FILL_SLACK or fill > c[LARGEST_FILL] + FILL_SLACK:
+        return EXTRAPOLATED
+    return OK
+
+
+def answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
+    """Velocity out of the driven chamber, m/s, regime, status, primed afterwards.
+
+    With `widths` the velocity's half-width (95 %), m/s, too; without, the status is never undecided.
+    """
+    up = within(c, w[FILL])
+    down = within(c, w[OPPOSITE_FILL])
     w[VELOCITY] = 0.0
     w[UNCERTAINTY] = 0.0
     w[REGIME] = BLOCKED
-    w[STATUS] = INVALID
     w[PRIMED_AFTER] = 0.0
-    x = w[FILL]
-    y = w[OPPOSITE_FILL]
-    p = w[PRESSURE]
-    if not (p >= -c[AMBIENT] and p <= GREATEST_PRESSURE and x == x and y == y):
+    w[STATUS] = OK
+    if w[FILL] != up:
+        w[STATUS] = fill_status(c, w[FILL])
+    if w[OPPOSITE_FILL] != down:
+        w[STATUS] = larger(w[STATUS], fill_status(c, w[OPPOSITE_FILL]))
+    if not (w[PRESSURE] >= -c[AMBIENT] and w[PRESSURE] <= GREATEST_PRESSURE):
+        w[STATUS] = INVALID
+    if w[STATUS] == INVALID:
         return
-    w[STATUS] = STANDS
-    most = c[LARGEST_FILL]
-    set_level(c, w, larger(0.0, smaller(x, most)), UP_LEVEL)
-    set_level(c, w, larger(0.0, smaller(y, most)), DOWN_LEVEL)
-    w[UP_GAS] = c[GAS_FACTOR] * p
+    w[UP_GAS] = c[GAS_FACTOR] * w[PRESSURE]
     w[DOWN_GAS] = 0.0
-    set_answer(c, w)
-    if w[REGIME] != BLOCKED and (w[VELOCITY] < c[LOWEST] or w[VELOCITY] > c[HIGHEST]):
+    set_levels(c, p, w, up, down)
+    worth = w[STATUS]
+    set_answer(c, p, w, widths)
+    if w[REGIME] == BLOCKED:
+        w[STATUS] = STANDS
+    elif w[VELOCITY] < c[LOWEST] or w[VELOCITY] > c[HIGHEST]:
         w[STATUS] = EXTRAPOLATED
-    if smaller(x, y) < -FILL_SLACK or larger(x, y) > most + FILL_SLACK:
+    if worth == EXTRAPOLATED:
         w[STATUS] = EXTRAPOLATED
-    part = c[TABULATION] * w[VELOCITY]
-    w[UNCERTAINTY] = sqrt(w[UNCERTAINTY] * w[UNCERTAINTY] + part * part)
     if w[REGIME] == REVERSE:
         w[VELOCITY] = -w[VELOCITY]
 
 
-def answer_all(c: Law, w: Query) -> None:
+def answer_all(c: Law, p: Pieces, w: Query) -> None:
     """The answer, and surface radius, m, and moment, kg m, of the driven chamber."""
-    answer(c, w)
-    w[RADIUS] = surface_radius(c, w[FILL])
-    w[MOMENT] = moment(c, w[FILL])
+    answer(c, p, w, True)
+    w[RADIUS] = surface_radius(c, p, w[FILL])
+    w[MOMENT] = moment(c, p, w[FILL])

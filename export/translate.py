@@ -14,8 +14,11 @@ from types import ModuleType
 from typing import Final
 
 NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
-LAW, QUERY = "Law", "Query"
-"""Types of the subset, as Python's annotations name them; two rows of numbers, of which one is only read."""
+LAW, PIECES, QUERY = "Law", "Pieces", "Query"
+"""Types of the subset, as Python's annotations name them; numbers and rows of them that are only read, and
+numbers that change."""
+PER_PIECE: Final = 9
+"""Numbers in a row of `Pieces`."""
 _BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
 
 
@@ -35,6 +38,12 @@ class Function:
     body: Sequence[ast.stmt]
     text: str
     """In Python."""
+
+    @property
+    def names(self) -> set[str]:
+        """All that it uses."""
+        nodes = [node for each in self.body for node in ast.walk(each)]
+        return {node.id for node in nodes if isinstance(node, ast.Name)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,19 +65,26 @@ class Source:
     def of_modules(cls, modules: Sequence[ModuleType], entries: Sequence[str]) -> Source:
         """What some functions need of modules that import each other's names, a later one's before.
 
-        Raises: ValueError: something in it that is not of the subset.
+        Raises: ValueError: something in it that is not of the subset, or a constant of two values.
         """
         whole = [cls.of(each) for each in modules]
         functions = {name: each for source in whole for name, each in source.functions.items()}
-        constants = {name: each for source in whole for name, each in source.constants.items()}
         needed, todo = set(entries), list(entries)
         while todo:
-            nodes = [node for each in functions[todo.pop()].body for node in ast.walk(each)]
-            names = {node.id for node in nodes if isinstance(node, ast.Name)}
+            names = functions[todo.pop()].names
             todo += [name for name in names - needed if name in functions]
             needed |= names
+        constants = {name: value for source in whole for name, value in source.constants.items()}
+        used: dict[str, int | float] = {}
+        for source in whole:
+            known = {**constants, **source.constants}
+            for name in set().union(
+                *(source.functions[each].names for each in needed & source.functions.keys())
+            ):
+                if name in known and used.setdefault(name, known[name]) != known[name]:
+                    raise ValueError(f"two modules mean different numbers by {name}")
         return cls(
-            constants={name: value for name, value in constants.items() if name in needed},
+            constants={name: used[name] for name in constants if name in used},
             functions={name: each for name, each in functions.items() if name in needed},
         )
 
@@ -111,6 +127,7 @@ class Language:
     """What two languages write differently."""
 
     types: Mapping[str, str]
+    """Format of a declared name."""
     operators: Mapping[type, str]
     """Of comparisons and of `and`, `or`, `not`."""
     to_whole: str
@@ -129,16 +146,19 @@ class Language:
     close_if: str
     open_while: str
     close_while: str
+    in_row: str
+    """Format of a number in a row of rows, by row and column."""
 
 
 C99: Final = Language(
     types={
-        NUMBER: "double ",
-        WHOLE: "int ",
-        TRUTH: "int ",
-        NOTHING: "void ",
-        LAW: "const double *",
-        QUERY: "double *",
+        NUMBER: "double {}",
+        WHOLE: "int {}",
+        TRUTH: "int {}",
+        NOTHING: "void {}",
+        LAW: "const double *{}",
+        PIECES: f"const double (*{{}})[{PER_PIECE}]",
+        QUERY: "double *{}",
     },
     operators={
         ast.Lt: "<",
@@ -164,13 +184,14 @@ C99: Final = Language(
     close_if="}",
     open_while="while ({}) {{",
     close_while="}",
+    in_row="{}[{}][{}]",
 )
 
 
 def structured_text(prefix: str) -> Language:
     """Structured text, whose names do not distinguish cases and whose functions share one space."""
     return Language(
-        types={NUMBER: "LREAL", WHOLE: "DINT", TRUTH: "BOOL", NOTHING: "BOOL"},
+        types={NUMBER: "{} : LREAL", WHOLE: "{} : DINT", TRUTH: "{} : BOOL", NOTHING: "{} : BOOL"},
         operators={
             ast.Lt: "<",
             ast.LtE: "<=",
@@ -182,7 +203,7 @@ def structured_text(prefix: str) -> Language:
             ast.Or: "OR",
             ast.Not: "NOT ",
         },
-        to_whole="LREAL_TO_DINT({})",
+        to_whole="TRUNC({})",
         to_number="DINT_TO_LREAL({})",
         truths=("FALSE", "TRUE"),
         variable="v_{}",
@@ -195,6 +216,7 @@ def structured_text(prefix: str) -> Language:
         close_if="END_IF;",
         open_while="WHILE {} DO",
         close_while="END_WHILE;",
+        in_row="{}[{}, {}]",
     )
 
 
@@ -285,6 +307,12 @@ class Writer:
                 return (name if self.language.constants else text), kind
             case ast.Name(id=name) if name in self.types:
                 return self.language.variable.format(name), self.types[name]
+            case ast.Subscript(value=ast.Subscript(value=rows, slice=row), slice=place):
+                name, kind = self._expression(rows)
+                if kind != PIECES:
+                    raise self._refused(node)
+                at = (self._typed(row, WHOLE), self._typed(place, WHOLE))
+                return self.language.in_row.format(name, *at), NUMBER
             case ast.Subscript(value=row, slice=place) if self._expression(row)[1] in (LAW, QUERY):
                 return f"{self._expression(row)[0]}[{self._typed(place, WHOLE)}]", NUMBER
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
@@ -376,18 +404,18 @@ def c_functions(source: Source) -> str:
     for function in source.functions.values():
         writer = Writer(language=C99, source=source, function=function)
         lines = writer.lines()
-        variables = [f"{C99.types[kind]}{name};" for name, kind in writer.local_variables().items()]
-        arguments = [f"{C99.types[kind]}{name}" for name, kind in function.arguments.items()]
+        variables = [f"{C99.types[kind].format(name)};" for name, kind in writer.local_variables().items()]
+        arguments = [C99.types[kind].format(name) for name, kind in function.arguments.items()]
         body = "".join(f"    {line}\n" for line in [*variables, *lines])
-        head = f"static {C99.types[function.result]}{function.name}({', '.join(arguments)})"
+        head = "static " + C99.types[function.result].format(f"{function.name}({', '.join(arguments)})")
         parts.append(f"\n/* {function.summary} */\n{head}\n{{\n{body}}}\n")
     return "".join(parts)
 
 
-def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, int]) -> str:
+def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, str]) -> str:
     """All functions of a source in structured text.
 
-    Args: `prefix`: of their names. `sizes`: numbers in each row, by its type.
+    Args: `prefix`: of their names. `sizes`: first and last place of each row, by its type.
     """
     language = structured_text(prefix)
     parts = []
@@ -396,14 +424,16 @@ def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, int]) -> st
         lines = writer.lines()
         rows = {name: kind for name, kind in function.arguments.items() if kind in sizes}
         parts.append(f"\n(* {function.summary} *)\n")
-        parts.append(f"FUNCTION {prefix}_{function.name} : {language.types[function.result]}\n")
+        parts.append(f"FUNCTION {language.types[function.result].format(f'{prefix}_{function.name}')}\n")
         inputs = [
-            f"{language.variable.format(name)} : {language.types[kind]};"
+            f"{language.types[kind].format(language.variable.format(name))};"
             for name, kind in function.arguments.items()
             if kind not in sizes
         ]
-        in_out = [f"v_{name} : ARRAY[0..{sizes[kind] - 1}] OF LREAL;" for name, kind in rows.items()]
-        inner = [f"v_{name} : {language.types[kind]};" for name, kind in writer.local_variables().items()]
+        in_out = [f"v_{name} : ARRAY[{sizes[kind]}] OF LREAL;" for name, kind in rows.items()]
+        inner = [
+            f"{language.types[kind].format(f'v_{name}')};" for name, kind in writer.local_variables().items()
+        ]
         for kind, declared in (("VAR_IN_OUT", in_out), ("VAR_INPUT", inputs), ("VAR", inner)):
             if declared:
                 parts.append(f"{kind}\n" + "".join(f"    {each}\n" for each in declared) + "END_VAR\n")

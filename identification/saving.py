@@ -24,7 +24,6 @@ from ringbalance.scene.changes import document_of, file_text
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT
-from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -187,8 +186,7 @@ class _Changes:
         if match is None or match[1] not in schema.tables or match[2] not in schema.tables[match[1]].keys:
             raise ValueError(f"a scene file has no value {path!r}")
         table, key, entry = match.groups()
-        takes = schema.key_at((table, key)).takes
-        dimension = takes.dimension if isinstance(takes, Reader) else None
+        dimension = schema.key_at((table, key)).takes.dimension
         by_table = table in schema.tables["uncertainty"].keys
         return _Place(
             table=table,
@@ -225,7 +223,7 @@ def _unit(here: object, path: str, dimension: str | None) -> str:
         return ""
     one = here[0] if isinstance(here, list) and here else here
     stated = unit_of(one) if isinstance(one, str) else ""
-    return stated or usual_unit(path) or next(iter(DIMENSIONS[dimension].units))
+    return stated or usual_unit(path) or DIMENSIONS[dimension].si_unit
 
 
 @dataclass(frozen=True, kw_only=True)

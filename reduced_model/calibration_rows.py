@@ -43,6 +43,8 @@ _NAMES: Final = MappingProxyType(
     }
 )
 """Of the budgets' quantities: name and symbol, in the order in which they are shown."""
+_MAIN: Final = ("lambda", "usable_moment", "reach", "velocity")
+"""Come first, and alone in a short text."""
 _ASIDE: Final = 0.01
 """Angle below which a chamber counts as symmetric, deg."""
 _NEXT_TO_NOTHING: Final = 1e-3
@@ -58,7 +60,8 @@ def calibration_rows(calibration: Calibration) -> Rows:
     where = f"{given(point.gas_pressure, 'Pa')}, equal fills of {point.fill_ratio:g}: {point.regime.label}"
     return Rows(
         title=f"Calibration of {scene.name} ({scene.source})",
-        quantities=tuple(_quantities(calibration)),
+        quantities=tuple(sorted(_quantities(calibration), key=lambda each: each.key not in _MAIN)),
+        main=len(_MAIN),
         findings=tuple(_findings(calibration)),
         facts=(("operating point", where), ("gas line", line_text(calibration.gas_line))),
         tables=(

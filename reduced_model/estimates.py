@@ -2,7 +2,7 @@
 
 Every estimate is relative to the quantity that the term changes, holds at the worst fill of the range, and
 rests on a dimensionless group that `terms` names.  What belongs to an injection is judged for the one that
-matters most, the shortest (`injection_time`).
+matters most, the shortest (`_injection_time`).
 
 **Inertia.**  A full column of length L under the driving pressure p obeys
     du/dt = (p/(rho L)) (1 - (u/u0)^2),    p = (k + 1) rho u0^2/2,
@@ -51,7 +51,7 @@ from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene
 
 
-def deciding_gas_time(scene: Scene, *, rate: float) -> float:
+def _deciding_gas_time(scene: Scene, *, rate: float) -> float:
     """Valve-open time of the shortest injection that matters, s: the one commanded at the limit of the
     vibration.
 
@@ -72,12 +72,12 @@ def deciding_gas_time(scene: Scene, *, rate: float) -> float:
     return min(max(commanded, control.minimum_gas_time), control.maximum_gas_time) or control.maximum_gas_time
 
 
-def long_start_up_loss(start_up: float, *, laminar: float = 0.0) -> float:
+def _long_start_up_loss(start_up: float, *, laminar: float = 0.0) -> float:
     """Valve-open time that a start costs of a long injection, s: tau ln 2 turbulent, tau laminar."""
     return start_up * (laminar + (1 - laminar) * math.log(2))
 
 
-def start_up_loss(*, start_up: float, gas_time: float, laminar: float = 0.0) -> float:
+def _start_up_loss(*, start_up: float, gas_time: float, laminar: float = 0.0) -> float:
     """Fraction of an injection's steady volume that the column's start costs, from 0 to 1.
 
     1 - (tau/T) ln cosh(T/tau), or (tau/T) (1 - exp(-T/tau)) laminar.
@@ -174,15 +174,15 @@ def _range_flow(scene: Scene) -> _RangeFlow:
     )
 
 
-def injection_time(scene: Scene) -> float:
+def _injection_time(scene: Scene) -> float:
     """Valve-open time of the injection that decides on a scene's estimates, s.
 
-    Returns: s, of `deciding_gas_time` with the flow at equal fills.
+    Returns: s, of `_deciding_gas_time` with the flow at equal fills.
     """
     *_, arm = chamber_closed_forms(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)
     flow = scene.liquid.density * scene.tube.area * range_flow(scene).equal
     rate = scene.rotor.influence_coefficient * scene.disc.moment_factor * float(arm) * flow
-    return deciding_gas_time(scene, rate=rate)
+    return _deciding_gas_time(scene, rate=rate)
 
 
 def plates(scene: Scene) -> Contribution:
@@ -322,7 +322,7 @@ def _loss_without(scene: Scene, velocity: FloatArray, left_out: TubePart | None)
 
 def inertia(scene: Scene) -> Contribution:
     """What the start of the column costs, relative to the liquid that the deciding injection moves."""
-    flow, deciding = range_flow(scene), injection_time(scene)
+    flow, deciding = range_flow(scene), _injection_time(scene)
     if not np.any(flow.starts):
         return Contribution(value=None, formula="nothing flows")
     re = abs(flow.equal) * scene.tube.bore / scene.liquid.kinematic_viscosity
@@ -332,17 +332,17 @@ def inertia(scene: Scene) -> Contribution:
     # A column that never moves costs nothing to start.
     slowest = max(float(np.max(times)), 1e-12)
     return Contribution(
-        value=start_up_loss(start_up=slowest, gas_time=deciding, laminar=laminar),
+        value=_start_up_loss(start_up=slowest, gas_time=deciding, laminar=laminar),
         formula=f"start-up time 2 L/((k + 1) u) up to {1e3 * slowest:.3g} ms over the range of fills, "
         f"{_within(deciding)}",
-        time=long_start_up_loss(slowest, laminar=laminar),
+        time=_long_start_up_loss(slowest, laminar=laminar),
     )
 
 
 def filling(scene: Scene) -> Contribution:
     """The longer of filling and venting an empty chamber, by the slowest line."""
     volume = chamber_volume(disc=scene.disc) + (scene.gas.dead_volume or 0.0)
-    ends, deciding = (line_ends(scene)[-1], line_ends(scene)[0]), injection_time(scene)
+    ends, deciding = (line_ends(scene)[-1], line_ends(scene)[0]), _injection_time(scene)
     lines, supply = [end.line for end in ends], ends[1].line.supply_pressure
     fill = [float(line.filling_time(supply, volume=volume)) for line in lines]
     vent = [float(line.venting_time(supply, volume=volume)) for line in lines]
@@ -353,7 +353,7 @@ def filling(scene: Scene) -> Contribution:
 
 def lag(scene: Scene) -> Contribution:
     """Delay of the valve over the deciding injection."""
-    times, deciding = [line_ends(scene)[i].valve_lag for i in (-1, 0)], injection_time(scene)
+    times, deciding = [line_ends(scene)[i].valve_lag for i in (-1, 0)], _injection_time(scene)
     formula = f"{_span(times)} ms {_within(deciding)}"
     return _over(formula, times, deciding, given=scene.gas.valve_lag is not None)
 
@@ -377,7 +377,7 @@ def _over(formula: str, times: Sequence[float], deciding: float, *, given: bool)
 
 def held(scene: Scene) -> Contribution:
     """What is lifted to the crest and falls back, as in a run, at the lowest level of the range."""
-    tube, flow, deciding = scene.tube, range_flow(scene), injection_time(scene)
+    tube, flow, deciding = scene.tube, range_flow(scene), _injection_time(scene)
     slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
     if tube.hump_radius is None:
         return Contribution(value=0.0, formula="a tube without a crest stays full")

@@ -35,7 +35,7 @@ from ringbalance.reports.section import Record, Work, ring_of
 from ringbalance.reports.sections import begun, collected_beside, completed
 from ringbalance.results.numbers import given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
-from ringbalance.scene.keys.declaration import Key, keys_of
+from ringbalance.scene.keys.declaration import Entries, Key, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import Table
 from ringbalance.scene.kinds import scene_kind
@@ -309,15 +309,14 @@ def _width(uncertain: InputUncertainty, tables: Mapping[str, Table]) -> str:
     return _written(uncertain.half_width, keys_of(record)[key].takes) if record else ""
 
 
-def _written(value: Any, takes: object, *, digits: int = 6) -> str:
+def _written(value: Any, takes: Reader | Entries, *, digits: int = 6) -> str:
     if isinstance(value, tuple):
         return ", ".join(_written(item, takes, digits=digits) for item in value)
     if isinstance(value, SpeedPoint):
         return f"{given(value.speed, 'rad/s')} from {given(value.time, 's')}"
     if isinstance(value, bool | str):
         return str(value)
-    dimension = takes.dimension if isinstance(takes, Reader) else None
-    unit = next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else ""
+    unit = DIMENSIONS[takes.dimension].si_unit.replace("*", " ") if takes.dimension else ""
     return given(value, unit, digits=digits) if unit else short(float(value), digits=digits)
 
 

@@ -27,7 +27,7 @@ from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.rows import Finding
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.origins import SceneFile, value_at
+from ringbalance.scene.origins import SceneFile, raw_value_at, value_at
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
@@ -157,7 +157,7 @@ def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
     tables: dict[str, list[str]] = {}
     for path in paths:
         table, _, key = path.partition(".")
-        value = getattr(getattr(scene, table), key)
+        value = raw_value_at(scene, path)
         if value not in (None, ()):
             tables.setdefault(table, []).append(f"{key} = {toml_text(_written(value, path))}")
     return [{"table": table, "lines": lines} for table, lines in tables.items()]
@@ -165,7 +165,8 @@ def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
 
 def _written(value: Any, path: str) -> Any:
     if isinstance(value, tuple):
-        return [_written(each, path) for each in value]
+        # One time for all chambers is written as it is read, and not as a list of one.
+        return _written(value[0], path) if len(value) == 1 else [_written(each, path) for each in value]
     if isinstance(value, str | bool | int):
         return value
     unit = usual_unit(path)

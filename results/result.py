@@ -182,6 +182,8 @@ class Rows:
     """Names and texts that are no quantities, for a terminal."""
     tables: tuple[Table, ...] = ()
     """For a terminal; those without rows are left out."""
+    main: int = _MAIN
+    """How many quantities a short text has."""
     listed: int | None = None
     """How many quantities a terminal lists, where its tables have the others; None: all."""
 
@@ -209,7 +211,7 @@ class Rows:
     def lines(self) -> Iterator[str]:
         """About five lines: what it is, its main numbers with units, the verdict, and a warning behind it."""
         yield self.title
-        for each in self.quantities[:_MAIN]:
+        for each in self.quantities[: self.main]:
             yield f"{each.name} {plain(each.text)}"
         warnings = [each for each in self.findings[1:] if each.severity == "warning"]
         for finding in (*self.findings[:1], *warnings[:1]):

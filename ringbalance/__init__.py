@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ringbalance.controller.liquid_ring.linear_loop import linear_loop as linear_loop
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
+    from ringbalance.controller.stepped import scene_controller as scene_controller
     from ringbalance.design.designing import Design as Design
     from ringbalance.design.sweep import Sweep as Sweep
     from ringbalance.designs import find_design as find_design
@@ -102,6 +103,7 @@ _NAMES = {
     "controller.liquid_ring.linear_loop": ("LinearLoop", "linear_loop"),
     "controller.rotor": ("Sensor",),
     "controller.simulation": ("Simulation",),
+    "controller.stepped": ("scene_controller",),
     "controller.judging.tuning": ("Tuning",),
     "design.designing": ("Design",),
     "design.sweep": ("Sweep",),

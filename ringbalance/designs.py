@@ -40,8 +40,9 @@ def sweep(
         name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
         "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: drawn devices that
         each point is run as at most, fewer where they decide. `intervals`: whether uncertain inputs are
-        followed through. `check`: rows of a liquid ring to calibrate, which measures what the array core
-        leaves out. `executor`: any `concurrent.futures.Executor`; its answers are those of this process to
+        followed through, which takes most of the time of static answers. `check`: rows of a liquid ring to
+        calibrate, which measures what the array core leaves out; none here, while the command takes three.
+        `executor`: any `concurrent.futures.Executor`; its answers are those of this process to
         the last bit. `workers`: processes of its own where there is none. `store`: folder in which answers
         are kept, and from which an interrupted sweep goes on. `progress`: called with how far it is.
     Raises: SceneError: a scene or an axis that cannot be used; a point that is refused is a row with its

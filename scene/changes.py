@@ -202,7 +202,7 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
     content, keys = document, schema.top
     for place, step in enumerate(steps):
         default = keys[step].presence.default if step in keys else None
-        keys = _inside(schema, steps[: place + 1])
+        keys = schema.keys_in(steps[: place + 1])
         inside = content.get(step, default if isinstance(default, Mapping) else {})
         if not isinstance(inside, Mapping):
             content[".".join((*steps[place:], name))] = value
@@ -224,15 +224,6 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
         _note_origin(document[steps[0]], (*steps[1:], name)[0], None if value is None else origin)
 
 
-def _inside(schema: Schema, steps: list[str]) -> Mapping[str, Key]:
-    """Keys of the table at a place; none where there is no table."""
-    keys = schema.tables[steps[0]].keys if steps[0] in schema.tables else {}
-    for step in steps[1:]:
-        takes = keys[step].takes if step in keys else None
-        keys = takes.keys if isinstance(takes, Entries) else {}
-    return keys
-
-
 def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None:
     """Of a changed value; what stood there was said of the value before."""
     stated = dict(table.get(ORIGIN, {})) if isinstance(table.get(ORIGIN, {}), Mapping) else {}
@@ -246,15 +237,11 @@ def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None
 
 def _plain(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> tuple[Any, float]:
     """A number in SI with its standard deviation; a quantity that no key takes as text, for its error."""
-    unit = _si_unit(takes.dimension) if isinstance(takes, Reader) and takes.dimension else ""
+    unit = DIMENSIONS[takes.dimension].si_unit if isinstance(takes, Reader) and takes.dimension else ""
     try:
         return plain_number(value, unit)
     except ValueError:
         return str(value), 0.0
-
-
-def _si_unit(dimension: str) -> str:
-    return next(iter(DIMENSIONS[dimension].units))
 
 
 def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> Any:
@@ -264,8 +251,10 @@ def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> 
         keys = takes.keys if isinstance(takes, Entries) else takes if isinstance(takes, Mapping) else {}
         return {key: _written(each, keys[key].takes if key in keys else None) for key, each in value.items()}
     if isinstance(value, list | tuple):
-        return [_written(each, takes) for each in value]
+        each_written = [_written(each, takes) for each in value]
+        single = isinstance(takes, Reader) and takes.one_for_all and len(value) == 1
+        return each_written[0] if single else each_written
     dimension = takes.dimension if isinstance(takes, Reader) else None
     if dimension is None or isinstance(value, bool) or not isinstance(value, int | float):
         return value
-    return f"{value!r} {_si_unit(dimension)}"
+    return f"{value!r} {DIMENSIONS[dimension].si_unit}"

@@ -8,8 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
-from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.declaration import Key, Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Bend, Scene
@@ -68,15 +67,15 @@ _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def _declared() -> Iterator[_Line]:
     for name, table in LIQUID_RING.tables.items():
         if table.record is not None:
-            takes = {key: each.takes for key, each in keys_of(table.record).items()}
+            keys = keys_of(table.record)
             for key, entry in descriptions_of(table.record).items():
-                yield _line(f"{name}.{key}", entry, takes.get(key))
+                yield _line(f"{name}.{key}", entry, keys.get(key))
     for key, entry in descriptions_of(Scene).items():
         yield _line(key, entry, None)
 
 
-def _line(path: str, entry: Shown, takes: object) -> _Line:
-    dimension = takes.dimension if isinstance(takes, Reader) else None
+def _line(path: str, entry: Shown, key: Key | None) -> _Line:
+    dimension = key.takes.dimension if key is not None else None
     return _Line(path=path, shown=entry, dimension=entry.dimension or dimension or "")
 
 
@@ -107,8 +106,8 @@ def _line_at(path: str) -> _Line:
     for kind in map(scene_kind, balancers()):
         keys = kind.schema.tables[table].keys if table in kind.schema.tables else {}
         takes = keys[key].takes if key in keys else None
-        if isinstance(takes, Reader) and takes.dimension:
-            unit = kind.usual_units.get(takes.dimension, next(iter(DIMENSIONS[takes.dimension].units)))
+        if takes is not None and takes.dimension:
+            unit = kind.usual_units.get(takes.dimension, DIMENSIONS[takes.dimension].si_unit)
             return _Line(path=path, shown=Shown(path, unit), dimension=takes.dimension)
     return _Line(path=path, shown=Shown(path), dimension="")
 
@@ -121,7 +120,7 @@ def usual_unit(path: str) -> str:
 def si_unit(path: str) -> str:
     """SI unit of a value of a scene, such as "kg m"; "1" for a number without one."""
     dimension = _line_at(path).dimension
-    return next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else "1"
+    return DIMENSIONS[dimension].si_unit.replace("*", " ") if dimension else "1"
 
 
 def usual_name(path: str) -> str:

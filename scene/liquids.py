@@ -9,7 +9,7 @@ import csv
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from types import MappingProxyType
 from typing import Any
@@ -24,6 +24,7 @@ from ringbalance.scene.models import Liquid
 from ringbalance.scene.units import FieldError
 
 _ZERO_CELSIUS = 273.15
+_ROOM = 293.15
 _SAME_TEMPERATURE = 0.01
 _WATER = "water"
 _COLUMNS = ("T_C", "rho_kg_m3", "nu_m2_s", "vapour_pressure_Pa")
@@ -127,6 +128,14 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
     )
 
 
+def liquids_at_room_temperature() -> tuple[Liquid, ...]:
+    """Every known liquid at 20 degC, or at the nearest temperature for which there are data."""
+    return tuple(
+        liquid_at(name=each.name, temperature=min(max(_ROOM, each.temperatures[0]), each.temperatures[-1]))
+        for each in known_liquids()
+    )
+
+
 def _properties(liquid: KnownLiquid, temperature: float) -> tuple[float, float, float]:
     low, high = liquid.temperatures[0], liquid.temperatures[-1]
     inside = min(max(temperature, low), high)
@@ -192,6 +201,7 @@ def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, F
     return liquid, rows
 
 
+@lru_cache(maxsize=256)
 def _water_properties(*, temperature: float) -> tuple[float, float, float]:
     """Properties of water at atmospheric pressure.
 

@@ -152,7 +152,8 @@ def _records(reading: Reading, before: CheckedValues | None) -> dict[str, Any]:
         for name, table in reading.schema.tables.items()
         if table.record is not None
     }
-    uncertainty = tuple(_uncertainty(reading))
+    same = before is not None and before.tables.get("uncertainty") is reading.tables["uncertainty"]
+    uncertainty = known["uncertainty"] if same else tuple(_uncertainty(reading))
     return {**records, "tolerance": values["accuracy.tolerance"], "uncertainty": uncertainty}
 
 

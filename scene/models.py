@@ -22,7 +22,7 @@ from ringbalance.scene.keys.declaration import (
     standard,
     unused,
 )
-from ringbalance.scene.keys.derivations import even_number_of_chambers
+from ringbalance.scene.keys.derivations import angle_of_chambers, even_number_of_chambers
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -80,8 +80,12 @@ class Disc:
     central_angle: Annotated[
         PositiveAngle,
         needed(
-            "theta of one chamber between its bounding radii; at most 360 deg / chambers, and wide enough "
-            "for an opening between the plates at inner_radius of 1/2000 of outer_radius - inner_radius"
+            "theta of one chamber, from the middle of one plate to the middle of the next; at most 360 deg / "
+            "chambers, and wide enough that the plates leave an opening at inner_radius of 1/2000 of "
+            "outer_radius - inner_radius",
+            "disc.chambers",
+            otherwise="360 deg / chambers; one of both is **needed**",
+            rule=angle_of_chambers,
         ),
         UNCERTAIN,
         Shown("central angle of a chamber", "deg"),
@@ -90,7 +94,7 @@ class Disc:
         int,
         chamber_count(),
         derived(
-            "360 deg / central_angle, when that is an even number",
+            "360 deg / central_angle, where that is an even number",
             "number of chambers",
             "disc.central_angle",
             rule=even_number_of_chambers,

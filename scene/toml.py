@@ -50,9 +50,16 @@ def table_text(name: str, table: Mapping[str, Any]) -> str:
 
 
 def _lines(table: Mapping[str, Any]) -> str:
-    return "".join(
-        (_text_line if isinstance(value, str) else _line)(key, value) for key, value in table.items()
-    )
+    return "".join(_kept_line(key, value) for key, value in table.items())
+
+
+def _kept_line(key: str, value: Any) -> str:
+    """Thousands of scenes that differ in few keys have most lines of texts and of origins alike."""
+    if isinstance(value, str):
+        return _text_line(key, value)
+    if isinstance(value, dict) and all(isinstance(each, str) for each in value.values()):
+        return _texts_line(key, tuple(value.items()))
+    return _line(key, value)
 
 
 def _line(key: str, value: Any) -> str:
@@ -61,8 +68,12 @@ def _line(key: str, value: Any) -> str:
 
 @lru_cache(maxsize=1024)
 def _text_line(key: str, value: str) -> str:
-    """The same of a text: thousands of scenes that differ in few keys have most lines alike."""
     return _line(key, value)
+
+
+@lru_cache(maxsize=1024)
+def _texts_line(key: str, items: tuple[tuple[str, str], ...]) -> str:
+    return _line(key, dict(items))
 
 
 def _value_text(value: Any, *, indent: str = "") -> str:

@@ -52,6 +52,11 @@ class _Dimension:
         return self.name.split(" ", 1)[1]
 
     @property
+    def si_unit(self) -> str:
+        """Its unit in SI."""
+        return next(iter(self.units))
+
+    @property
     def unit_names(self) -> str:
         """The units with commas between, as a message shows them."""
         return ", ".join(self.units)
@@ -204,7 +209,7 @@ def shortest(value: float) -> str:
 
 def shortest_quantity(value: float, usual: str) -> str:
     """An SI value to 1e-6 in its usual unit, or in that of SI where it is tiny or this saves digits."""
-    si = next(next(iter(kind.units)) for kind in DIMENSIONS.values() if usual in kind.units)
+    si = next(kind.si_unit for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
     tiny = abs(value) < _TINY * unit_factor(usual) and len(other) < len(plain)
     return other if value == 0.0 or tiny or len(other) + _SAVED <= len(plain) else plain
@@ -257,19 +262,22 @@ def _in_si(number: str, unit: _Unit, kind: _Dimension) -> float:
     scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
     if not abs(rough) * scale <= 10 * kind.largest:
         raise FieldError(_too_large(kind), _allowed(kind))
-    exact = Fraction(number) if rough != 0 else Fraction(0)
-    value = float((exact + unit.offset) * unit.factor) * (math.pi if unit.pi else 1.0)
+    value = rough + 0.0  # no negative zero
+    if unit.factor != 1 or unit.offset != 0:
+        exact = Fraction(number) if rough != 0 else Fraction(0)
+        value = float((exact + unit.offset) * unit.factor)
+    value *= math.pi if unit.pi else 1.0
     if abs(value) > kind.largest:
         raise FieldError(_too_large(kind), _allowed(kind))
     return value
 
 
 def _too_large(kind: _Dimension) -> str:
-    return f"its magnitude is above {kind.largest:g} {next(iter(kind.units))}, more than any balancer has"
+    return f"its magnitude is above {kind.largest:g} {kind.si_unit}, more than any balancer has"
 
 
 def _allowed(kind: _Dimension) -> str:
-    return f'{kind.name} such as "{kind.example}", in {", ".join(kind.units)}'
+    return f'{kind.name} such as "{kind.example}", in {kind.unit_names}'
 
 
 def _wrong_unit(unit_text: str, kind: _Dimension) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
@@ -24,6 +25,7 @@ settings.register_profile("dev", deadline=None, max_examples=200)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 _FOLDER: Final = Path(__file__).parent
+_ROOT: Final = _FOLDER.parent.resolve()
 _FIRST: Final = (
     "verification/test_cases.py",
     "physics",
@@ -55,3 +57,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def paper_scene() -> Scene:
     """The liquid-ring paper's disc, as bundled."""
     return cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
+
+
+@pytest.fixture(scope="session")
+def tracked_files() -> tuple[Path, ...]:
+    """Files that git tracks or would track; symbolic links are left out."""
+    command = [
+        "git",
+        "-c",
+        "safe.directory=*",
+        "ls-files",
+        "--cached",
+        "--others",
+        "--exclude-standard",
+        "-z",
+    ]
+    listing = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip(f"not a git checkout: {listing.stderr.strip()}")
+    paths = [_ROOT / name for name in sorted(set(listing.stdout.split("\0"))) if name]
+    return tuple(path for path in paths if path.is_file() and not path.is_symlink())

@@ -272,12 +272,13 @@ runpy.run_module("ringbalance", run_name="__main__")
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
-def test_brief_prints_a_title_three_numbers_and_the_verdict(here: Run) -> None:
+def test_brief_prints_a_title_main_numbers_and_the_verdict(here: Run) -> None:
     whole, brief = here("calibrate", PAPER), here("calibrate", "--brief", PAPER)
     assert brief.returncode == 0
     assert brief.stdout.splitlines()[0] == whole.stdout.splitlines()[0]
-    assert len(brief.stdout.splitlines()) <= 6 < len(whole.stdout.splitlines())
+    assert len(brief.stdout.splitlines()) <= 7 < len(whole.stdout.splitlines())
     assert "lambda per transferred mass" in brief.stdout
+    assert "usable moment in any direction" in brief.stdout
 
 
 def test_quiet_silences_messages_and_not_errors(here: Run, tmp_path: Path) -> None:

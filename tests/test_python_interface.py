@@ -13,14 +13,13 @@ from dataclasses import replace
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from algorithm_steps import Stepped
 
 import ringbalance as rb
-from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -92,7 +91,7 @@ class Wrapped:
 
     def __init__(self, weaker: float) -> None:
         settings = {"controller.proportional": short().controller.proportional * weaker}
-        self.inner = Stepped(TargetVector(scene=liquid_ring_scene(short().with_values(settings))))
+        self.inner = rb.scene_controller(liquid_ring_scene(short().with_values(settings)))
         self.rises_tolerated = self.inner.rises_tolerated
 
     def start(self) -> Any:
@@ -143,6 +142,31 @@ class Slower:
     def evaluate(self, **conditions: Any) -> rb.Flow:
         flow = self.law.evaluate(**conditions)
         return replace(flow, velocity=self.part * flow.velocity)
+
+
+class Short:
+    """A law of one's own that forgets the arrays."""
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def evaluate(self, **_conditions: Any) -> Any:
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (1.5, r"Short returns a Flow, not 1\.5"),
+        (
+            SimpleNamespace(velocity=1.0, uncertainty=0.1, regime=1, primed=True),
+            "all arrays of its Flow have the shape of the conditions",
+        ),
+    ],
+)
+def test_a_law_that_gives_no_arrays_is_refused_in_one_sentence(answer: Any, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        rb.simulate(short(), flow_law=Short(answer))
 
 
 def test_what_a_law_of_one_s_own_does_not_give_is_said() -> None:

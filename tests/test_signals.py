@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -38,14 +37,17 @@ except KeyboardInterrupt:
 """
 
 
+def ended(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", program, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=15)
+
+
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("in_finaliser", [True, False])
 def test_an_interrupt_that_python_drops_is_made_again(name: str, in_finaliser: bool) -> None:
     program = DROPPED.format(name=name, in_finaliser=in_finaliser)
-    ended = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=15, env=dict(os.environ)
-    )
-    assert (ended.returncode, ended.stderr) == (130, "")
+    run = ended(program)
+    assert (run.returncode, run.stderr) == (130, "")
 
 
 def test_other_dropped_errors_are_shown_as_ever() -> None:
@@ -57,8 +59,7 @@ class Thing:
 with interrupts():
     Thing()
 """
-    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15)
-    assert "of the finaliser" in ended.stderr
+    assert "of the finaliser" in ended(program).stderr
 
 
 def test_an_interrupt_waits_for_a_module_that_would_catch_it(tmp_path: Path) -> None:
@@ -78,9 +79,8 @@ try:
 except KeyboardInterrupt:
     sys.exit(130)
 """
-    command = [sys.executable, "-c", program, str(tmp_path)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=15)
-    assert (ended.returncode, ended.stderr) == (130, "")
+    run = ended(program, str(tmp_path))
+    assert (run.returncode, run.stderr) == (130, "")
 
 
 def test_an_interrupt_waits_for_a_process_that_is_being_started() -> None:
@@ -110,5 +110,5 @@ try:
 except KeyboardInterrupt:
     sys.exit(130)
 """
-    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15)
-    assert (ended.returncode, ended.stderr) == (130, "")
+    run = ended(program)
+    assert (run.returncode, run.stderr) == (130, "")

@@ -122,7 +122,7 @@ def when_left_out(key: Key) -> str:
     """What holds without a key."""
     if key.presence.kind == "standard":
         return f"`{toml_text(key.presence.default)}`"
-    return "**needed**" if key.presence.kind == "needed" else key.presence.otherwise
+    return key.presence.otherwise
 
 
 def tables() -> dict[str, str]:

@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import raw_value_at, with_values_at
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.evidence import Evidence
 from ringbalance.verification.papers import changed
@@ -46,7 +47,7 @@ def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption,
     """
     found = []
     for one in rests_on:
-        origin, value = scene.origin_of(one.path), _value_of(scene, one.path)
+        origin, value = scene.origin_of(one.path), raw_value_at(scene, one.path)
         if origin in KNOWN or value is None:
             continue
         low, high, why = _range(one, scene, value, origin)
@@ -55,17 +56,6 @@ def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption,
             Assumption(path=one.path, origin=origin, value=value, why=why, covered=one.covered, **ends)
         )
     return tuple(found)
-
-
-def _value_of(scene: Any, path: str) -> float | None:
-    """A scene's value by "table.key", SI; None where the scene does not have the term."""
-    table, _, key = path.partition(".")
-    value: float | None = getattr(getattr(scene, table), key)
-    return value
-
-
-def _with_part(scene: Any, table: str, **values: Any) -> Any:
-    return dataclasses.replace(scene, **{table: dataclasses.replace(getattr(scene, table), **values)})
 
 
 _CHANGES: Final[Mapping[str, Callable[..., Any]]] = {"eccentric_mass": changed}
@@ -82,8 +72,8 @@ def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -
         if not hasattr(getattr(scene, table, None), key):
             raise ValueError(f'a scene has no quantity "{path}"')
         value = None if given == "absent" else given
-        change: Callable[..., Any] = _CHANGES.get(scene.balancer, _with_part)
-        scene = change(scene, table, **{key: value})
+        change: Callable[..., Any] = _CHANGES.get(scene.balancer, with_values_at)
+        scene = change(scene, {path: value})
     return scene
 
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any, Final
 
@@ -22,6 +21,7 @@ from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.origins import raw_value_at, with_values_at
 from ringbalance.verification.evidence import input_uncertainty, printed
 
 CHAMBER_VOLUME: Final = printed(67.7e-6, last_digit=0.1e-6)
@@ -120,14 +120,13 @@ def _places(size: int) -> IntArray:
     return np.unique(np.linspace(0, size - 1, _DRAWN).round().astype(np.int64))
 
 
-def changed(scene: EccentricScene, table: str, **values: Any) -> EccentricScene:
-    """The scene with some values of one table replaced, and with the defaults that follow from them.
+def changed(scene: EccentricScene, values: Mapping[str, Any]) -> EccentricScene:
+    """The scene with some values replaced, and with the defaults that follow from them.
 
     Unlike `SceneFile.with_values` it checks nothing: at the ends of an assumed noise, say, the limit may lie
-    below the noise. Args: `**values`: by key, SI.
+    below the noise. Args: `values`: by path, SI.
     """
-    scene = replace(scene, **{table: replace(getattr(scene, table), **values)})
-    changes = {f"{table}.{name}" for name in values}
+    scene, changes = with_values_at(scene, values), set(values)
     for path in scene.defaulted:
         part, _, name = path.partition(".")
         if not hasattr(scene, part) or path in changes:
@@ -135,8 +134,8 @@ def changed(scene: EccentricScene, table: str, **values: Any) -> EccentricScene:
         record: Any = type(getattr(scene, part))
         presence = keys_of(record)[name].presence
         if not changes.isdisjoint(presence.needs):
-            needed = [getattr(getattr(scene, p), key) for p, key in (n.split(".") for n in presence.needs)]
-            scene = replace(scene, **{part: replace(getattr(scene, part), **{name: presence.value(*needed)})})
+            needed = [raw_value_at(scene, need) for need in presence.needs]
+            scene = with_values_at(scene, {path: presence.value(*needed)})
             changes.add(path)
     return scene
 
@@ -146,5 +145,5 @@ def at_constant_speed(
 ) -> EccentricScene:
     """The scene at one speed. Args: `speed`: rad/s; default the first of the scene's profile."""
     kept = scene.rotor.speed_profile[0].speed if speed is None else speed
-    level = changed(scene, "rotor", speed_profile=(SpeedPoint(time=0.0, speed=kept),))
-    return changed(level, "run", time_limit=time_limit)
+    level = changed(scene, {"rotor.speed_profile": (SpeedPoint(time=0.0, speed=kept),)})
+    return changed(level, {"run.time_limit": time_limit})

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
+from operator import index
 from typing import Protocol, TypeVar
 
 StateT = TypeVar("StateT")
@@ -44,6 +46,13 @@ class ValveCommand:
     """Index of the driven chamber, A = 0."""
     duration: float
     """s, above zero."""
+
+    def __post_init__(self) -> None:
+        """Refuse a chamber or a time that no valve has."""
+        if index(self.chamber) < 0:
+            raise ValueError(f"chamber {self.chamber}: chambers are counted from 0, which is A")
+        if not 0.0 < self.duration < inf:
+            raise ValueError(f"a valve cannot open for {self.duration} s: leave it out of the command")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -57,7 +57,7 @@ FRICTION_FILTER: Final = np.dtype(
 
 
 @in_place
-def friction_flow(
+def _friction_flow(
     model: TrackModel, rate: float, arm: float, speed: float, torque: float, step: float, euler: bool
 ) -> tuple[float, float, float]:
     """Carry a moving mass one step on, by the exponential Rosenbrock-Euler rule, which bears any step.
@@ -92,7 +92,7 @@ def friction_step(
 
     Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
     """
-    rate, by_rate, by_arm = friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
+    rate, by_rate, by_arm = _friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
     wander, r = noise.arm * step, noise.rate_variance
     p11 = (
         by_rate**2 * estimate.rate_variance

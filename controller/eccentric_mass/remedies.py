@@ -18,7 +18,7 @@ from ringbalance.controller.balancer import Outcomes, Remedy, Settings
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.scene.origins import value_at
+from ringbalance.scene.origins import raw_value_at, value_at
 
 _MOST: Final = 4
 """Kinds of change that are tried by how runs end."""
@@ -125,8 +125,7 @@ def _of_ends(scene: EccentricScene, ended: Counter[str]) -> Iterator[Remedy]:
 def _changed(scene: EccentricScene, factors: Mapping[str, float | str]) -> dict[str, float | str]:
     changes: dict[str, float | str] = {}
     for path, factor in factors.items():
-        table, _, key = path.partition(".")
-        before = getattr(getattr(scene, table), key)
+        before = raw_value_at(scene, path)
         if isinstance(factor, str):
             changes |= {path: factor} if before != factor else {}
         elif before:

@@ -129,7 +129,7 @@ def _return(memory: Record, place: Sequence[float], time: float, cause: int) -> 
 
 
 @in_place
-def influence_of(law: DriveLaw, speed: float) -> complex:
+def _influence_of(law: DriveLaw, speed: float) -> complex:
     """alpha, steady vibration per imbalance as configured, m/(kg m)."""
     stiffness = law.whirl.stiffness - law.whirl.mass * speed * speed
     return speed * speed / complex(stiffness, law.whirl.damping * speed)
@@ -147,7 +147,7 @@ def _imbalance(
 ) -> None:
     """Until the imbalance is known relative to itself, or so well that it makes no difference."""
     known = memory.deviation <= gates.imbalance_gate * abs(memory.imbalance)
-    settled = 2 * memory.deviation * abs(influence_of(law, motion.speed)) <= 0.1 * gates.limit
+    settled = 2 * memory.deviation * abs(_influence_of(law, motion.speed)) <= 0.1 * gates.limit
     elapsed = time - memory.entered
     if visible and (known or settled) and elapsed >= gates.least_estimate:
         _stay(memory, FRICTION, time, NONE)
@@ -228,7 +228,7 @@ def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: fl
         _average_from(memory, time + gates.wait)
     if _averaged(gates, memory, motion, time):
         mean = memory.total / memory.averaged
-        _correct(gates, memory, mean, influence_of(law, motion.speed), time)
+        _correct(gates, memory, mean, _influence_of(law, motion.speed), time)
 
 
 @in_place

@@ -109,7 +109,7 @@ def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
     name, outcome = _outcome(judgement)
     places = judgement.outcomes.inputs.items()
     rows = [
-        _row(balancer, judgement, of, place, name, first_order_index(outcome, place)) for of, place in places
+        _row(balancer, judgement, of, place, name, _first_order_index(outcome, place)) for of, place in places
     ]
     return Ranking(inputs=tuple(sorted(rows, key=lambda each: -each.index)))
 
@@ -140,7 +140,7 @@ def _row(
     )
 
 
-def first_order_index(outcome: Sequence[float] | FloatArray, place: npt.ArrayLike) -> float:
+def _first_order_index(outcome: Sequence[float] | FloatArray, place: npt.ArrayLike) -> float:
     """S of an input by eighths of its distribution; 0 where the outcome is the same everywhere.
 
     Args: `outcome`: y of every device, shape (n,). `place`: of the input in its distribution, in (0, 1).

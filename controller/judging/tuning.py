@@ -12,6 +12,7 @@ from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied, amplitude_reached
 from ringbalance.controller.judging.search import Along
+from ringbalance.controller.rotor import assumed_rotor
 from ringbalance.controller.trials import Information
 from ringbalance.results.numbers import given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
@@ -257,6 +258,7 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
         yield Finding(code="tuned_causes", values={"causes": causes})
     if not tuning.remedies and tuning.along and best.verdict != MET:
         yield Finding(code="tuned_no_level", values={"key": tuning.along_name})
+    yield from assumed_rotor(tuning.scene)
     yield from _mending(tuning)
 
 

@@ -50,7 +50,10 @@ class StateSpace:
 
     def to_control(self) -> Any:
         """A `control.StateSpace` with these names. Raises: ImportError: python-control is not installed."""
-        make = registered("function", "control_state_space")
+        try:
+            make = registered("function", "control_state_space")
+        except ImportError:
+            raise ImportError("python-control is not installed: pip install control") from None
         names = {"inputs": list(self.inputs), "outputs": list(self.outputs), "states": list(self.states)}
         return make(self.a, self.b, self.c, self.d, self.dt, **names)
 

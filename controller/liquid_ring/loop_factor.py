@@ -109,7 +109,7 @@ def _usable_fill(scene: Scene, model: BalancerModel) -> float:
     return min(max(residual_fill_ratio(scene, law=law), stalled), start)
 
 
-def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
+def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
     total = 2.0 * scene.disc.initial_fill
     least, most = _range(scene, model)
@@ -132,7 +132,7 @@ def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
 def vibration_rates(scene: Scene, model: BalancerModel) -> FloatArray:
     """b at the balanced fills, m/s, shape (pairs, 2): gas into the positive chamber, into the other one."""
     total, (lowest, highest) = 2.0 * scene.disc.initial_fill, _range(scene, model)
-    fills = balanced_fills(scene, model)
+    fills = _balanced_fills(scene, model)
     step = _FILL_STEP * (highest - lowest)
     after, before = np.minimum(fills + step, highest), np.maximum(fills - step, lowest)
     up, down = (

@@ -86,7 +86,7 @@ class Column:
         return min(self.highest, _LARGEST.get(self.dimension or "", math.inf))
 
     def _range(self) -> str:
-        unit = next(iter(DIMENSIONS[self.dimension].units)) if self.dimension else ""
+        unit = DIMENSIONS[self.dimension].si_unit if self.dimension else ""
         low = self.lowest if self.lowest > -math.inf else -self._largest
         start = "above 0" if self.above_zero else f"from {low:.4g}"
         end = "" if self._largest == math.inf else f"to {self._largest:.4g} {unit}"

@@ -176,7 +176,7 @@ def amplification(scene: Scene, fills: FloatArray | float) -> _Swing:
     return _swing(scene, np.pi / disc.central_angle, depth, disc.central_angle / 2)
 
 
-def wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
+def _wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
     """Estimated height that gravity's waves may have, zero-to-peak, over the depth of the ring.
 
     A surface across gravity alone, g/omega^2 sin(phi) and cos(phi), is taken apart into the modes of a
@@ -222,7 +222,7 @@ def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
     In shallow waves the mean square of the velocity is g_c <eta^2>/h, of which Bernoulli's equation takes
     half from the wall pressure and as much from the surface's mean place; <eta^2> is at most eta^2/2.
     """
-    return np.minimum(wave_height(scene, fills) ** 2 / 4, 1.0)
+    return np.minimum(_wave_height(scene, fills) ** 2 / 4, 1.0)
 
 
 FILLS: Final = (0.2, 0.5, 1.0)
@@ -329,7 +329,7 @@ def _dense(scene: Scene) -> Status:
 
 def _waves(scene: Scene, fills: FloatArray) -> Status:
     """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    swing = wave_height(scene, fills)
+    swing = _wave_height(scene, fills)
     worst = int(np.argmax(swing))
     if swing[worst] <= SMALL:
         return Status()

@@ -311,6 +311,16 @@ class _Velocities:
 
     def evaluate(self, **conditions: Any) -> Flow:
         flow: Flow = self.law.evaluate(**conditions)
+        shape = np.broadcast_shapes(*(np.shape(value) for value in conditions.values() if value is not None))
+        names = ("velocity", "uncertainty", "regime", "primed")
+        if not all(hasattr(flow, name) for name in names):
+            raise TypeError(f"evaluate of the law {self.name} returns a Flow, not {flow!r}")
+        for name in names:
+            if (found := np.shape(getattr(flow, name))) != shape:
+                raise TypeError(
+                    f"evaluate of the law {self.name} returns {name} of shape {found} for conditions of "
+                    f"shape {shape}: all arrays of its Flow have the shape of the conditions"
+                )
         return flow
 
 

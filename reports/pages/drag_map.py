@@ -37,7 +37,7 @@ from ringbalance.reduced_model.tube.regime import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.liquids import known_liquids, liquid_at
+from ringbalance.scene.liquids import liquids_at_room_temperature
 from ringbalance.scene.models import HumpGas, Liquid, Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, input_sides, nominal_value, without_fitted
 
@@ -242,7 +242,6 @@ _VISCOSITIES: Final = (2e-7, 5e-4)
 _BORE_POINTS: Final = 41
 _VISCOSITY_POINTS: Final = 49
 _ROOM: Final = 1.5
-_ROOM_TEMPERATURE: Final = 293.15
 _FIFTY: Final = paper.PAPER_DRAG_COEFFICIENT
 
 
@@ -315,7 +314,7 @@ def liquids_in_tube(
     Source: `_DragPoint.of`, density and the spread of the properties included.
     """
     scene, law = calibration.scene, calibration.flow_law
-    asked = _default_liquids() if liquids is None else liquids
+    asked = liquids_at_room_temperature() if liquids is None else liquids
     chosen = (scene.liquid, *(q for q in asked if q.name != scene.liquid.name))
     density = np.array([q.density for q in chosen])
     equal = scene.gas.pressure * density / scene.liquid.density
@@ -416,15 +415,6 @@ def _starting_pressure(calibration: Calibration) -> float:
     gas: HumpGas = "trapped" if law.path.trapped else "vented"
     pressure = priming_pressure(law=law, fill_ratio=half, opposite_fill_ratio=half, hump_gas=gas)
     return 0.0 if pressure is None else max(float(pressure), 0.0)
-
-
-def _default_liquids() -> tuple[Liquid, ...]:
-    """Each known liquid at room temperature, or at the nearest temperature that there are data for."""
-    temperatures = {q.name: (q.temperatures[0], q.temperatures[-1]) for q in known_liquids()}
-    return tuple(
-        liquid_at(name=name, temperature=min(max(_ROOM_TEMPERATURE, low), high))
-        for name, (low, high) in temperatures.items()
-    )
 
 
 def _designs(scene: Scene, values: Mapping[str, FloatArray]) -> Designs:

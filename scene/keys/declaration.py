@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, is_dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from ringbalance.scene.keys.fields import Reader, choice
 
@@ -53,6 +53,7 @@ class Entries:
     keys: Mapping[str, Key]
     example: str
     """The list as one would write it; empty for one table."""
+    dimension: ClassVar[str | None] = None
 
     @property
     def allowed(self) -> str:
@@ -114,9 +115,14 @@ UNKNOWN = _Uncertain(common=True)
 """All devices have it alike, and it is not known exactly."""
 
 
-def needed(meaning: str) -> Presence:
-    """Declare a key that every scene must have."""
-    return Presence(kind="needed", meaning=meaning, otherwise="needed")
+def needed(
+    meaning: str, *needs: str, otherwise: str = "**needed**", rule: Callable[..., Any] | None = None
+) -> Presence:
+    """Declare a key that every scene must have.
+
+    Args: `needs`, `otherwise`, `rule`: as of `derived`, of one that follows where those others are there.
+    """
+    return Presence(kind="needed", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs)
 
 
 def standard(default: object, meaning: str) -> Presence:

@@ -36,6 +36,11 @@ def even_number_of_chambers(central_angle: float) -> int | None:
     return nearest if close and nearest >= LEAST_CHAMBERS and nearest % 2 == 0 else None
 
 
+def angle_of_chambers(chambers: int) -> float:
+    """Central angle of chambers that fill the circle, rad."""
+    return 2 * math.pi / chambers
+
+
 def trial_sequence(chambers: int) -> tuple[str, ...]:
     """Order in which chambers are tried, each followed by its opposite: A, C, B, D for four, as printed."""
     half = chambers // 2

@@ -33,6 +33,8 @@ class Reader:
     """What is written there, for the reference of the scene file."""
     dimension: str | None = None
     """A key of `DIMENSIONS`; None without unit."""
+    one_for_all: bool = False
+    """Whether a list of one value is written as that value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +84,9 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
         if not limits.holds(number):
             raise FieldError(f"it must be {limits}", allowed)
         if limits.above == 0 and number < kind.smallest:
-            si_unit = next(iter(kind.units))
-            raise FieldError(f"it must be at least {kind.smallest:g} {si_unit} to mean anything", allowed)
+            raise FieldError(
+                f"it must be at least {kind.smallest:g} {kind.si_unit} to mean anything", allowed
+            )
         return number
 
     return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
@@ -228,6 +231,7 @@ def _one_or_each(reader: Reader, *, example: str) -> Reader:
         read=read,
         allowed=f"{reader.allowed}; {more}, such as {example}",
         summary=f"{reader.summary}, {more}",
+        one_for_all=True,
     )
 
 

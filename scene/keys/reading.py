@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any, Literal
 
-from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean
+from ringbalance.scene.faults import MISSING, Fault, closest
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import Place, Schema
 from ringbalance.scene.toml import toml_key, toml_text
@@ -97,6 +97,11 @@ class Reading:
         """An error about a value that is not there."""
         return self.fault(path, problem=problem, allowed=self.allowed(path))
 
+    def _needed(self, path: str) -> Fault:
+        """An error about a missing value, with what it would follow from."""
+        others = (need.split(".")[1] for need in self.schema.key_at(tuple(path.split("."))).presence.needs)
+        return self.missing(path, " or ".join(["every scene needs it", *others]))
+
     def _table(self, table: str) -> Mapping[str, Any]:
         content = self.document.get(table, {}) if table else self.document
         return content if isinstance(content, Mapping) else {}
@@ -108,7 +113,8 @@ class Reading:
     def completed(self) -> Reading:
         """Fill in the defaults that follow from other values, as far as those are known.
 
-        What a default follows from is there already, because a key is declared after it.
+        What a default follows from is there already, because a key is declared after it; a needed key follows
+        from what the file gives.
         """
         unnamed = self.lacks("name")
         known = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
@@ -126,7 +132,7 @@ class Reading:
                 continue
             if self.given(name):
                 paths = (f"{name}.{key}" for key in keys)
-                yield from (self.missing(path) for path in paths if self.lacks(path))
+                yield from (self._needed(path) for path in paths if self.lacks(path))
             elif name not in self.broken:
                 inside = ", ".join(keys) or "name and temperature, or density and kinematic_viscosity"
                 yield Fault(
@@ -296,7 +302,7 @@ def _unknown(rejected: _Rejected, schema: Schema, meant: str) -> tuple[str, str]
     if meant and key == place[-1]:
         hint = f" (it belongs in [{table}])" if table else " (it belongs at the top, before the first table)"
     elif meant:
-        hint = did_you_mean(str(place[-1]), [key])
+        hint = f' (did you mean "{key}"?)'
     return f"unknown {kind}{hint}", ", ".join(known)
 
 
@@ -312,5 +318,6 @@ def _meant(rejected: _Rejected, schema: Schema) -> str:
         home = next((name for name, table in schema.tables.items() if word in table.keys), "")
         if home:
             return f"{home}.{word}"
-    near = closest(word, schema.names_at(place[:-1]))
+    # In words the hump of a tube is the siphon's crest; no name of a key has that word.
+    near = closest(word.replace("crest", "hump"), schema.names_at(place[:-1]))
     return ".".join([*map(str, place[:-1]), near]) if near else ""

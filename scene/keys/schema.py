@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -13,7 +13,7 @@ from ringbalance.scene.chamber_file.record import MeshKeys
 from ringbalance.scene.design_settings import DesignSettings
 from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
-from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, one_of, share, text
+from ringbalance.scene.keys.fields import Bounds, choice, half_width, one_of, share, text
 from ringbalance.scene.origins import Measured, Origin
 from ringbalance.scene.registry import balancers
 
@@ -71,17 +71,18 @@ class Schema:
     def key_at(self, place: Place) -> Key:
         """The key at a place: table, key and so on; entries of lists are passed over."""
         *tables, name = (step for step in place if isinstance(step, str))
-        return self._keys(tables)[name] if tables else self.top[name]
+        return self.keys_in(tables)[name] if tables else self.top[name]
 
     def names_at(self, place: Place) -> list[str]:
         """Names that can stand in the table at a place; at the top those of keys and tables."""
         steps = [step for step in place if isinstance(step, str)]
-        return list(self._keys(steps)) if steps else [*self.top, *self.tables]
+        return list(self.keys_in(steps)) if steps else [*self.top, *self.tables]
 
-    def _keys(self, steps: list[str]) -> Mapping[str, Key]:
-        keys = self.tables[steps[0]].keys
+    def keys_in(self, steps: Sequence[str]) -> Mapping[str, Key]:
+        """Keys of the table at a place; none where there is no table."""
+        keys = self.tables[steps[0]].keys if steps[0] in self.tables else {}
         for step in steps[1:]:
-            takes = keys[step].takes
+            takes = keys[step].takes if step in keys else None
             keys = takes.keys if isinstance(takes, Entries) else {}
         return keys
 
@@ -138,9 +139,8 @@ def _rotor() -> Table:
 
 def _half_width_of(table: str, key: Key) -> Key:
     rule = "that of the known liquid" if table == "liquid" else "exact"
-    dimension = key.takes.dimension if isinstance(key.takes, Reader) else None
     return Key(
-        takes=half_width(dimension),
+        takes=half_width(key.takes.dimension),
         presence=unused(rule, f"expanded uncertainty of the quantity in [{table}]"),
     )
 

@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, closest
 from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT, ErrorCause, FittedQuantity
-from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.toml import toml_text
@@ -78,8 +77,7 @@ def _unit(reading: Reading, each: FittedQuantity) -> _Said:
     if path is None or f"{path[1]}.{path[2]}" not in _uncertain(reading):
         allowed: tuple[str, ...] = (NO_UNIT,)
     else:
-        takes = reading.schema.key_at((path[1], path[2])).takes
-        dimension = takes.dimension if isinstance(takes, Reader) else None
+        dimension = reading.schema.key_at((path[1], path[2])).takes.dimension
         allowed = tuple(DIMENSIONS[dimension].units) if dimension else (NO_UNIT,)
     return None if each.unit in allowed else ("it is not a unit of that quantity", ", ".join(allowed))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -46,23 +45,3 @@ def modules() -> Mapping[str, Path]:
             name = ".".join(("ringbalance", *(part for part in parts if part != "__init__")))
             found[name] = path
     return found
-
-
-@pytest.fixture(scope="session")
-def tracked_files() -> tuple[Path, ...]:
-    """Files that git tracks or would track; symbolic links are left out."""
-    command = [
-        "git",
-        "-c",
-        "safe.directory=*",
-        "ls-files",
-        "--cached",
-        "--others",
-        "--exclude-standard",
-        "-z",
-    ]
-    listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    if listing.returncode != 0:
-        pytest.skip(f"not a git checkout: {listing.stderr.strip()}")
-    paths = [ROOT / name for name in sorted(set(listing.stdout.split("\0"))) if name]
-    return tuple(path for path in paths if path.is_file() and not path.is_symlink())

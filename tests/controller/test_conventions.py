@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ringbalance.controller.document import conventions, lasting_speed
+from ringbalance.controller.document import _lasting_speed, conventions
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import Holding
@@ -25,10 +25,10 @@ def test_unbalances_and_vibrations_follow_from_the_amplitudes(paper_scene: Scene
 
 
 def test_a_correction_lasts_down_to_the_speed_at_which_the_column_parts(paper_scene: Scene) -> None:
-    speed = lasting_speed(paper_scene, 0.4)
+    speed = _lasting_speed(paper_scene, 0.4)
     assert speed is not None
     for factor, holds in ((1.001, True), (0.999, False)):
         slower = replace(paper_scene, rotor=replace(paper_scene.rotor, speed=factor * speed))
         assert Holding.of(slower, fill_ratio=0.4).holds is holds
     fixed = replace(paper_scene, tube=replace(paper_scene.tube, hump_radius=None))
-    assert lasting_speed(fixed, 0.4) is None
+    assert _lasting_speed(fixed, 0.4) is None

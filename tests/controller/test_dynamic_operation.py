@@ -270,18 +270,24 @@ def test_work_bounds_the_integrators_steps(
     assert 0 <= found.fill <= 0.5
 
 
-def test_a_creep_through_a_narrow_tube_takes_few_steps(
-    scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch, forces: Callable[[Dynamics], Any]
-) -> None:
-    """Friction answers in 70 us, the levels within seconds: explicit steps would take half a million."""
+@pytest.fixture
+def creeping(scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch) -> Dynamics:
+    """Of a thick liquid, and few steps for it."""
+    monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 5000)
     thick = replace(
         scene,
         liquid=replace(scene.liquid, name="custom", kinematic_viscosity=1e-3),
         rotor=replace(scene.rotor, speed=250.0),
         environment=replace(scene.environment, gravity=0.0),
     )
-    own = plant(calibrate(thick).model, "tube inertia")
-    monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 5000)
+    return plant(calibrate(thick).model, "tube inertia")
+
+
+def test_a_creep_through_a_narrow_tube_takes_few_steps(
+    creeping: Dynamics, forces: Callable[[Dynamics], Any]
+) -> None:
+    """Friction answers in 70 us, the levels within seconds: explicit steps would take half a million."""
+    own = creeping
     instants = np.array([0.5, 5.0, 50.0])
     found = pass_time(own, PairState(fill=0.3, total=0.5, primed=True), instants=instants)
 
@@ -298,24 +304,13 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
     assert 0.25 < found.fills[2] < found.fills[1] < found.fills[0] < 0.3
 
 
-def test_a_creep_near_its_balance_takes_few_steps(
-    scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_creep_near_its_balance_takes_few_steps(creeping: Dynamics) -> None:
     """Slower than the error allowed to a step: explicit steps would stop it and start it again without
     end."""
-    thick = replace(
-        scene,
-        liquid=replace(scene.liquid, name="custom", kinematic_viscosity=1e-3),
-        rotor=replace(scene.rotor, speed=250.0),
-        environment=replace(scene.environment, gravity=0.0),
-    )
-    own = plant(calibrate(thick).model, "tube inertia")
-    monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 5000)
     left = []
     for offset in (1e-5, 1e-7):
-        found = pass_time(
-            own, PairState(fill=0.25 + offset, total=0.5, primed=True), instants=np.array([20.0])
-        )
+        start = PairState(fill=0.25 + offset, total=0.5, primed=True)
+        found = pass_time(creeping, start, instants=np.array([20.0]))
         assert found.motion.record.event is not Event.UNFINISHED
         left.append((found.fill - 0.25) / offset)
     # Laminar: the same share is left of any offset.

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from algorithm_steps import Stepped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -30,6 +29,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
+from ringbalance.controller.stepped import Stepped
 from ringbalance.reduced_model.injection.dynamics import WORKSPACE
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import cast
 
 import numpy as np
@@ -128,6 +129,12 @@ def test_python_control_takes_it(scene: Scene, law: CompleteLaw) -> None:
     poles = np.sort(np.abs(closed.poles()))
     right = np.sort(np.abs(np.linalg.eigvals(loop.closed)))
     assert poles[-1] == pytest.approx(right[-1], rel=1e-6)
+
+
+@pytest.mark.skipif(find_spec("control") is not None, reason="python-control is installed")
+def test_without_python_control_it_is_named(scene: Scene, law: CompleteLaw) -> None:
+    with pytest.raises(ImportError, match="pip install control"):
+        rb.linear_loop(scene, flow_law=law).plant.to_control()
 
 
 def test_another_controller_has_no_linear_loop(scene: Scene, law: CompleteLaw) -> None:

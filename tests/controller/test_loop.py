@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from algorithm_steps import Stepped
 from pairs import Passage
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
@@ -19,6 +18,7 @@ from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
+from ringbalance.controller.stepped import Stepped
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
@@ -331,3 +331,45 @@ def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> No
         simulate(scene)
     with pytest.raises(ValueError, match="flow_law"):
         simulate(scene, model, flow_law=law)
+
+
+class Answers:
+    """Opens what it is told to, in a command alone or with a state."""
+
+    rises_tolerated = 3
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def start(self) -> None:
+        return None
+
+    def step(self, _state: None, _measurement: Measurement | None) -> Any:
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (Command(resting=True), r"Answers.step returns the next state and a Command"),
+        (None, r"it returned None"),
+        ((None, "A"), r"it returned \(None, 'A'\)"),
+        ((None, Command(valves=(ValveCommand(chamber=9, duration=0.01),))), "this disc has chambers 0 to 3"),
+    ],
+)
+def test_an_answer_that_is_none_is_refused(
+    scene: Scene, model: BalancerModel, answer: Any, message: str
+) -> None:
+    with pytest.raises((TypeError, ValueError), match=message):
+        simulate(scene, model, controller=Answers(answer))
+
+
+def test_there_is_no_chamber_before_the_first() -> None:
+    with pytest.raises(ValueError, match="chambers are counted from 0"):
+        ValveCommand(chamber=-1, duration=0.01)
+
+
+@pytest.mark.parametrize("duration", [-0.01, 0.0, math.nan, math.inf])
+def test_no_valve_opens_for_less_than_no_time(duration: float) -> None:
+    with pytest.raises(ValueError, match="a valve cannot open for"):
+        ValveCommand(chamber=0, duration=duration)

@@ -10,8 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ringbalance as rb
 from ringbalance.controller.liquid_ring.plant import LiquidRing, starting_pressure
-from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
+from ringbalance.controller.rotor import (
+    assumed_rotor,
+    chamber_directions,
+    chamber_letters,
+    disc_unbalance,
+    wrapped,
+)
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -143,3 +150,13 @@ def test_the_starting_pressure_of_the_paper_is_eq_19_at_rest(model: BalancerMode
     found = starting_pressure(law=model.flow, fill=0.0, opposite_fill=0.5, primed=False, above=1e5)
     assert found == pytest.approx(stall, rel=1e-12)
     assert stall == pytest.approx(0.381e6, abs=500)
+
+
+def test_a_result_says_that_its_rotor_is_assumed() -> None:
+    whole = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+    assert list(assumed_rotor(whole)) == []
+    without = {"rotor.lag_angle": None, "rotor.initial_vibration": None}
+    (finding,) = assumed_rotor(whole.with_values(without))
+    assert finding.text.endswith("rotor.lag_angle 17 deg and rotor.initial_vibration 10 um at 90 deg")
+    assert finding in rb.simulate(whole.with_values(without)).rows().findings
+    assert list(assumed_rotor(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))) == []

@@ -14,8 +14,8 @@ from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.loop_factor import (
     LoopFactor,
+    _balanced_fills,
     _stationary_deviation,
-    balanced_fills,
     loop_factor,
     vibration_rates,
 )
@@ -51,7 +51,7 @@ def factor(scene: Scene, model: BalancerModel) -> LoopFactor:
 
 
 def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerModel) -> None:
-    fills = balanced_fills(scene, model)
+    fills = _balanced_fills(scene, model)
     dynamics = dynamics_of(scene=scene, model=model, modelled=())
     rates, short = vibration_rates(scene, model), 1e-5
 
@@ -71,7 +71,7 @@ def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerMo
 def test_the_balanced_fills_of_many_chambers_keep_the_residual_fill(scene: Scene) -> None:
     eight = replace(scene, disc=replace(scene.disc, chambers=8, central_angle=math.pi / 4))
     model = paper_model(eight)
-    fills = balanced_fills(eight, model)
+    fills = _balanced_fills(eight, model)
     assert np.min(fills) == pytest.approx(residual_fill_ratio(eight, law=model.flow))
     moment = disc_unbalance(moment=model.moment, fill_ratio=(*fills, *(0.5 - fills)))
     assert abs(complex(scene.rotor.vibration(moment))) < 1e-9

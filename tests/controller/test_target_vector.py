@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from algorithm_steps import Memory, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import OnReversal, TargetVector, vector_shares
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.stepped import Memory, Stepped
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 
 PAPER = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from algorithm_steps import Memory, Stepped
-
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import Trial
+from ringbalance.controller.stepped import Memory, Stepped
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 
 PAPER = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))

@@ -57,6 +57,17 @@ def test_runs_are_those_of_the_balancer(paper_scene: Scene) -> None:
     assert found.verdicts[0] == "not met"
 
 
+def test_a_store_says_what_it_answered(paper_scene: Scene, tmp_path: Path) -> None:
+    few, more = ({"tube.bore": [1e-3 * bore for bore in bores]} for bores in ([1.0, 1.2], [1.0, 1.2, 1.4]))
+    first = rb.sweep(paper_scene, few, runs=1, intervals=False, store=tmp_path)
+    assert first.resumed == {}
+    again = rb.sweep(paper_scene, more, runs=1, intervals=False, store=tmp_path)
+    assert again.to_dict()["resumed"] == {"runs": 2}
+    (finding,) = (each for each in again.rows().findings if each.code == "sweep_resumed")
+    assert finding.values == {"count": 2, "what": "runs"}
+    assert again.driven[:2] == first.driven
+
+
 def test_a_sweep_can_be_pickled(paper_scene: Scene) -> None:
     table = rb.sweep(paper_scene, {"tube.bore": [1e-3, 2e-3]}, intervals=False)
     assert pickle.loads(pickle.dumps(table)).to_dict() == table.to_dict()
@@ -126,6 +137,12 @@ def test_axes_of_every_kind_make_the_same_points(paper_scene: Scene, tmp_path: P
         ({"tube.bore": "1mm:2mm"}, "", "steps"),
         ({"tube.bore": "1mm:2mm:x"}, "", "no range"),
         ({"tube.bore": "1mm:2mm"}, "halton:8", "no sample"),
+        (
+            {"tube.bore": [0.7, 1.5, 2.5]},
+            "",
+            "bare numbers are in m, and all are far from the scene's 1.5 mm",
+        ),
+        ({"gas.pressure": [0.5, 0.7]}, "", 'as "0.7 MPa"'),
         ({"gas": "nowhere.csv"}, "", "cannot be read"),
         ({"tube.bore": "1mm:2mm:1000", "gas.pressure": "1MPa:2MPa:1001"}, "", "1001000 points"),
         ({}, "", "nothing varies"),

@@ -85,7 +85,7 @@ def test_an_importer_in_c_has_the_bits_of_python(
     asked = queries(law, 4000, outside=True)
     asked = asked[:, np.isfinite(asked).all(axis=0)]
     found = ran(tmp_path / "host", compact, asked)
-    right = np.array(list(answers(compact.constants, asked)))
+    right = np.array(list(answers(compact, asked)))
     assert found[:, :2].tobytes() == np.ascontiguousarray(right[:, :2]).tobytes()
     assert np.array_equal(found[:, 2:], right[:, 2:])
 

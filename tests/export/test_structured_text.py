@@ -24,7 +24,7 @@ parse = pytest.importorskip("blark.parse")
 Both = tuple[CalibratedLaw, CompactLaw]
 STANDARD: Final[dict[str, Callable[[Any], Any]]] = {
     "SQRT": sqrt,
-    "LREAL_TO_DINT": round,
+    "TRUNC": int,
     "DINT_TO_LREAL": float,
 }
 OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
@@ -71,7 +71,7 @@ class Machine:
     def _AssignmentStatement(self, node: Any, names: dict[str, Any]) -> None:  # noqa: N802
         target, value = node.variables[0], self._value(node.expression, names)
         if hasattr(target, "elements"):
-            names[str(target.name.name)][self._place(target, names)] = value
+            names[str(target.name.name)][self._places(target, names)[0]] = value
         else:
             names[str(target.name)] = value
 
@@ -99,9 +99,8 @@ class Machine:
         name, given = str(node.name.name), [self._value(each.value, names) for each in node.parameters]
         return STANDARD[name](*given) if name in STANDARD else self.call(name, given)
 
-    def _place(self, node: Any, names: dict[str, Any]) -> int:
-        place: int = self._value(node.elements[0].subscripts[0], names)
-        return place
+    def _places(self, node: Any, names: dict[str, Any]) -> list[int]:
+        return [self._value(each, names) for each in node.elements[0].subscripts]
 
     def _value(self, node: Any, names: dict[str, Any]) -> Any:  # noqa: C901
         match type(node).__name__:
@@ -114,7 +113,10 @@ class Machine:
             case "SimpleVariable":
                 return names[str(node.name)]
             case "MultiElementVariable":
-                return names[str(node.name.name)][self._place(node, names)]
+                found = names[str(node.name.name)]
+                for place in self._places(node, names):
+                    found = found[place]
+                return found
             case "ParenthesizedExpression":
                 return self._value(node.expr, names)
             case "UnaryOperation":
@@ -152,12 +154,22 @@ def test_structured_text_has_the_bits_of_python(six: Both) -> None:
     constants = [float(each) for each in re.split(r"[\s,]+", block.split("[")[2].split("]")[0].strip())]
     assert constants == list(compact.constants)
     asked = queries(law, 400, seed=3, outside=True)
-    right = np.array(list(answers(compact.constants, asked)))
+    right = np.array(list(answers(compact, asked)))
     assert np.unique(right[:, 2]).size == 5
+    operations = []
     for query, expected in zip(asked.T.tolist(), right, strict=True):
-        row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
-        machine.call("disc_answer", [constants, row])
-        assert np.array(row[point.VELOCITY : point.PRIMED_AFTER + 1]).tobytes() == expected.tobytes()
+        for widths in (True, False):
+            row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
+            before = machine.operations
+            machine.call("disc_answer", [constants, compact.pieces, row, widths])
+            operations.append((row[point.REGIME] == point.BLOCKED, widths, machine.operations - before))
+            if widths:
+                found = row[point.VELOCITY : point.PRIMED_AFTER + 1]
+                assert np.array(found).tobytes() == expected.tobytes()
+        assert row[point.VELOCITY] == expected[0]
+        assert row[point.PRIMED_AFTER] == expected[4]
+    for blocked, widths, most in ((True, True, 120), (False, False, 180), (False, True, 300)):
+        assert most - 60 < max(n for at, wide, n in operations if (at, wide) == (blocked, widths)) <= most
 
 
 def test_the_function_block_is_one(six: Both) -> None:
@@ -182,7 +194,9 @@ def test_disc_and_controller_have_the_bits_of_python(blocks: dict[str, Block]) -
             given = {name: value * (step < 2) for name, value in inputs.items()}
             for name, value in given.items():
                 mine[places[name]] = value
-            machine.call("disc_step", [list(block.constants), mine, 0.003])
+            machine.call(
+                "disc_step", [block.constants, *([block.pieces] if block.pieces else []), mine, 0.003]
+            )
             block.run(row, 0.003, given)
             assert np.array(mine).tobytes() == np.array(row).tobytes()
         assert mine != list(block.start)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import ModuleType
+
 import pytest
 
 from ringbalance.export.translate import Source, c_functions, number_text, st_functions
@@ -37,8 +40,24 @@ def test_what_is_not_of_the_subset_is_refused(line: str) -> None:
 def test_both_languages_have_the_same_statements() -> None:
     source = Source.of_text(f"{HEAD}    if not a > X:\n        return c[N + n // 2]\n    return -a\n")
     assert "if (!(a > X)) {\n        return c[N + (n / 2)];\n    }\n    return -a;" in c_functions(source)
-    text = st_functions(source, prefix="p", sizes={"Law": 4})
+    text = st_functions(source, prefix="p", sizes={"Law": "0..3"})
     assert "IF NOT (v_a > 0.5) THEN\n    p_f := v_c[2 + (v_n / 2)];\n    RETURN;\nEND_IF;" in text
+
+
+def test_a_name_with_two_meanings_is_refused(tmp_path: Path) -> None:
+    texts = (
+        "N, M = 1, 3\n\n\ndef f(c: Law) -> float:\n    return c[N]\n",
+        "N, M = 2, 3\n\n\ndef g(c: Law) -> float:\n    return f(c) + c[N]\n",
+    )
+    modules = []
+    for name, text in zip(("first", "second"), texts, strict=True):
+        file = tmp_path / f"{name}.py"
+        file.write_text(text)
+        modules.append(ModuleType(name))
+        modules[-1].__file__ = str(file)
+    with pytest.raises(ValueError, match="different numbers by N"):
+        Source.of_modules(modules, ["g"])
+    assert Source.of_modules(modules, ["f"]).constants == {"N": 1}
 
 
 def test_numbers_have_a_point() -> None:

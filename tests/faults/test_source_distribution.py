@@ -20,22 +20,9 @@ ADDED = {"PKG-INFO", "setup.cfg"}
 
 
 @pytest.fixture(scope="module")
-def files() -> list[Path]:
+def files(tracked_files: tuple[Path, ...]) -> list[Path]:
     """Files that git tracks or would track, relative to the root; links to folders are left out."""
-    command = [
-        "git",
-        "-c",
-        "safe.directory=*",
-        "ls-files",
-        "--cached",
-        "--others",
-        "--exclude-standard",
-        "-z",
-    ]
-    listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    if listing.returncode != 0:
-        pytest.skip(f"not a git checkout: {listing.stderr.strip()}")
-    return sorted(Path(name) for name in set(listing.stdout.split("\0")) if name and (ROOT / name).is_file())
+    return [path.relative_to(ROOT) for path in tracked_files]
 
 
 @pytest.fixture(scope="module")

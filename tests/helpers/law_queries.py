@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ringbalance.export import point
+from ringbalance.export.compact import CompactLaw
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.arrays import FloatArray
 
@@ -33,9 +34,9 @@ def queries(law: CalibratedLaw, count: int, *, seed: int = 1, outside: bool = Fa
     return found
 
 
-def answers(constants: tuple[float, ...], asked: FloatArray) -> Iterator[list[float]]:
+def answers(law: CompactLaw, asked: FloatArray) -> Iterator[list[float]]:
     """Velocity, half-width, regime, status and primed of each query, by the program's own evaluator."""
     for query in asked.T.tolist():
         w = query + [0.0] * (point.PLACES_OF_QUERY - 4)
-        point.answer(constants, w)
+        point.answer(law.constants, law.pieces, w, True)
         yield w[point.VELOCITY : point.PRIMED_AFTER + 1]

@@ -209,30 +209,29 @@ def test_end_rates_at_various_pressures_see_no_more(scene: Scene, loss: str) -> 
     assert [c.text for c in found.combinations] == ["lambda^2/(k + 1)"]
 
 
-def test_an_amount_and_a_time_tell_both_apart(scene: Scene) -> None:
-    """Liquid weighed beside the end rates: no combination is needed any more."""
-    data = injections(scene, np.full(12, 0.05), noise=1e-8, seed=1)
+def weighed(scene: Scene) -> Observations:
+    """Six transfers whose liquid is weighed."""
     columns: dict[str, npt.ArrayLike] = {
         "fill_ratio": [0.25] * 6,
         "pressure": scene.gas.pressure,
         "gas_time": [0.2, 0.3, 0.4] * 2,
         "mass": 1.0,
     }
+    return noisy("transfer", scene, columns)
+
+
+def test_an_amount_and_a_time_tell_both_apart(scene: Scene) -> None:
+    """Liquid weighed beside the end rates: no combination is needed any more."""
+    data = injections(scene, np.full(12, 0.05), noise=1e-8, seed=1)
     names = ["lambda_factor", "drag_coefficient"]
-    found = fit(scene, data=[data, noisy("transfer", scene, columns)], parameters=names)
+    found = fit(scene, data=[data, weighed(scene)], parameters=names)
     assert set(verdicts(found).values()) == {Identified.IDENTIFIED}
     assert found.combinations == ()
 
 
 def test_a_prior_that_says_more_than_the_data(scene: Scene) -> None:
     """A bore known to a ten-thousandth is not identified by weighing to a hundredth."""
-    columns: dict[str, npt.ArrayLike] = {
-        "fill_ratio": [0.25] * 6,
-        "pressure": scene.gas.pressure,
-        "gas_time": [0.2, 0.3, 0.4] * 2,
-        "mass": 1.0,
-    }
-    data = noisy("transfer", scene, columns)
+    data = weighed(scene)
     known = replace(scene, uncertainty=(replace_bore(scene, 1e-4),))
     assert verdicts(fit(known, data=[data], parameters=["bore"]))["bore"] is Identified.PRACTICALLY
     assert verdicts(fit(scene, data=[data], parameters=["bore"]))["bore"] is Identified.IDENTIFIED

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 from ringbalance.reduced_model import estimates
 from ringbalance.reduced_model.estimates import (
-    deciding_gas_time,
-    long_start_up_loss,
-    start_up_loss,
+    _deciding_gas_time,
+    _long_start_up_loss,
+    _start_up_loss,
 )
 from ringbalance.scene.models import Scene
 
@@ -30,16 +30,16 @@ def moved(gas_time: float, *, power: int) -> float:
 @pytest.mark.parametrize("gas_time", [1e-4, 2e-3, 4e-3, 0.8])
 @pytest.mark.parametrize(("power", "laminar"), [(2, 0.0), (1, 1.0)])
 def test_start_up_loss_is_that_of_the_column(gas_time: float, power: int, laminar: float) -> None:
-    lost = start_up_loss(start_up=3e-3, gas_time=gas_time, laminar=laminar)
+    lost = _start_up_loss(start_up=3e-3, gas_time=gas_time, laminar=laminar)
     assert lost == pytest.approx(moved(gas_time, power=power), rel=1e-6)
     assert 0 < lost < 1
 
 
 def test_a_long_injection_loses_tau_ln_2() -> None:
     tau, long = 3e-3, 30.0
-    assert start_up_loss(start_up=tau, gas_time=long) * long == pytest.approx(tau * math.log(2), rel=1e-9)
-    assert long_start_up_loss(tau) == pytest.approx(tau * math.log(2))
-    assert long_start_up_loss(tau, laminar=1.0) == tau
+    assert _start_up_loss(start_up=tau, gas_time=long) * long == pytest.approx(tau * math.log(2), rel=1e-9)
+    assert _long_start_up_loss(tau) == pytest.approx(tau * math.log(2))
+    assert _long_start_up_loss(tau, laminar=1.0) == tau
 
 
 def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) -> None:
@@ -51,11 +51,11 @@ def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) ->
     }
     for kind, expected in kinds.items():
         scene = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind=kind))
-        assert deciding_gas_time(scene, rate=7.2e-6) == pytest.approx(expected)
+        assert _deciding_gas_time(scene, rate=7.2e-6) == pytest.approx(expected)
     trial = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind="trial"))
-    assert deciding_gas_time(trial, rate=7.2e-6) == control.short_step
+    assert _deciding_gas_time(trial, rate=7.2e-6) == control.short_step
     slow = dataclasses.replace(control, minimum_gas_time=0.02)
-    assert deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02
+    assert _deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02
 
 
 def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scene) -> None:

@@ -12,7 +12,7 @@ from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing import sloshing_response
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.contributions import _wave_mean, wave_height
+from ringbalance.reduced_model.chamber.contributions import _wave_height, _wave_mean
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.arrays import FloatArray
@@ -66,7 +66,7 @@ def test_the_interval_holds_the_waves_of_finite_elements(slow: Calibration) -> N
 def test_thin_rings_answer_in_higher_modes(table_1_scene: Scene) -> None:
     # Limits: the factor of three that the estimate claims; the lowest mode alone has 0.16 to 0.5 here.
     fills = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.5])
-    ratio = wave_height(table_1_scene, fills) / highest(table_1_scene, fills)
+    ratio = _wave_height(table_1_scene, fills) / highest(table_1_scene, fills)
     assert np.all((ratio > 1 / 3) & (ratio < 3)), ratio
     assert np.all(ratio[:3] > 1), ratio
 
@@ -79,7 +79,7 @@ def test_a_fast_rotor_by_hand(table_1_calibration: Calibration) -> None:
     # 1.470 and 1.224 from the lower end: 0.5454 400.8 + 0.061 and 0.143 g/omega^2 = 20.3 % of the depth.
     chamber = table_1_calibration.chamber
     assert chamber.moment.status.ok
-    height = float(wave_height(table_1_calibration.scene, np.array(0.5)))
+    height = float(_wave_height(table_1_calibration.scene, np.array(0.5)))
     assert height == pytest.approx(0.203, rel=0.02)
     last = chamber.reported[-1]
     share = chamber.moment.uncertainty[last] / chamber.moment.value[last]

@@ -82,7 +82,7 @@ def test_eccentric_inputs_are_drawn_together() -> None:
         {"quantity": "imbalance.phase", "unit": "deg", "standard_deviation": 2.0, "correlations": [0.95, 1]},
     )
     read = scene_from(content=content(*quantities, name="driven_masses_small"), file="a.toml")
-    scene = changed(eccentric_scene(read), "requirement", phase_range=0.0)
+    scene = changed(eccentric_scene(read), {"requirement.phase_range": 0.0})
     draws = [device(scene, number).scene for number in range(1024)]
     damping = np.log([each.rotor.damping / scene.rotor.damping for each in draws])
     phase = np.array([each.imbalance.phase - scene.imbalance.phase for each in draws])

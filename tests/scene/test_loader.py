@@ -131,6 +131,20 @@ def test_bundled_scene_by_file_name_and_unknown() -> None:
         bundled_scene("six_chambers")
 
 
+@pytest.mark.parametrize(("angle", "chambers"), [(90, 4), (60, 6)])
+def test_angle_and_number_of_chambers_follow_from_each_other(angle: float, chambers: int) -> None:
+    scene = paper()
+    of_number = scene.with_values(
+        {"disc.central_angle": None, "disc.chambers": chambers, "controller.sequence": None}
+    )
+    of_angle = scene.with_values(
+        {"disc.chambers": None, "disc.central_angle": f"{angle} deg", "controller.sequence": None}
+    )
+    assert of_number.disc.central_angle == pytest.approx(math.radians(angle), rel=1e-15)
+    assert of_angle.disc.chambers == chambers
+    assert of_number.origin_of("disc.central_angle") == "default"
+
+
 def test_paper_scene_has_the_papers_values() -> None:
     """Table 1, Eqs. 4 to 6 and section 6 of the liquid-ring paper."""
     scene = paper()

@@ -57,7 +57,7 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     critical, without = (
         _RPM * math.sqrt(parameters.stiffness / mass) for mass in (parameters.mass, scene.rotor.mass)
     )
-    balanced, locked = simulate_eccentric(scene), _locked(changed(scene, "sensor", position_noise=0.0))
+    balanced, locked = simulate_eccentric(scene), _locked(changed(scene, {"sensor.position_noise": 0.0}))
     begins = scene.rotor.speed_profile[-2].time if len(scene.rotor.speed_profile) > 1 else 0.0
     first = int(np.searchsorted(locked.time, begins))
     at = first + int(np.argmax(locked.amplitude[first:]))
@@ -82,7 +82,7 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
 @lru_cache(maxsize=1)
 def _locked(scene: EccentricScene) -> EccentricRun:
     """With locked masses; no sensor is looked at, so that one run serves every noise of the position."""
-    return simulate_eccentric(changed(scene, "supervisor", strategy="locked"))
+    return simulate_eccentric(changed(scene, {"supervisor.strategy": "locked"}))
 
 
 def _amplitudes(
@@ -116,7 +116,7 @@ def _balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> 
     level = at_constant_speed(scene, time_limit=time_limit)
     runs = {
         f"imbalance at {phase:.0f} degrees": simulate_eccentric(
-            changed(level, "imbalance", phase=math.radians(phase))
+            changed(level, {"imbalance.phase": math.radians(phase)})
         )
         for phase in _PHASES
     }
@@ -130,7 +130,7 @@ def _balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> 
 
 def _beside_the_targets(scene: EccentricScene) -> EccentricScene:
     """With masses that stop 10 degrees beside their targets, then trials alone, as in Fig. 8."""
-    return changed(scene, "supervisor", target_error=(_BESIDE, _BESIDE), correction="trials")
+    return changed(scene, {"supervisor.target_error": (_BESIDE, _BESIDE), "supervisor.correction": "trials"})
 
 
 def _in_check(run: EccentricRun) -> float:
@@ -367,7 +367,7 @@ def _estimate_imbalance(
 
 def _figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _SCALES) -> _FigureFour:
     """Estimates of the four imbalances of the paper's Fig. 4, and of one under dishonest covariances."""
-    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _TURNED]
+    turned = [changed(scene, {"imbalance.phase": math.radians(phase)}) for phase in _TURNED]
     records = [_imbalance_record(one, duration=_RECORD) for one in turned]
     pairs = list(zip(turned, records, strict=True))
     found = [_estimate_imbalance(*pair) for pair in pairs]
@@ -417,7 +417,7 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
 def _friction_runs(scene: EccentricScene) -> Mapping[float, EccentricRun]:
     """Runs by their true friction arm, m. Source: Fig. 5 of the paper on eccentric masses."""
     level = at_constant_speed(scene, time_limit=_FRICTION_TIME)
-    return {a: simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in _ARMS}
+    return {a: simulate_eccentric(changed(level, {"masses.friction_arm": (a, a)})) for a in _ARMS}
 
 
 def friction_time(run: EccentricRun, arm: float) -> float:

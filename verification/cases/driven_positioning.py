@@ -107,8 +107,8 @@ def _efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
     shape = (len(_MASS_RATIOS), len(_WEIGHT_RATIOS), len(_SPEED_RATIOS))
     arm, found = scene.masses.friction_arm[0], {name: np.empty(shape) for name in _SHARES}
     for i, j in np.ndindex(shape[:2]):
-        heavier = changed(scene, "masses", mass=_MASS_RATIOS[i] * scene.rotor.mass)
-        weighted = changed(heavier, "lqr", state_weight=_WEIGHT_RATIOS[j] * scene.lqr.input_weight)
+        heavier = changed(scene, {"masses.mass": _MASS_RATIOS[i] * scene.rotor.mass})
+        weighted = changed(heavier, {"lqr.state_weight": _WEIGHT_RATIOS[j] * scene.lqr.input_weight})
         law = DriveLaw.of(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
         natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * _MASS_RATIOS[i])))
         for (name, share), (k, ratio) in itertools.product(_SHARES.items(), enumerate(_SPEED_RATIOS)):

@@ -20,8 +20,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
-from ringbalance.scene import known_liquids, liquid_at
-from ringbalance.scene.models import Liquid, Scene
+from ringbalance.scene.liquids import liquid_at, liquids_at_room_temperature
+from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
@@ -52,7 +52,6 @@ _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 """In units of the scene's."""
 _NARROWEST: Final = 0.1
 """Smallest bore searched for k = 50, in units of the scene's."""
-_ROOM: Final = 293.15
 _WARM: Final = 333.15
 _OIL: Final = "silicone oil 100 cSt"
 _OIL_TABLE: Final = 298.15
@@ -158,7 +157,8 @@ def drag_coefficient(scene: Scene, level: Level, defect: str | None = None) -> E
     printed, bare = fig_7_readings()
     narrow = _running(bare, _driving_heads(bare, [0.5]))
     bores = [float(_with_bore(scene, factor).k.value[0]) for factor in _BORES]
-    liquids = {one.name: _under_gas(dataclasses.replace(scene, liquid=one)) for one in _liquids()}
+    known = liquids_at_room_temperature()
+    liquids = {one.name: _under_gas(dataclasses.replace(scene, liquid=one)) for one in known}
     table, differences = _over_liquids(liquids), _differences(printed, bare)
     of_liquids = [float(run.k.value[0]) for run in liquids.values()]
     return Evidence(
@@ -189,14 +189,6 @@ def drag_coefficient(scene: Scene, level: Level, defect: str | None = None) -> E
 
 def _over_fills(scene: Scene) -> TubeLoss:
     return _running(scene, _driving_heads(scene, np.linspace(0, 1, 11)))
-
-
-def _liquids() -> list[Liquid]:
-    """Every known liquid, at room temperature or the temperature nearest to it for which there are data."""
-    return [
-        liquid_at(name=known.name, temperature=float(np.clip(_ROOM, *np.array(known.temperatures)[[0, -1]])))
-        for known in known_liquids()
-    ]
 
 
 def _with_bore(scene: Scene, factor: float) -> TubeLoss:

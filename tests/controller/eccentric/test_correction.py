@@ -42,7 +42,7 @@ def test_a_step_leaves_what_the_wrong_influence_leaves() -> None:
     """|1 - alpha_true/alpha|, with a stiffness 3 % off; masses come to rest within a tenth of a degree."""
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=45.0)
     told = StrategySettings.of(paper)
-    plant = changed(paper, "rotor", stiffness=1.03 * paper.rotor.stiffness)
+    plant = changed(paper, {"rotor.stiffness": 1.03 * paper.rotor.stiffness})
     run = simulate_eccentric(plant, settings=told)
     checks = [stage for stage in run.stages if stage.name == "check"]
     left = [
@@ -61,8 +61,8 @@ def test_a_step_leaves_what_the_wrong_influence_leaves() -> None:
 def test_a_run_that_ends_while_it_corrects_what_is_within_the_limit_is_settled() -> None:
     """Balanced to within a loose limit at the first check, and cut off in the correction that follows."""
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=20.0)
-    told = StrategySettings.of(changed(paper, "supervisor", limit=1e-3))
-    plant = changed(changed(paper, "supervisor", limit=1e-3), "rotor", stiffness=1.01 * paper.rotor.stiffness)
+    told = StrategySettings.of(changed(paper, {"supervisor.limit": 1e-3}))
+    plant = changed(paper, {"supervisor.limit": 1e-3, "rotor.stiffness": 1.01 * paper.rotor.stiffness})
     run = simulate_eccentric(plant, settings=told)
     assert stage_names(run)[-2:] == ["correction", "check"]
     assert run.settled
@@ -71,7 +71,7 @@ def test_a_run_that_ends_while_it_corrects_what_is_within_the_limit_is_settled()
 def test_a_wrong_influence_is_met_by_smaller_steps() -> None:
     """A stiffness of 0.55 of what is believed: whole steps would not converge, and the run still settles."""
     paper = at_constant_speed(bundled("washing_machine"), time_limit=200.0)
-    plant = changed(paper, "rotor", stiffness=0.55 * paper.rotor.stiffness)
+    plant = changed(paper, {"rotor.stiffness": 0.55 * paper.rotor.stiffness})
     speed = paper.rotor.speed_profile[0].speed
     believed, true = (PlantParameters.of(scene).influence(speed) for scene in (paper, plant))
     assert abs(1 - true / believed) > 1
@@ -82,9 +82,9 @@ def test_a_wrong_influence_is_met_by_smaller_steps() -> None:
 def test_trials_alone_are_asked_for_by_a_key() -> None:
     """Masses ten degrees beside their targets: by trials in minutes, by the measured vibration in seconds."""
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=200.0)
-    beside = changed(paper, "supervisor", target_error=(math.radians(10), math.radians(10)))
+    beside = changed(paper, {"supervisor.target_error": (math.radians(10), math.radians(10))})
     measured = simulate_eccentric(beside)
-    trials = simulate_eccentric(changed(beside, "supervisor", correction="trials"))
+    trials = simulate_eccentric(changed(beside, {"supervisor.correction": "trials"}))
     assert "correction" in stage_names(measured)
     assert "fine tuning" not in stage_names(measured)
     assert "fine tuning" in stage_names(trials)

@@ -54,7 +54,7 @@ def test_the_capacity_is_that_of_both_masses_side_by_side(paper: EccentricScene)
 
 def test_a_loop_at_its_gain_margin_is_at_the_edge(paper: EccentricScene) -> None:
     speed = RecommendedGains.of(paper).speed
-    edge = changed(paper, "friction_filter", speed_gain=speed.value * speed.gain_margin * (1 + 1e-6))
+    edge = changed(paper, {"friction_filter.speed_gain": speed.value * speed.gain_margin * (1 + 1e-6)})
     beyond = RecommendedGains.of(edge).speed
     assert not beyond.stable
     assert beyond.radius == pytest.approx(1.0, abs=1e-4)
@@ -77,7 +77,7 @@ def test_the_direction_of_the_imbalance_is_any_unless_the_scene_restricts_it(pap
     turned = np.array([device(paper, number).scene.imbalance.phase for number in range(64)])
     places = np.sort((turned - paper.imbalance.phase) / (2 * math.pi))
     assert np.all(np.abs(places - (np.arange(64) + 0.5) / 64 + 0.5) <= 0.5 / 64)
-    certain = changed(stating(paper, imbalance__mass=(0.0, True)), "requirement", phase_range=0.0)
+    certain = changed(stating(paper, imbalance__mass=(0.0, True)), {"requirement.phase_range": 0.0})
     assert device(certain, 3).scene.imbalance == paper.imbalance
     assert PHASE not in device(certain, 3).inputs
 
@@ -86,7 +86,7 @@ def test_devices_whose_imbalance_is_beyond_reach_do_not_settle(paper: EccentricS
     """Of an imbalance as large as the reach half of the devices have more; those and no others fail."""
     short = at_constant_speed(paper, time_limit=40.0)
     size = reach_of(short) / short.imbalance.radius
-    scene = changed(stating(short, imbalance__mass=(0.5, True)), "imbalance", mass=size)
+    scene = changed(stating(short, imbalance__mass=(0.5, True)), {"imbalance.mass": size})
     outcomes = balancer_of(scene).run({}, Draws.first(8))
     within = outcomes.unbalance < outcomes.usable_moment
     assert 2 <= np.count_nonzero(within) <= 6
@@ -97,7 +97,9 @@ def test_devices_whose_imbalance_is_beyond_reach_do_not_settle(paper: EccentricS
 def test_what_is_required_is_judged_over_the_devices(paper: EccentricScene) -> None:
     """A residual that none reaches decides, whatever settles."""
     scene = at_constant_speed(paper, time_limit=40.0)
-    asked = changed(scene, "requirement", residual=1e-9, settling_time=39.0, fraction=0.8)
+    asked = changed(
+        scene, {"requirement.residual": 1e-9, "requirement.settling_time": 39.0, "requirement.fraction": 0.8}
+    )
     (judgement,) = judged_all(balancer_of(asked), [{}], first=8, most=8)
     settled, residual = (judgement.fraction_of(each) for each in judgement.demands)
     assert settled.value > 0.5
@@ -120,8 +122,8 @@ def test_tuning_gives_the_drives_their_margins_where_they_lack_them(small: Eccen
     """A speed control at its edge: the devices are run with it and with half of it."""
     assert balancer_of(small).trials() == ()
     edge = RecommendedGains.of(small).speed
-    scene = changed(small, "friction_filter", speed_gain=1.5 * edge.recommended)
-    (trials,) = balancer_of(changed(scene, "run", time_limit=6.0)).trials()
+    scene = changed(small, {"friction_filter.speed_gain": 1.5 * edge.recommended})
+    (trials,) = balancer_of(changed(scene, {"run.time_limit": 6.0})).trials()
     settings = trials.settings({trials.axes[0].name: 1.0})
     assert settings is not None
     assert settings["friction_filter.speed_gain"] == pytest.approx(edge.recommended)

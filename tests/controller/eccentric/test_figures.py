@@ -158,7 +158,7 @@ def test_a_wrong_assumption_shifts_the_estimate_by_the_ratio_of_stiffnesses(
     # A filter that assumes wrong also misreads the transient of the start.
     late = record.time > 12.0
     record = replace(record, time=record.time[late], samples=record.samples[late])
-    wrong = changed(paper, "imbalance_filter", **{key: getattr(paper.imbalance_filter, key) * (1 + change)})
+    wrong = changed(paper, {f"imbalance_filter.{key}": getattr(paper.imbalance_filter, key) * (1 + change)})
     ratio = stiffness(wrong, record.speed) / stiffness(paper, record.speed)
     x = _estimate_imbalance(wrong, record)[0][-1]
     assert abs(complex(x[4], x[5]) / record.imbalance - ratio) < 2e-3
@@ -185,8 +185,10 @@ def test_saturation_leaves_what_is_beyond_both_masses(paper: EccentricScene, sha
 def test_noise_takes_time_and_then_the_gate(paper: EccentricScene, noise: float, outcome: str) -> None:
     velocity = noise * paper.sensor.velocity_noise / paper.sensor.position_noise
     level = at_constant_speed(paper, time_limit=61.0)
-    loud = changed(level, "sensor", position_noise=noise, velocity_noise=velocity)
-    loud = changed(loud, "imbalance_filter", position_noise=noise, velocity_noise=velocity)
+    loud = changed(level, {"sensor.position_noise": noise, "sensor.velocity_noise": velocity})
+    loud = changed(
+        loud, {"imbalance_filter.position_noise": noise, "imbalance_filter.velocity_noise": velocity}
+    )
     assert simulate_eccentric(loud).outcome.value == outcome
 
 

@@ -90,14 +90,18 @@ def test_sampled_poles_are_those_of_both_masses_on_their_rotor(scene: EccentricS
 
 def test_recommended_gains_leave_their_margin(scene: EccentricScene) -> None:
     gains = RecommendedGains.of(scene)
-    speed = changed(scene, "friction_filter", speed_gain=GAIN_MARGIN * gains.speed.recommended)
+    speed = changed(scene, {"friction_filter.speed_gain": GAIN_MARGIN * gains.speed.recommended})
     assert RecommendedGains.of(speed).speed.radius == pytest.approx(1.0, abs=1e-9)
-    advised = changed(scene, "lqr", state_weight=gains.regulator.recommended)
+    advised = changed(scene, {"lqr.state_weight": gains.regulator.recommended})
     advised = changed(
-        advised, "friction_filter", speed_gain=gains.speed.recommended, pair_gain=gains.pair.recommended
+        advised,
+        {
+            "friction_filter.speed_gain": gains.speed.recommended,
+            "friction_filter.pair_gain": gains.pair.recommended,
+        },
     )
     assert all(loop.stable for loop in RecommendedGains.of(advised).loops)
-    shorter = changed(scene, "lqr", step=gains.step)
+    shorter = changed(scene, {"lqr.step": gains.step})
     assert all(loop.stable for loop in RecommendedGains.of(shorter).loops)
 
 
@@ -107,6 +111,6 @@ def test_the_drive_speed_overcomes_friction_and_a_free_mass_needs_none(scene: Ec
     speed = scene.rotor.speed_profile[0].speed
     friction = max(scene.masses.friction_arm) * plant.moment * speed**2
     assert plant.drive_gain * gain * gains.drive_speed > 1.49 * friction
-    free = changed(scene, "masses", friction_arm=(0.0, 0.0))
+    free = changed(scene, {"masses.friction_arm": (0.0, 0.0)})
     assert RecommendedGains.of(free).drive_speed == scene.friction_filter.drive_speed
     assert math.isfinite(gains.drive_speed)

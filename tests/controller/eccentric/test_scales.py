@@ -16,6 +16,7 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.scene.origins import value_at
 from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
@@ -23,10 +24,10 @@ def shrunk(size: float) -> EccentricScene:
     """The washing machine with all lengths that are seen or walked `size` times as long."""
     wash = at_constant_speed(bundled("washing_machine"), time_limit=1.2)
     radius = size * wash.masses.guide_radius
-    wash = changed(wash, "masses", guide_radius=radius, friction_arm=(0.1 * radius, 0.1 * radius))
-    wash = changed(wash, "imbalance", radius=size * wash.imbalance.radius)
-    noise = {name: size * getattr(wash.sensor, name) for name in ("position_noise", "velocity_noise")}
-    return changed(wash, "sensor", **noise)
+    wash = changed(wash, {"masses.guide_radius": radius, "masses.friction_arm": (0.1 * radius, 0.1 * radius)})
+    wash = changed(wash, {"imbalance.radius": size * wash.imbalance.radius})
+    noise = ("sensor.position_noise", "sensor.velocity_noise")
+    return changed(wash, {path: size * value_at(wash, path) for path in noise})
 
 
 def normalised(scene: EccentricScene, seed: int) -> float:
@@ -45,7 +46,7 @@ def test_errors_are_those_claimed_at_any_size(size: float) -> None:
 
 def test_an_estimation_takes_no_longer_than_its_information() -> None:
     """Ten nanometres of noise on ten micrometres of vibration: 0.2 % after a few samples."""
-    run = simulate_eccentric(changed(bundled("driven_masses_small"), "run", time_limit=1.0))
+    run = simulate_eccentric(changed(bundled("driven_masses_small"), {"run.time_limit": 1.0}))
     first = run.stages[0]
     assert first.name == "imbalance estimation"
     assert first.end < 0.02
@@ -53,7 +54,7 @@ def test_an_estimation_takes_no_longer_than_its_information() -> None:
 
 def ellipse(scene: EccentricScene, number: int) -> tuple[float, float]:
     """Squared error of a drawn plant's imbalance over the stated covariance, with the rotor and without."""
-    plant = device(changed(scene, "requirement", phase_range=0.0), number).scene
+    plant = device(changed(scene, {"requirement.phase_range": 0.0}), number).scene
     run = simulate_eccentric(plant, seed=number, settings=StrategySettings.of(scene))
     told = simulate_eccentric(scene).to_dict()["estimates"]
     noise = np.asarray(told["imbalance_covariance"][-1])
@@ -101,7 +102,7 @@ def test_half_widths_are_in_the_document() -> None:
 def test_a_held_regulator_is_stable_for_a_step_that_goes_with_its_fastest_pole(weight: float) -> None:
     """At high weights k_d is sqrt(0.1) k_p; J/k_d is the fastest time constant, and with a margin of two the
     longest hold."""
-    scene = changed(bundled("eccentric_mass_paper"), "lqr", state_weight=weight)
+    scene = changed(bundled("eccentric_mass_paper"), {"lqr.state_weight": weight})
     regulator, plant = RecommendedGains.of(scene).regulator, PlantParameters.of(scene)
     inertia = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
     assert not regulator.stable
@@ -112,7 +113,10 @@ def test_a_held_regulator_is_stable_for_a_step_that_goes_with_its_fastest_pole(w
 def test_the_longest_hold_is_that_of_the_fastest_pole(gain: float) -> None:
     """With B_add gamma in place of C_add the rate's pole is -(C_add + B_add gamma)/J: twice the gain is
     stable for holds up to 2/|pole|, less what the rotor gives way."""
-    scene = changed(bundled("eccentric_mass_paper"), "friction_filter", speed_gain=gain, pair_gain=0.0)
+    scene = changed(
+        bundled("eccentric_mass_paper"),
+        {"friction_filter.speed_gain": gain, "friction_filter.pair_gain": 0.0},
+    )
     speed, plant = RecommendedGains.of(scene).speed, PlantParameters.of(scene)
     inertia = plant.inertia + plant.drive_inertia
     pole = (plant.drive_damping + 2 * plant.drive_gain * gain) / inertia
@@ -122,7 +126,7 @@ def test_the_longest_hold_is_that_of_the_fastest_pole(gain: float) -> None:
 
 def test_a_coarse_euler_transition_is_named_before_the_stiffness() -> None:
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=4.0, speed=220 * RPM)
-    coarse = changed(paper, "imbalance_filter", discretisation="euler")
+    coarse = changed(paper, {"imbalance_filter.discretisation": "euler"})
     run = simulate_eccentric(coarse)
     assert run.innovation is not None
     assert run.innovation > 1.5

@@ -56,7 +56,7 @@ def test_a_seed_gives_the_same_bits(run: EccentricRun, scene: EccentricScene) ->
 
 def test_progress_is_reported(scene: EccentricScene) -> None:
     told: list[tuple[float, float]] = []
-    simulate_eccentric(changed(scene, "run", time_limit=12.0), progress=lambda *a: told.append(a))
+    simulate_eccentric(changed(scene, {"run.time_limit": 12.0}), progress=lambda *a: told.append(a))
     times = [time for time, _ in told]
     assert {limit for _, limit in told} == {12.0}
     assert times == sorted(times)
@@ -83,7 +83,7 @@ def test_a_step_is_repeatable_and_a_sample_that_is_not_a_number_is_passed_over(
 
 @pytest.mark.parametrize("arms", [(0.0, 0.0), (0.004, 0.012), (0.0, 0.01)])
 def test_any_friction_is_mastered(scene: EccentricScene, arms: tuple[float, float]) -> None:
-    found = simulate_eccentric(changed(scene, "masses", friction_arm=arms))
+    found = simulate_eccentric(changed(scene, {"masses.friction_arm": arms}))
     assert found.settled
     slippery = min(arms) == 0
     assert ("drives_stay_on" in {each.code for each in found.warned}) == slippery
@@ -95,7 +95,7 @@ def test_any_friction_is_mastered(scene: EccentricScene, arms: tuple[float, floa
 
 
 def test_without_the_pair_loop_unequal_masses_part(scene: EccentricScene) -> None:
-    slow = changed(changed(scene, "masses", friction_arm=(0.004, 0.012)), "friction_filter", pair_gain=0.0)
+    slow = changed(scene, {"masses.friction_arm": (0.004, 0.012), "friction_filter.pair_gain": 0.0})
     found = simulate_eccentric(slow)
     friction = stage_of(found, "friction estimation")
     during = (found.time >= friction.start) & (found.time <= friction.end)
@@ -104,22 +104,24 @@ def test_without_the_pair_loop_unequal_masses_part(scene: EccentricScene) -> Non
 
 
 def test_a_saturated_rotor_keeps_what_two_masses_cannot_undo(scene: EccentricScene) -> None:
-    found = simulate_eccentric(changed(scene, "imbalance", mass=0.5))
+    found = simulate_eccentric(changed(scene, {"imbalance.mass": 0.5}))
     assert found.targets is not None
     assert found.targets.saturated
-    parameters = PlantParameters.of(changed(scene, "imbalance", mass=0.5))
+    parameters = PlantParameters.of(changed(scene, {"imbalance.mass": 0.5}))
     left = unbalance_left(found, parameters)
     assert left == pytest.approx(found.targets.residual, rel=0.01)
 
 
 def test_a_drive_that_nearly_stalls_is_warned_of(scene: EccentricScene) -> None:
-    weak = changed(changed(scene, "friction_filter", drive_speed=0.02, speed_gain=2.0), "run", time_limit=6.0)
-    paper_law = changed(weak, "friction_filter", pair_gain=0.0)
+    weak = changed(
+        scene, {"friction_filter.drive_speed": 0.02, "friction_filter.speed_gain": 2.0, "run.time_limit": 6.0}
+    )
+    paper_law = changed(weak, {"friction_filter.pair_gain": 0.0})
     assert "drive_nearly_stalled" in {each.code for each in simulate_eccentric(paper_law).warned}
 
 
 def test_no_imbalance_is_no_trouble(scene: EccentricScene) -> None:
-    found = simulate_eccentric(changed(scene, "imbalance", mass=0.0))
+    found = simulate_eccentric(changed(scene, {"imbalance.mass": 0.0}))
     assert found.settled
     assert found.residual_ratio is None
 
@@ -130,8 +132,8 @@ def test_any_speed_will_do(scene: EccentricScene, speed: float) -> None:
 
 
 def test_any_sensor_and_any_start_will_do(scene: EccentricScene) -> None:
-    settles(changed(scene, "sensor", frame="laboratory"), 2e-3)
-    settles(changed(scene, "masses", initial_angle=(0.4, 2.0)), 2e-3)
+    settles(changed(scene, {"sensor.frame": "laboratory"}), 2e-3)
+    settles(changed(scene, {"masses.initial_angle": (0.4, 2.0)}), 2e-3)
 
 
 def test_the_washing_machine_settles() -> None:

@@ -1,4 +1,4 @@
-"""An algorithm of the program, stepped from outside the loop by one sample at a time."""
+"""An algorithm of the program, stepped from Python by one sample at a time."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import NO_SAMPLE, BuiltIn, command_of, show
-from ringbalance.controller.algorithms.law_based import LawBased
-from ringbalance.controller.compiled_loop import _decide
+from ringbalance.controller.algorithms.law_based import LawBased, controller_of
+from ringbalance.controller.compiled_loop import decide
 from ringbalance.controller.loop_records import LOOP, RUN
+from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.reduced_model.injection.dynamics import PLANT, WORKSPACE
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import Records
+from ringbalance.scene.models import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,7 @@ class Memory:
 
 
 class Stepped:
-    """A controller as a user would write one, which does what an algorithm of the program does."""
+    """A `Controller` that does what an algorithm of the program does."""
 
     def __init__(self, algorithm: BuiltIn) -> None:
         self.algorithm, self.rises_tolerated = algorithm, algorithm.rises_tolerated
@@ -41,14 +44,33 @@ class Stepped:
         self._plant = algorithm.plant if isinstance(algorithm, LawBased) else np.zeros(1, dtype=PLANT)
 
     def start(self) -> Memory:
+        """As `Controller.start`."""
         return Memory(self._run, self.algorithm.liquid())
 
     def step(self, state: Memory, measurement: Measurement | None) -> tuple[Memory, Command]:
+        """As `Controller.step`."""
         run, liquid = state.run.copy(), state.liquid.copy()
         show(run[0], measurement)
         if measurement is not None:
             run["time"] = measurement.time
             run["at_residual"][0, : len(measurement.at_residual)] = measurement.at_residual
-        _decide(self._loop[0], self._plant[0], run[0], liquid, np.zeros((2, 1)), np.zeros(WORKSPACE))
+        decide(self._loop[0], self._plant[0], run[0], liquid, np.zeros((2, 1)), np.zeros(WORKSPACE))
         command = command_of(run[0], int(self._loop["chambers"][0]))
         return (state, command) if command.reason == NO_SAMPLE else (Memory(run, liquid), command)
+
+
+def scene_controller(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Stepped:
+    """The algorithm that a scene asks for, with the scene's settings, for one of your own to wrap.
+
+    Args: `flow_law`: what the law-based algorithm believes of the flow; default the calibrated law.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> inner = rb.scene_controller(scene)
+        >>> seen = rb.Measurement(time=0.0, amplitude=1e-5, phase=0.0)
+        >>> state, command = inner.step(inner.start(), seen)
+        >>> [valve.chamber for valve in command.valves]
+        [0, 1]
+    """
+    model = BalancerModel.of(flow_law or chamber_and_law(scene)[1])
+    return Stepped(controller_of(scene, model))

@@ -66,7 +66,7 @@ _MOST: Final = 1024
 """Devices of a verdict."""
 _FINER: Final = 0.02
 """Relative difference in size between designs that are judged."""
-_LADDER: Final = (-8, 13)
+_SIZES_JUDGED: Final = (-8, 13)
 """Of these, from smaller ones than the surface promises to larger ones."""
 _CLOUD: Final = 48
 """Points of each such size of which the most promising is judged."""
@@ -302,7 +302,7 @@ def hunt(
     for number in range(0 if whole else len(_STEPS)):
         told(f"round {number + 1} of {len(_STEPS)}, about {1e6 * size:.4g} ml")
         size = _round(state, size, number)
-    finalists = _all(state, size) if whole or not space.sized else _ladder(state, size)
+    finalists = _all(state, size) if whole or not space.sized else _by_size(state, size)
     return Hunt(
         static=static,
         whole=whole,
@@ -363,19 +363,21 @@ def _round(state: _State, size: float, number: int) -> float:
     return min(max(min(able), low * size), high * size)
 
 
-def _ladder(state: _State, size: float) -> list[Finalist]:
+def _by_size(state: _State, size: float) -> list[Finalist]:
     """Of every size, in equal steps, the point that promises most; all with the settings that serve best."""
     state.told("settings of the designs that are judged")
     surface = state.surface(size)
     parents = state.parents(surface, size)
-    steps = size * (1 + _FINER) ** np.arange(*_LADDER)
+    steps = size * (1 + _FINER) ** np.arange(*_SIZES_JUDGED)
     shares, points = state.cloud(parents, _STEPS[-1], np.repeat(steps, _CLOUD))
     if not points:
         return _all(state, size)
     logits, _ = surface.logits(state.coordinates(shares))
-    rung = np.rint(np.log([state.space.size(each) / size for each in points]) / math.log1p(_FINER))
+    steps_away = np.rint(np.log([state.space.size(each) / size for each in points]) / math.log1p(_FINER))
     best = [
-        int(rows[np.argmax(logits[rows])]) for at in np.unique(rung) for rows in [np.flatnonzero(rung == at)]
+        int(rows[np.argmax(logits[rows])])
+        for at in np.unique(steps_away)
+        for rows in [np.flatnonzero(steps_away == at)]
     ]
     enough = [i for i in best if logits[i] >= logit(state.threshold)]
     place = _settled(state, points[enough[0] if enough else best[-1]], parents)

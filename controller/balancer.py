@@ -77,6 +77,9 @@ class Draws:
     whole: bool = True
     """Whether every run is carried out; False: one that is known not to settle ends with the least vibration
     that the device can come to."""
+    until: float = math.inf
+    """s, at which a run that is above its limit may end undecided; where runs are watched to their end, none
+    does."""
 
     @classmethod
     def first(cls, count: int, *, devices: bool = True) -> Draws:
@@ -84,9 +87,9 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
     @classmethod
-    def block(cls, start: int, count: int, *, whole: bool = True) -> Draws:
+    def block(cls, start: int, count: int, *, whole: bool = True, until: float = math.inf) -> Draws:
         """Devices `start` to `start + count - 1`."""
-        return cls(numbers=tuple(range(start, start + count)), whole=whole)
+        return cls(numbers=tuple(range(start, start + count)), whole=whole, until=until)
 
 
 AS_GIVEN: Final = Draws.first(1, devices=False)

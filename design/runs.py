@@ -17,6 +17,8 @@ from ringbalance.scene.origins import SceneFile
 _LOOK: Final = 4
 """Devices after which a design is left if none of them meets what is required: where 7 of 10 do, that happens
 once in a hundred times.  Runs that do not settle take longest."""
+_HASTY: Final = 2.0
+"""Times the settling time that the scene requires, at which these may end: later none of them meets it."""
 _FIRST: Final = 16
 """Devices after which the verdict of most other designs is known."""
 
@@ -34,7 +36,7 @@ def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
     try:
         balancer = quick_balancer(point_scene(scene, point))
         judge = partial(judged_all, balancer, [{}], whole=False)
-        (judgement,) = judge(most=min(_LOOK, runs))
+        (judgement,) = judge(most=min(_LOOK, runs), until=_HASTY * balancer.demands()[0].required)
         if judgement.fraction.count or judgement.verdict == OPEN:
             (judgement,) = judge(first=min(_FIRST, runs), most=runs)
     except (SceneError, *FAULTS) as error:

@@ -83,12 +83,13 @@ def judged_all(
     start: int = FRESH,
     further: float = FURTHER,
     whole: bool = True,
+    until: float = math.inf,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Judgement, ...]:
     """Settings over the same devices, twice as many each time until the verdict on each is known.
 
     Args: `first`, `most`: numbers of devices; default the balancer's. `start`: number of the first one.
-    `further`: as `Balancer.run_all`. `whole`: as `Draws`. `progress`: told what is done.
+    `further`: as `Balancer.run_all`. `whole`, `until`: as `Draws`. `progress`: told what is done.
     """
     asked, demands = balancer.asked_fraction(), balancer.demands()
 
@@ -101,7 +102,7 @@ def judged_all(
     while left and count < most:
         if progress is not None:
             progress(f"{count} of at most {most} drawn devices")
-        draws = Draws.block(start + count, more, whole=whole)
+        draws = Draws.block(start + count, more, whole=whole, until=until)
         ran = balancer.run_all([settings[i] for i in left], draws, further=further)
         for place, outcomes in zip(left, ran, strict=True):
             before = done.get(place)

@@ -103,7 +103,7 @@ class DrawnRuns:
             for pressure, tried in _grouped(asked, lambda each: each.scene.gas.pressure):
                 under = self._under(made, pressure)
                 for number in some:
-                    for at, done in self._runs(under[group.index(number)], tried, further, whole=draws.whole):
+                    for at, done in self._runs(under[group.index(number)], tried, draws, further):
                         ended[at].append(done)
         devices_drawn: dict[str, Any] = {
             "numbers": tuple(device.number for device in drawn),
@@ -119,10 +119,10 @@ class DrawnRuns:
         return _Setting(place=place, scene=scene, controller=controller)
 
     def _runs(
-        self, under: _Under, asked: Sequence[_Setting], further: float, *, whole: bool
+        self, under: _Under, asked: Sequence[_Setting], draws: Draws, further: float
     ) -> Iterator[tuple[int, RunResult]]:
         """Place of a setting and how the device's run under it ended."""
-        if not whole and under.unreachable > _OUT_OF_REACH * self.limit:
+        if not draws.whole and under.unreachable > _OUT_OF_REACH * self.limit:
             yield from ((each.place, _at_best(under, limit=self.limit)) for each in asked)
             return
         for settings, tried in _grouped(asked, lambda each: replace(each.scene.controller, proportional=1)):
@@ -136,6 +136,7 @@ class DrawnRuns:
                 moments=under.device.moments,
             )
             plan.loop["limit"] = self.limit
+            plan.loop["time_limit"] = min(self.scene.run.time_limit, draws.until)
             gains = [each.scene.controller.proportional for each in tried]
             runs = under.carried(plan, gains, seed=self.scene.run.seed)
             for each, run in zip(tried, runs, strict=True):

@@ -17,7 +17,7 @@ import pytest
 from sweep import on_paper
 
 import ringbalance as rb
-from ringbalance.controller.balancer import Draws, balancer_of
+from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
 from ringbalance.controller.judging.judge import FRESH, judged_all
 from ringbalance.design.store import Store
 from ringbalance.design.work import bundle_size
@@ -55,6 +55,24 @@ def test_runs_are_those_of_the_balancer(paper_scene: Scene) -> None:
         assert run["fraction"] == np.mean(met)
     assert found.driven[0]["fraction"] < found.driven[1]["fraction"]
     assert found.verdicts[0] == "not met"
+
+
+def test_runs_that_end_early_meet_the_same() -> None:
+    """Of devices of drawn designs: who is above the limit at twice the settling time meets nothing later."""
+    scene = rb.load_scene(rb.bundled_scene("spindle_design"))
+    vary = {"tube.bore": "0.6mm:1.2mm", "controller.proportional": "0.02s/um:0.2s/um"}
+    drawn, met = rb.sweep(scene, vary, sample="latin:8", intervals=False), []
+    for row in range(8):
+        balancer = quick_balancer(drawn.point_scene(row))
+        demands = balancer.demands()
+        whole, early = (
+            balancer.run_all([{}], Draws.block(FRESH, 16, whole=False, until=until))[0]
+            for until in (math.inf, 2 * demands[0].required)
+        )
+        for demand in demands:
+            assert demand.met(early).tolist() == demand.met(whole).tolist()
+        met += demands[0].met(early).tolist()
+    assert {*met} == {True, False}
 
 
 def test_a_store_says_what_it_answered(paper_scene: Scene, tmp_path: Path) -> None:

@@ -17,11 +17,12 @@ from typing import Any, Final, Literal
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import controller, disc, point
+from ringbalance.export import controller, disc
 from ringbalance.export.compact import VELOCITIES, CompactLaw
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import FILLING, LAG
 from ringbalance.scene.faults import SceneError

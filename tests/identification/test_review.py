@@ -19,7 +19,7 @@ from ringbalance.identification.next_measurement import (
     _words_of,
     next_measurement,
 )
-from ringbalance.identification.other_laws import LAMINAR, UNBROKEN, _power_of
+from ringbalance.identification.other_laws import LAMINAR, UNBROKEN
 from ringbalance.identification.reading import KINDS
 from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
@@ -82,7 +82,10 @@ def test_a_disc_with_another_law_is_found_out(
     velocity = float(
         Device.of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
     )
-    other = replace(models, other=lambda law: _power_of(law, velocity, exponent))
+    other = replace(
+        models,
+        other=lambda law: replace(law, heads=law.heads.power(velocity=velocity, exponent=exponent)),
+    )
     data = transfers(true, other, seed=1, known=False)
     told = Review.of(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
     assert not told.holds

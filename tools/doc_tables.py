@@ -90,7 +90,7 @@ def finding_table() -> str:
 def block_table() -> str:
     """Variables of the blocks that are exported."""
     heads = ("block", "variable", "side", "unit", "from", "to", "meaning")
-    return _markdown(
+    return markdown(
         heads,
         [
             (

@@ -63,6 +63,10 @@ def design_document(design: Design) -> dict[str, Any]:
         "largest_reach_kg_m": finite(static.reach),
         "reach_kg_m": design.reach,
         "size_m3": None if judgement is None else design.size,
+        "size_uncertainty": design.doubt,
+        "smaller": None
+        if design.smaller is None
+        else {"size_m3": design.smaller[0], "fraction": design.smaller[1].document()},
         "changes": plain_settings(design.point) if judgement else {},
         "settings": plain_settings(judgement.settings) if judgement else {},
         "asked": judgement.asked if judgement else None,
@@ -134,11 +138,22 @@ def _findings(design: Design) -> Iterator[Finding]:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
         yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
     yield Finding(code="design_looked", values=counted)
+    yield from _sharpness(design)
     if judgement.verdict != MET:
         yield from _misses(design, judgement)
     for path, end in _edges(design):
         name = VALVE if path == VALVE else path
         yield Finding(code="design_edge", values={"path": name, "end": end})
+
+
+def _sharpness(design: Design) -> Iterator[Finding]:
+    """How far the smallest size is known."""
+    if design.smaller is not None:
+        size, share = design.smaller
+        values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
+        yield Finding(code="design_smaller", values=values)
+    if design.doubt is not None:
+        yield Finding(code="design_doubt", values={"doubt": design.doubt})
 
 
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:

@@ -6,8 +6,9 @@ What the search finds is judged as `tune` judges: on devices on which nothing wa
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -17,8 +18,8 @@ from ringbalance.controller.balancer import Draws, Settings, balancer_of
 from ringbalance.controller.judging.judge import FRESH, Judgement
 from ringbalance.controller.judging.ranking import Ranking, ranked
 from ringbalance.design.axes import Axis, Point
-from ringbalance.design.hunt import Candidate, Hunt, Static, deal, hunt
-from ringbalance.design.racing import devices_row, judged_design
+from ringbalance.design.hunt import Candidate, Finalist, Hunt, Static, deal, hunt
+from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import Space
 from ringbalance.design.static import point_scene, static_rows
 from ringbalance.results.requirements import MET, Proportion
@@ -30,12 +31,12 @@ from ringbalance.scene.platform.processes import beside
 
 VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
-_TOGETHER, _MOST = 2, 8
-"""Designs that are judged at a time, and at the most."""
+_MOST: Final = 10
+"""Designs that are judged at the most, but for one."""
 _FEW: Final = 512
 """Devices at the most that choose between them; the verdict takes as many as `tune` does."""
-_NEAR: Final = 2
-"""Smaller ones that nearly pass, for which settings are searched as `tune` does."""
+_SLOPE: Final = 3
+"""Designs to both sides over which the growth of the fraction is taken."""
 _MOVED: Final = 0.05
 """By which a key is moved to either side, relative."""
 _DEVICES: Final = 64
@@ -81,6 +82,12 @@ class Design(PresentedResult):
     """Changes of the scene; of the design that comes nearest where none meets what is required."""
     judgement: Judgement | None
     """Of it under its best settings; None: no design can work."""
+    smaller: tuple[float, Proportion] | None
+    """Size, m^3, of the next smaller design that was judged, with the fraction of devices that it served;
+    None: none was, or the size does not vary."""
+    doubt: float | None
+    """By how much other drawn devices would move the size, relative (95 %); None: the fraction of devices
+    does not grow with the size, or that does not vary."""
     front: tuple[Candidate, ...]
     """Of those that meet it on the devices of the search, none better than another in size, time and gas."""
     effects: tuple[Effect, ...]
@@ -126,8 +133,10 @@ def run_design(
         crew = executor or pool
         asked = balancer.asked_fraction()
         found = hunt(space, asked=asked, needed=needed, executor=crew, told=told)
-        best, judgement = _best(space, found, crew, told)
+        place, judged = _best(space, found, crew, told)
+        best, judgement = (found.finalists[place], judged[place]) if judged else (None, None)
         effects: tuple[Effect, ...] = ()
+        smaller = _smaller(found, place, judged) if judged and space.sized else None
         if best is not None and judgement is not None:
             told("the verdict, and what changes of it would do")
             whole = partial(judged_design, scene, best.point, settings=judgement.settings)
@@ -146,6 +155,8 @@ def run_design(
         reach=reach,
         point=found.static.reach_point if best is None else best.point,
         judgement=judgement,
+        smaller=smaller,
+        doubt=_doubt(found, place, judgement) if judgement is not None and space.sized else None,
         front=_front(found, asked, least=0.0 if best is None else best.size),
         effects=effects,
         ranking=ranking,
@@ -160,36 +171,66 @@ def _reach(space: Space, point: Point) -> float | None:
 
 def _best(
     space: Space, found: Hunt, executor: Executor | None, told: Callable[[str], None]
-) -> tuple[Candidate | None, Judgement | None]:
-    """The smallest that meets what is required on fresh devices, else the one that serves most of them."""
-    best: tuple[Candidate | None, Judgement | None] = None, None
-    finalists = [(each, True) for each in found.near_misses(_NEAR)]
-    finalists += [(each, False) for each in found.passing[:_MOST]]
-    for start in range(0, len(finalists), _TOGETHER):
-        told(f"judging designs {start + 1} and on of {len(finalists)}")
-        together = finalists[start : start + _TOGETHER]
-        calls = [
-            partial(
-                judged_design,
-                space.hasty,
-                each.point,
-                settings=each.race.settings,
-                search=search and not space.sets_controller,
-                most=_FEW,
-            )
-            for each, search in together
+) -> tuple[int, dict[int, Judgement]]:
+    """Place of the finalist to take, and all that were judged on fresh devices by their places.
+
+    From the first one that promises to meet what is required: on to better ones until two miss, or to others
+    until one meets it; else the one that serves most devices.
+    """
+    judged: dict[int, Judgement] = {}
+    missing = set[int]()
+
+    def judge(*places: int) -> None:
+        some = [
+            at for at in places if 0 <= at < len(found.finalists) and at not in judged and at not in missing
         ]
-        for (each, _), now in zip(together, deal(executor, calls), strict=True):
-            if now is not None and now.verdict == MET:
-                return each, now
-            if now is not None and (best[1] is None or now.fraction.value > best[1].fraction.value):
-                best = each, now
-    return best
+        told(f"judging designs {len(judged) + 1} and on of at most {_MOST}")
+        calls = [_judging(space, found, at) for at in some]
+        for at, answer in zip(some, deal(executor, calls), strict=True):
+            missing.update([at] if answer is None else [])
+            judged.update({} if answer is None else {at: answer})
+
+    def met() -> list[int]:
+        return [at for at, each in judged.items() if each.verdict == MET]
+
+    judge(found.start, found.start - 1)
+    while met() and (least := min(met())) > 0 and len(judged) < _MOST:
+        judge(least - 1, least - 2)
+        if min(met()) == least:
+            break
+    top = found.start
+    while not met() and top + 1 < len(found.finalists) and len(judged) < _MOST:
+        judge(top + 1, top + 2)
+        top += 2
+    best = min(met(), default=None)
+    return max(judged, key=lambda at: judged[at].fraction.value, default=-1) if best is None else best, judged
+
+
+def _judging(space: Space, found: Hunt, at: int) -> Callable[[], Judgement | None]:
+    finalist = found.finalists[at]
+    search = found.whole and not space.sets_controller
+    return partial(judged_design, space.hasty, finalist.point, place=finalist.place, search=search, most=_FEW)
+
+
+def _smaller(found: Hunt, place: int, judged: Mapping[int, Judgement]) -> tuple[float, Proportion] | None:
+    below = [at for at in judged if found.finalists[at].size < found.finalists[place].size]
+    if not below:
+        return None
+    at = max(below, key=lambda each: found.finalists[each].size)
+    return found.finalists[at].size, judged[at].fraction
+
+
+def _doubt(found: Hunt, place: int, judgement: Judgement) -> float | None:
+    """Half-width of the fraction over its growth per logarithm of the size, by the surface."""
+    rows, share = found.finalists, judgement.fraction
+    low, high = rows[max(place - _SLOPE, 0)], rows[min(place + _SLOPE, len(rows) - 1)]
+    rise = high.promise - low.promise
+    return (share.high - share.low) / 2 * math.log(high.size / low.size) / rise if rise > 0 else None
 
 
 def _effects(
     space: Space,
-    best: Candidate,
+    best: Finalist,
     settings: Settings,
     executor: Executor | None,
     whole: Callable[[], Judgement | None],
@@ -233,7 +274,11 @@ def _front(found: Hunt, asked: float, *, least: float) -> tuple[Candidate, ...]:
 
     Args: `least`: size of the design, m^3: smaller ones met what is required on few devices alone.
     """
-    passing = [each for each in found.passing if each.size >= least]
+    passing = [
+        each
+        for each in sorted(found.candidates, key=lambda each: each.size)
+        if each.size >= least and each.race.meets.size == DEVICES and each.race.fraction >= found.threshold
+    ]
 
     def of(each: Candidate) -> tuple[float, float, float]:
         return each.size, each.race.time(asked), each.race.gas

@@ -1,5 +1,5 @@
 """The search for a design: points of a Sobol sequence, those that can work without a run, races of a few
-drawn devices, then points about the best, closer and closer.
+drawn devices, then points about the best, closer and closer, led by a surface through the counts of all.
 
 Smallest is the volume of the cylinder around the chambers; where the disc's size does not vary, or differs by
 less than `AS_SMALL`, the gas that is used decides.  Everything is counted and nothing timed, so that the same
@@ -9,24 +9,25 @@ scene gives the same design on every machine.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
 from typing import Any, Final
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
+from scipy.special import expit, logit
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Axis, Point, Range
-from ringbalance.design.racing import BLOCK, DEVICES, SURE, Place, Race, near, race, raced_longer
+from ringbalance.design.racing import DEVICES, Place, Race, near, race
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, static_rows
+from ringbalance.design.surface import Surface
 from ringbalance.results.requirements import MET, Proportion
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.registry import registered
 
 Told = Callable[[str], None]
@@ -38,34 +39,39 @@ POINTS: Final = 2048
 _WHOLE: Final = 256
 """Points up to which a space of lists is tried whole."""
 _TOGETHER: Final = 256
-_SMALLEST, _SPREAD = 18, 18
+_SMALLEST, _SPREAD = 12, 14
 """Of the points that can work: the smallest, and as many over all sizes, that race at first."""
-_ROUNDS: Final = 9
-_CHILDREN: Final = 17
+_BLOCKS: Final = 8
+"""Of devices, over which designs are spread: what one block has by chance does not lead the search."""
+_STEPS: Final = (0.15, 0.15, 0.1, 0.08, 0.06, 0.05)
+"""Standard deviations of the steps in the unit cube, round by round."""
+_SIZES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.15), (0.85, 1.15), (0.88, 1.12), (0.9, 1.1))
+"""Times the size that is looked for: between which points are tried."""
+_ANYWHERE: Final = (0.5, 0.3, 0.1, 0.0, 0.0, 0.0)
+"""Part of the points that lie anywhere in the unit cube, round by round."""
+_CHILDREN: Final = 16
 """Points that race in a round."""
 _TRIED: Final = 16
 """Drawn for each of them: of those that can work the one races that promises most."""
-_SMOOTHING: Final = 0.01
-"""Of the surface through the fractions of designs that raced."""
-_PARENTS: Final = 5
-_ROOM: Final = 1.06
-"""Times the smallest size: of these, the designs that serve most devices have room to become smaller."""
-_SURE: Final = 2
-"""Times in a round that the two smallest designs are run as more devices."""
-_STEP: Final = 0.15
-"""Standard deviation of the first steps in the unit cube."""
-_SHRINK: Final = 0.85
-"""Times the smallest size: that of the first points about the best ones."""
-_SLOWER, _FASTER = 0.6, 1.3
-"""Factors of the steps and of the shrinking after a round without a better design, and with one."""
-_LIKE: Final = 16
-"""Designs that say which devices run first in a round."""
-_BESIDE: Final = 1
+_BOLD: Final = 0.5
+"""Standard deviations of the surface that are added where a point is chosen to race."""
+_NEAR: Final = 0.35
+"""Logarithm of the sizes' ratio, standard deviation of the weights by which designs make the surface."""
+_PARENTS: Final = 6
+_BESIDE: Final = 2
 """Settings that race beside those of the parent."""
-_SWITCH: Final = 0.2
+_SWITCH: Final = 0.1
 """Probability that a step takes another entry of a list, such as a valve."""
 _MOST: Final = 1024
 """Devices of a verdict."""
+_FINER: Final = 0.02
+"""Relative difference in size between designs that are judged."""
+_SIZES_JUDGED: Final = (-8, 13)
+"""Of these, from smaller ones than the surface promises to larger ones."""
+_CLOUD: Final = 48
+"""Points of each such size of which the most promising is judged."""
+_SETTLED: Final = 3
+"""Blocks of devices on which the settings of the designs that are judged race."""
 _REACH: Final = 0.9
 """Of the initial unbalance, that a design must be able to cancel before it runs: its devices differ."""
 _REACH_ONE_WAY: Final = 0.6
@@ -105,8 +111,21 @@ class Static:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Finalist:
+    """A design that may be judged."""
+
+    point: Point
+    size: float
+    """m^3."""
+    place: Place | None
+    """Its settings; None: the scene's own."""
+    promise: float
+    """Fraction of the devices by the surface."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Hunt:
-    """All that raced."""
+    """All that raced, and what is to be judged."""
 
     static: Static
     candidates: tuple[Candidate, ...]
@@ -114,41 +133,16 @@ class Hunt:
     """Whether every design that can work did."""
     threshold: float
     """Fraction of few devices from which on a design counts as one that meets what is required."""
+    finalists: tuple[Finalist, ...] = ()
+    """The one to prefer first."""
 
     @property
-    def passing(self) -> list[Candidate]:
-        """The best first."""
-        return _passing(self.candidates, self.threshold)
-
-    def near_misses(self, count: int) -> list[Candidate]:
-        """Smaller than all that pass, those that serve most devices; smallest first.
-
-        None where rounds have looked about the smallest that passes.
-        """
-        if self.passing and not self.whole:
-            return []
-        limit = min((each.size for each in self.passing), default=math.inf)
-        near = _nearest(each for each in self.candidates if each.size < limit)[:count]
-        return sorted(near, key=lambda each: each.size)
-
-
-def _passing(candidates: Iterable[Candidate], threshold: float) -> list[Candidate]:
-    """Smallest first, of those as small as the smallest by the gas that they use."""
-    met = [each for each in candidates if each.race.meets.size >= DEVICES and each.race.fraction >= threshold]
-    rows = sorted(met, key=lambda each: (each.size, each.race.gas))
-    small = [each for each in rows if each.size <= (1 + AS_SMALL) * rows[0].size]
-    return [*sorted(small, key=lambda each: each.race.gas), *rows[len(small) :]]
-
-
-def _nearest(candidates: Iterable[Candidate]) -> list[Candidate]:
-    return sorted(candidates, key=lambda each: (-_served(each), each.race.time(0.5), each.size))
-
-
-def _served(candidate: Candidate) -> float:
-    """Fraction of the devices that meet every demand; one of them is taken for failed: 4 of 4 are worth less
-    than 60 of 64."""
-    race = candidate.race
-    return race.fraction - 1.0 / max(race.meets.size + race.unseen, 1)
+    def start(self) -> int:
+        """Place of the first finalist that promises to meet what is required; else of the one that comes
+        nearest."""
+        promises = [each.promise for each in self.finalists]
+        enough = (i for i, promise in enumerate(promises) if promise >= self.threshold)
+        return next(enough, int(np.argmax(promises)) if promises else 0)
 
 
 def threshold(asked: float) -> float:
@@ -174,22 +168,25 @@ class _State:
     space: Space
     needed: float
     """Unbalance that every design must cancel, kg m."""
-    asked: float
+    threshold: float
     executor: Executor | None
     told: Told
     trials: Sequence[Trials]
-    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    random: np.random.Generator
     candidates: list[Candidate] = field(default_factory=list)
     raced: set[str] = field(default_factory=set)
 
-    def static(self, points: Sequence[Point]) -> list[Record]:
+    def able(self, points: Sequence[Point]) -> tuple[list[Record], BoolArray]:
+        """Static answers, and which points can work."""
         batches = [points[start : start + _TOGETHER] for start in range(0, len(points), _TOGETHER)]
         calls = [partial(static_rows, self.space.scene, each, intervals=False) for each in batches]
-        return [row for rows in deal(self.executor, calls) for row in rows or ()]
-
-    def able(self, row: Record) -> bool:
-        reach = row["values"].get("reach", (None,))[0]
-        return row["status"] == "ok" and reach is not None and reach >= self.needed
+        rows = [row for part in deal(self.executor, calls) for row in part or ()]
+        reach = [row["values"].get("reach", (None,))[0] for row in rows]
+        enough = [
+            row["status"] == "ok" and most is not None and most >= self.needed
+            for row, most in zip(rows, reach, strict=True)
+        ]
+        return rows, np.array(enough, dtype=np.bool_)
 
     def race(
         self, shares: FloatArray, points: Sequence[Point], places: Sequence[Sequence[Place] | None]
@@ -197,129 +194,122 @@ class _State:
         """Race points that have not yet, and keep those that have an answer."""
         keys = [repr(sorted(point.items())) for point in points]
         fresh = [i for i, key in enumerate(keys) if key not in self.raced and key not in keys[:i]]
-        self.raced |= set(keys)
-        blocks = self.hard_blocks()
         calls = [
             partial(
                 race,
                 self.space.hasty,
                 points[i],
                 places=places[i],
-                asked=threshold(self.asked),
+                asked=self.threshold,
                 settings=not self.space.sets_controller,
-                blocks=blocks if places[i] else (),
+                block=(len(self.raced) + number) % _BLOCKS,
             )
-            for i in fresh
+            for number, i in enumerate(fresh)
         ]
-        for i, found in zip(fresh, deal(self.executor, calls), strict=True):
-            if found is not None:
+        self.raced |= set(keys)
+        for i, raced in zip(fresh, deal(self.executor, calls), strict=True):
+            if raced is not None:
                 size = self.space.size(points[i])
-                self.candidates.append(Candidate(shares=shares[i], point=points[i], size=size, race=found))
+                self.candidates.append(Candidate(shares=shares[i], point=points[i], size=size, race=raced))
 
-    def hard_blocks(self) -> tuple[int, ...]:
-        """Blocks of devices, first the one in which most fail in the best designs."""
-        whole = [each.race for each in _nearest(self.candidates) if each.race.meets.size >= DEVICES][:_LIKE]
-        met = np.zeros(DEVICES // BLOCK)
-        for each in whole:
-            met += each.in_order()[:DEVICES].reshape(-1, BLOCK).sum(axis=1)
-        return tuple(np.argsort(met, kind="stable").tolist())
-
-    def promise(self, shares: FloatArray) -> FloatArray:
-        """Fraction of the devices that designs may serve, after those that raced near them."""
-        known = np.array([self.coordinates(each.shares) for each in self.candidates])
-        served = np.array([_served(each) for each in self.candidates])
-        surface = RBFInterpolator(known, served, kernel="linear", smoothing=_SMOOTHING)
-        found: FloatArray = surface(np.array([self.coordinates(each) for each in shares]))
-        return found
+    def surface(self, about: float) -> Surface:
+        """Through the counts of all designs, the nearer in size the more."""
+        races = [each.race for each in self.candidates]
+        apart = np.log([each.size / about for each in self.candidates]) / _NEAR
+        return Surface.of(
+            self.coordinates(np.array([each.shares for each in self.candidates])),
+            met=np.array([each.met for each in races]),
+            devices=np.array([each.meets.size for each in races]),
+            blocks=np.array([each.block for each in races]),
+            weights=np.exp(-0.5 * apart**2) + 1e-6,
+        )
 
     def coordinates(self, shares: FloatArray) -> FloatArray:
-        """Of a place: entries of a list are equally far from each other."""
-        parts = [
-            share[np.newaxis] if axis.ranges else 0.5 * np.eye(len(axis.choices))[_entry(axis, share)]
-            for axis, share in zip(self.space.axes, shares, strict=True)
-        ]
-        return np.concatenate(parts)
+        """Of places, shape (n, axes): entries of a list are equally far from each other."""
+        return np.concatenate(
+            [
+                column[:, np.newaxis]
+                if axis.ranges
+                else 0.5 * np.eye(len(axis.choices))[[_entry(axis, share) for share in column]]
+                for axis, column in zip(self.space.axes, shares.T, strict=True)
+            ],
+            axis=1,
+        )
 
-    def places(self, parent: Candidate) -> list[Place] | None:
-        """The settings of a parent, and others beside them."""
-        place = parent.race.place
+    def places(self, shares: FloatArray) -> list[list[Place] | None]:
+        """By point the settings of the nearest design that served many devices, and others beside them."""
+        whole = [each for each in self.candidates if each.race.meets.size == DEVICES] or self.candidates
+        known = self.coordinates(np.array([each.shares for each in whole]))
+        apart = np.linalg.norm(self.coordinates(shares)[:, np.newaxis] - known, axis=2)
+        return [self._beside(whole[at].race.place) for at in np.argmin(apart, axis=1).tolist()]
+
+    def _beside(self, place: Place | None) -> list[Place] | None:
         if place is None:
             return None
         beside = near(self.trials, place)
         chosen = self.random.permutation(len(beside))[:_BESIDE].tolist()
         return [place, *(beside[at] for at in chosen)]
 
-    def make_sure(self) -> None:
-        """Run the smallest designs that pass as more devices, until one of them still does."""
-        for _ in range(_SURE):
-            unsure = [each for each in self.passing[:2] if each.race.meets.size < SURE]
-            if not unsure or self.passing[0] not in unsure:
-                return
-            calls = [
-                partial(
-                    raced_longer,
-                    self.space.hasty,
-                    each.point,
-                    before=each.race,
-                    asked=threshold(self.asked),
-                )
-                for each in unsure
-            ]
-            for each, found in zip(unsure, deal(self.executor, calls), strict=True):
-                self.candidates[self.candidates.index(each)] = replace(each, race=found)
+    def parents(self, surface: Surface, size: float) -> list[Candidate]:
+        """Those that would serve most devices if they had a size."""
+        shares = np.array([_sized(self.space, each.shares.copy(), size) for each in self.candidates])
+        order = np.argsort(-surface.logits(self.coordinates(shares))[0], kind="stable")
+        whole = [i for i in order.tolist() if self.candidates[i].race.meets.size == DEVICES]
+        return [self.candidates[i] for i in (whole or order.tolist())[:_PARENTS]]
 
-    @property
-    def passing(self) -> list[Candidate]:
-        return _passing(self.candidates, threshold(self.asked))
+    def cloud(
+        self, parents: Sequence[Candidate], step: float, sizes: FloatArray, *, anywhere: float = 0.0
+    ) -> tuple[FloatArray, list[Point]]:
+        """Points about some designs that can work, one for each size.
 
-    @property
-    def best(self) -> tuple[float, float]:
-        """Size and gas of the best that passes; before any does, minus the most devices that one serves."""
-        for each in self.passing[:1]:
-            return each.size, each.race.gas
-        return math.inf, -_served(_nearest(self.candidates)[0])
-
-    def parents(self) -> list[Candidate]:
-        """Of the smallest designs those that serve most devices, and smaller ones that come near."""
-        passing = self.passing
-        nearest = _nearest(self.candidates)
-        if not passing or not self.space.sized:
-            return (passing or nearest)[:_PARENTS]
-        roomy = _nearest(each for each in passing if each.size <= _ROOM * passing[0].size)
-        smaller = [each for each in nearest if each.size < passing[0].size]
-        return [*roomy[:_PARENTS], *smaller[:2]]
+        Args: `anywhere`: part of them that lie anywhere.
+        """
+        drawn = self.random.integers(0, len(parents), sizes.size).tolist()
+        shares = np.array([_stepped(self, parents[at].shares, step) for at in drawn])
+        free = self.random.random(sizes.size) < anywhere
+        shares[free] = self.random.random((int(np.count_nonzero(free)), shares.shape[1]))
+        if self.space.sized:
+            pairs = zip(shares, sizes, strict=True)
+            shares = np.array([_sized(self.space, each, size) for each, size in pairs])
+        points = self.space.points(shares)
+        able = np.flatnonzero(self.able(points)[1]).tolist()
+        return shares[able], [points[i] for i in able]
 
 
-def hunt(space: Space, *, asked: float, needed: float, executor: Executor | None, told: Told) -> Hunt:
+def hunt(
+    space: Space, *, asked: float, needed: float, executor: Executor | None, told: Told, seed: int = 0
+) -> Hunt:
     """Search a space.
 
     Args: `asked`: fraction of devices. `needed`: initial unbalance, kg m. `executor`: who computes; None:
-        this process.
+        this process. `seed`: of the points that are tried.
     """
     one_way = space.scene.requirement.phase_range < _EVERY_WAY
     share = _REACH_ONE_WAY if one_way else _REACH
-    trials = balancer_of(space.scene).trials()
     state = _State(
-        space=space, needed=share * needed, asked=asked, executor=executor, told=told, trials=trials
+        space=space,
+        needed=share * needed,
+        threshold=threshold(asked),
+        executor=executor,
+        told=told,
+        trials=balancer_of(space.scene).trials(),
+        random=np.random.default_rng(seed),
     )
     static, whole = _first(state)
-    step, shrink = _STEP, _SHRINK
-    for number in range(_ROUNDS if state.candidates and not whole else 0):
-        told(f"round {number + 1} of at most {_ROUNDS}, {_best_text(state)}")
-        before = state.best
-        _round(state, step, shrink)
-        state.make_sure()
-        factor = _SLOWER if state.best >= before else _FASTER
-        step, shrink = min(factor * step, _STEP), 1 - min(factor * (1 - shrink), 1 - _SHRINK)
-        if 1 - shrink < AS_SMALL:
-            break
-    return Hunt(static=static, whole=whole, candidates=tuple(state.candidates), threshold=threshold(asked))
-
-
-def _best_text(state: _State) -> str:
-    if state.passing:
-        return f"best {1e6 * state.passing[0].size:.4g} ml"
-    return f"best {_nearest(state.candidates)[0].race.fraction:.0%} of few devices"
+    if not state.candidates:
+        return Hunt(static=static, whole=whole, candidates=(), threshold=state.threshold)
+    size = _size_at_first(state)
+    for number in range(0 if whole else len(_STEPS)):
+        told(f"round {number + 1} of {len(_STEPS)}, about {1e6 * size:.4g} ml")
+        size = _round(state, size, number)
+    finalists = _all(state, size) if whole or not space.sized else _by_size(state, size)
+    return Hunt(
+        static=static,
+        whole=whole,
+        candidates=tuple(state.candidates),
+        threshold=state.threshold,
+        finalists=tuple(finalists),
+    )
 
 
 def _first(state: _State) -> tuple[Static, bool]:
@@ -328,15 +318,114 @@ def _first(state: _State) -> tuple[Static, bool]:
     shares, whole = _sample(space)
     state.told(f"{len(shares)} designs without a run")
     points = space.points(shares)
-    rows = state.static(points)
-    able = sorted((i for i, row in enumerate(rows) if state.able(row)), key=lambda i: space.size(points[i]))
+    rows, enough = state.able(points)
+    able = sorted(np.flatnonzero(enough).tolist(), key=lambda i: space.size(points[i]))
     rest = able[_SMALLEST:]
     spread = [rest[at] for at in np.linspace(0, len(rest) - 1, min(_SPREAD, len(rest))).astype(int)]
     chosen = able if whole else able[:_SMALLEST] + spread
     state.told(f"{len(chosen)} of {len(able)} designs that can work, few devices each")
     state.race(shares[chosen], [points[i] for i in chosen], [None] * len(chosen))
-    state.make_sure()
     return _static(points, rows, len(able)), whole
+
+
+def _size_at_first(state: _State) -> float:
+    """Of the smallest that serves enough devices; else of the one that serves most."""
+    enough = [each.size for each in state.candidates if _served(each) >= state.threshold]
+    return min(enough) if enough else max(state.candidates, key=_served).size
+
+
+def _served(candidate: Candidate) -> float:
+    """Fraction of the devices; one of them is taken for failed: 4 of 4 are worth less than 60 of 64."""
+    return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
+
+
+def _round(state: _State, size: float, number: int) -> float:
+    """Race points about the best. Returns: the size from which on they serve enough devices."""
+    surface, (low, high) = state.surface(size), _SIZES[number]
+    sizes = size * np.exp(np.linspace(math.log(low), math.log(high), _CHILDREN * _TRIED))
+    parents = state.parents(surface, size)
+    shares, points = state.cloud(parents, _STEPS[number], sizes, anywhere=_ANYWHERE[number])
+    if points:
+        logits, spread = surface.logits(state.coordinates(shares))
+        slices = np.array_split(np.arange(len(points)), min(_CHILDREN, len(points)))
+        chosen = [int(each[np.argmax((logits + _BOLD * spread)[each])]) for each in slices]
+        state.race(shares[chosen], [points[i] for i in chosen], state.places(shares[chosen]))
+    surface = state.surface(size)
+    shares = np.array([each.shares for each in state.candidates])
+    logits, spread = surface.logits(state.coordinates(shares))
+    able = [
+        each.size
+        for each, value, doubt in zip(state.candidates, logits, spread, strict=True)
+        if value - _BOLD * doubt >= logit(state.threshold)
+    ]
+    if not able:
+        return size * high
+    return min(max(min(able), low * size), high * size)
+
+
+def _by_size(state: _State, size: float) -> list[Finalist]:
+    """Of every size, in equal steps, the point that promises most; all with the settings that serve best."""
+    state.told("settings of the designs that are judged")
+    surface = state.surface(size)
+    parents = state.parents(surface, size)
+    steps = size * (1 + _FINER) ** np.arange(*_SIZES_JUDGED)
+    shares, points = state.cloud(parents, _STEPS[-1], np.repeat(steps, _CLOUD))
+    if not points:
+        return _all(state, size)
+    logits, _ = surface.logits(state.coordinates(shares))
+    steps_away = np.rint(np.log([state.space.size(each) / size for each in points]) / math.log1p(_FINER))
+    best = [
+        int(rows[np.argmax(logits[rows])])
+        for at in np.unique(steps_away)
+        for rows in [np.flatnonzero(steps_away == at)]
+    ]
+    enough = [i for i in best if logits[i] >= logit(state.threshold)]
+    place = _settled(state, points[enough[0] if enough else best[-1]], parents)
+    return [
+        Finalist(
+            point=points[i], size=state.space.size(points[i]), place=place, promise=float(expit(logits[i]))
+        )
+        for i in best
+    ]
+
+
+def _settled(state: _State, point: Point, parents: Sequence[Candidate]) -> Place | None:
+    """The settings that serve most devices of a design, of those that serve best near it."""
+    places: list[Place] = []
+    for each in parents:
+        if each.race.place is not None:
+            beside = near(state.trials, each.race.place)
+            places += [place for place in (each.race.place, *beside) if place not in places]
+    if not places:
+        return None
+    calls = [
+        partial(
+            race, state.space.hasty, point, places=places, asked=state.threshold, settings=True, block=block
+        )
+        for block in range(_SETTLED)
+    ]
+    races = [each for each in deal(state.executor, calls) if each is not None]
+    return min(races, key=lambda each: each.order).place if races else places[0]
+
+
+def _all(state: _State, size: float) -> list[Finalist]:
+    """What raced: of sizes that are nearly alike the one that promises most."""
+    logits, _ = state.surface(size).logits(
+        state.coordinates(np.array([each.shares for each in state.candidates]))
+    )
+    rows = sorted(range(len(logits)), key=lambda i: (state.candidates[i].size, state.candidates[i].race.gas))
+    finalists: list[Finalist] = []
+    for i in rows:
+        each = state.candidates[i]
+        one = Finalist(
+            point=each.point, size=each.size, place=each.race.place, promise=float(expit(logits[i]))
+        )
+        alike = bool(finalists) and state.space.sized and one.size <= (1 + AS_SMALL) * finalists[-1].size
+        if alike and one.promise > finalists[-1].promise:
+            finalists[-1] = one
+        elif not alike:
+            finalists.append(one)
+    return finalists
 
 
 def _sample(space: Space) -> tuple[FloatArray, bool]:
@@ -360,29 +449,6 @@ def _static(points: Sequence[Point], rows: Sequence[Record], able: int) -> Stati
         reach=reach[best] or math.nan,
         reach_point=points[best],
     )
-
-
-def _round(state: _State, step: float, shrink: float) -> None:
-    """Points about the best ones; on average smaller by a factor than the smallest that passes."""
-    space, parents = state.space, state.parents()
-    most = state.best[0] if space.sized else math.inf
-    drawn = state.random.integers(0, len(parents), _CHILDREN * _TRIED).tolist()
-    shares = np.array([_stepped(state, parents[at].shares, step) for at in drawn])
-    if math.isfinite(most):
-        sizes = np.repeat(most * (1 - 2 * (1 - shrink) * state.random.random(_CHILDREN)), _TRIED)
-        shares = np.array([_sized(space, each, size) for each, size in zip(shares, sizes, strict=True)])
-    points = space.points(shares)
-    able = [
-        state.able(row) and space.size(point) < most
-        for row, point in zip(state.static(points), points, strict=True)
-    ]
-    promise = np.where(able, state.promise(shares), -math.inf).reshape(_CHILDREN, _TRIED)
-    chosen = [
-        child * _TRIED + int(np.argmax(row)) for child, row in enumerate(promise) if np.isfinite(row.max())
-    ]
-    if chosen:
-        places = [state.places(parents[drawn[i]]) for i in chosen]
-        state.race(shares[chosen], [points[i] for i in chosen], places)
 
 
 def _stepped(state: _State, shares: FloatArray, step: float) -> FloatArray:

@@ -1,8 +1,7 @@
 """One design in closed loop: few drawn devices race its controllers' settings.
 
 Settings stand in units of a design's own loop and dead time, so that what served one design is a good start
-for another.  A design that serves few of the first devices is left; only good ones run on all.  Devices that
-fail most often in other designs run first, once these are known.
+for another.  A design that serves few of the first devices is left; only good ones run on a whole block.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Settings, quick_balancer
+from ringbalance.controller.balancer import Balancer, Draws, Settings, quick_balancer
 from ringbalance.controller.judging.judge import Judgement, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.trials import Trials
@@ -26,17 +25,14 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 
-Place = tuple[int, tuple[int, ...]]
-"""Kind of controller, by its number among the balancer's trials, and levels on its axes."""
+Place = tuple[int, tuple[float, ...]]
+"""Kind of controller, by its number among the balancer's trials, and places among the levels on its axes."""
 HEATS: Final = (4, 8, 24, 64)
 """Devices after each heat of a race; at last a whole block of draws, whose inputs are spread evenly."""
-BLOCK: Final = 16
-"""Devices that are made together, by consecutive numbers."""
 DEVICES: Final = HEATS[-1]
 """Of a design that stays in the race."""
-SURE: Final = 256
-"""Devices on which the smallest design must hold before others are measured by it: the best of many that ran
-as few is often one that was lucky with them."""
+STEP: Final = 0.5
+"""Levels, between settings that race beside each other."""
 _WATCHED: Final = 10.0
 """s, for which a race watches a device that has held its limit; a verdict watches longer."""
 _KEPT: Final = (39, 8, 1)
@@ -55,10 +51,8 @@ class Race:
     """None: under the scene's own settings."""
     settings: Settings
     """By path, SI."""
-    numbers: tuple[int, ...] = ()
-    """Of the devices that ran."""
-    unseen: int = 0
-    """Devices that need not run, since too many others fail, and are taken to meet what is asked."""
+    block: int = 0
+    """Of `DEVICES` devices each, from which those are that ran."""
     meets: BoolArray
     """Of each device that ran."""
     times: FloatArray
@@ -67,18 +61,14 @@ class Race:
     """J, of the gas that was let in."""
 
     @property
-    def failed(self) -> int:
-        """Devices that do not meet every demand."""
-        return int(np.count_nonzero(~self.meets))
+    def met(self) -> int:
+        """Devices that meet every demand."""
+        return int(np.count_nonzero(self.meets))
 
     @property
     def fraction(self) -> float:
-        """Of the devices that meet every demand."""
-        return 1.0 - self.failed / (self.meets.size + self.unseen) if self.meets.size else 0.0
-
-    def in_order(self) -> BoolArray:
-        """`meets` by number of the devices."""
-        return self.meets[np.argsort(self.numbers)]
+        """Of the devices that ran."""
+        return self.met / self.meets.size if self.meets.size else 0.0
 
     @cached_property
     def gas(self) -> float:
@@ -94,13 +84,12 @@ class Race:
     @property
     def order(self) -> tuple[float, ...]:
         """Most devices first, then soonest."""
-        return (-float(np.count_nonzero(self.meets)), self.time(0.9), self.gas)
+        return (-float(self.met), self.time(0.9), self.gas)
 
     def joined(self, other: Race) -> Race:
         """With the outcomes of further devices."""
         return replace(
             self,
-            numbers=self.numbers + other.numbers,
             meets=np.concatenate([self.meets, other.meets]),
             times=np.concatenate([self.times, other.times]),
             energy=np.concatenate([self.energy, other.energy]),
@@ -114,35 +103,20 @@ def race(
     places: Sequence[Place] | None,
     asked: float,
     settings: bool,
-    blocks: tuple[int, ...] = (),
+    block: int = 0,
 ) -> Race | None:
     """The best settings of a design; None: its scene is refused, or it breaks down.
 
     Args: `places`: settings that race, such as those that raced best on another design; None: all that are
         tried at first. `asked`: fraction of devices. `settings`: whether any are raced but the scene's own.
-        `blocks`: of devices, in the order in which they run until too many have failed; none: in heats.
+        `block`: whose devices run.
     """
     try:
         balancer = quick_balancer(point_scene(scene, point))
         field = _field(balancer.trials(), places) if settings else [(None, {})]
-        if not field:
-            return None
-        return _by_blocks(balancer, field, asked, blocks) if blocks else _raced(balancer, field, asked)
+        return _raced(balancer, field, asked, block) if field else None
     except (SceneError, *FAULTS):
         return None
-
-
-def raced_longer(scene: SceneFile, point: Point, *, before: Race, asked: float) -> Race:
-    """The same on `SURE` devices, or until too many have failed; as it was where it breaks down."""
-    longer = before
-    try:
-        balancer = quick_balancer(point_scene(scene, point))
-        while longer.meets.size < SURE and longer.failed <= (1 - asked) * SURE:
-            size = longer.meets.size
-            (longer,) = _heat(balancer, [longer], range(size, size + DEVICES), further=FURTHER)
-    except (SceneError, *FAULTS):
-        return before
-    return longer
 
 
 def _field(trials: Sequence[Trials], places: Sequence[Place] | None) -> list[tuple[Place | None, Settings]]:
@@ -161,60 +135,49 @@ def _all_first(trials: Sequence[Trials]) -> list[Place]:
 
 
 def near(trials: Sequence[Trials], place: Place) -> list[Place]:
-    """Settings one level away on one axis."""
+    """Settings one step away on one axis."""
     kind, levels = place
     return [
         (kind, (*levels[:axis], level, *levels[axis + 1 :]))
         for axis, at in enumerate(levels)
-        for level in (at - 1, at + 1)
-        if 0 <= level < len(trials[kind].axes[axis].levels)
+        for level in (at - STEP, at + STEP)
+        if 0 <= level <= len(trials[kind].axes[axis].levels) - 1
     ]
 
 
-def _settings(trials: Trials, levels: tuple[int, ...]) -> Settings | None:
-    return trials.settings({axis.name: axis.levels[at] for axis, at in zip(trials.axes, levels, strict=True)})
+def _settings(trials: Trials, levels: tuple[float, ...]) -> Settings | None:
+    """At places among the levels, straight between two of them."""
+    return trials.settings(
+        {
+            axis.name: float(np.interp(at, range(len(axis.levels)), axis.levels))
+            for axis, at in zip(trials.axes, levels, strict=True)
+        }
+    )
 
 
-def _raced(balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], asked: float) -> Race:
-    running = [Race(place=place, settings=settings, **_NOBODY) for place, settings in field]
-    first = 0
+def _raced(
+    balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], asked: float, block: int
+) -> Race:
+    running = [Race(place=place, settings=settings, block=block, **_NOBODY) for place, settings in field]
+    first, start = 0, block * DEVICES
     for heat, last in enumerate(HEATS):
-        running = sorted(_heat(balancer, running, range(first, last)), key=lambda each: each.order)
+        running = sorted(
+            _heat(balancer, running, range(start + first, start + last)), key=lambda each: each.order
+        )
         if running[0].fraction < asked - _LEFT:
             break
-        best = np.count_nonzero(running[0].meets)
-        running = [each for each in running if np.count_nonzero(each.meets) > best - _BEHIND]
+        running = [each for each in running if each.met > running[0].met - _BEHIND]
         first, running = last, running[: _KEPT[heat]] if heat < len(_KEPT) else running
     return running[0]
 
 
-def _by_blocks(
-    balancer: Balancer,
-    field: Sequence[tuple[Place | None, Settings]],
-    asked: float,
-    blocks: tuple[int, ...],
-) -> Race:
-    """The settings that serve most of the first block, on as many blocks as it takes to refuse the design."""
-    running = [Race(place=place, settings=settings, unseen=DEVICES, **_NOBODY) for place, settings in field]
-    for block in blocks:
-        ran = _heat(balancer, running, range(block * BLOCK, (block + 1) * BLOCK))
-        best = min(ran, key=lambda each: each.order)
-        running = [replace(best, unseen=best.unseen - BLOCK)]
-        if running[0].fraction < asked:
-            break
-    return running[0]
-
-
-def _heat(
-    balancer: Balancer, races: Sequence[Race], numbers: Sequence[int], *, further: float = _WATCHED
-) -> list[Race]:
+def _heat(balancer: Balancer, races: Sequence[Race], numbers: Sequence[int]) -> list[Race]:
     draws, demands = Draws(numbers=tuple(numbers), whole=False), balancer.demands()
-    ran = balancer.run_all([each.settings for each in races], draws, further=further)
+    ran = balancer.run_all([each.settings for each in races], draws, further=_WATCHED)
     return [
         each.joined(
             replace(
                 each,
-                numbers=draws.numbers,
                 meets=np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0)),
                 times=outcomes.settling_time,
                 energy=outcomes.energy,
@@ -232,22 +195,29 @@ _NOBODY: Final[dict[str, Any]] = {
 
 
 def judged_design(
-    scene: SceneFile, point: Point, *, settings: Settings, search: bool = False, most: int | None = None
+    scene: SceneFile,
+    point: Point,
+    *,
+    place: Place | None = None,
+    settings: Settings | None = None,
+    search: bool = False,
+    most: int | None = None,
 ) -> Judgement | None:
     """The settings that serve most devices of a design; None: it breaks down.
 
     Judged on devices on which nothing was chosen.
-    Args: `settings`: those that raced best. `search`: whether others are looked for as `tune` does.
-        `most`: devices; default as many as `tune` takes.
+    Args: `place`, `settings`: those that raced best; without either the scene's own. `search`: whether others
+        are looked for as `tune` does. `most`: devices; default as many as `tune` takes.
     """
     try:
         balancer = quick_balancer(point_scene(scene, point))
-        tried = [settings, searched(balancer)] if search else [settings]
+        raced = _field(balancer.trials(), [place]) if place is not None else [(None, settings or {})]
+        tried = [each for _, each in raced] + ([searched(balancer)] if search else [])
         fresh = [each for i, each in enumerate(tried) if each not in tried[:i]]
         judged = judged_all(balancer, fresh, most=most)
     except (SceneError, *FAULTS):
         return None
-    return max(judged, key=lambda each: each.fraction.value)
+    return max(judged, key=lambda each: each.fraction.value, default=None)
 
 
 def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> int | None:

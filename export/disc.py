@@ -9,7 +9,7 @@ Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and nam
 
 from math import sqrt
 
-from ringbalance.export.point import (
+from ringbalance.reduced_model.pieces.point import (
     AMBIENT,
     BLOCK,
     BLOCKED,

@@ -32,13 +32,14 @@ from ringbalance.identification.tables import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean
-from ringbalance.scene.keys.fields import LETTERS, half_width
+from ringbalance.scene.keys.fields import LETTERS, Bounds, half_width, share
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import FieldError, parse_quantity
 
 _AMPLITUDE: Final = "amplitude"
 _UNCERTAINTY: Final = "uncertainty"
+_RELATIVE: Final = share(Bounds(above=0, below=1), example=0.02)
 _TEXTS: Final = (
     *("kind", "source", "uncertainty_from", "where", "doi", "licence", "read", "conditions"),
     *("supports", "does_not_support"),
@@ -297,11 +298,16 @@ def _of_header(
         return {}, []
     if isinstance(stated, Mapping):
         return _by_column(table, stated, columns, {column.name: column for column in measured})
-    if isinstance(stated, bool) or not isinstance(stated, int | float) or not 0 < stated < 1:
-        problem = "it must be a number above 0 and below 1: 95 %, relative to the measured values"
-        allowed = 'such as 0.02, or by column: { amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
-        return {}, [data_fault(table.file, _UNCERTAINTY, problem, value=toml_text(stated), allowed=allowed)]
-    return {column.name: stated * _size(kind, columns, column.name) for column in measured}, []
+    try:
+        width = _RELATIVE.read(stated)
+    except FieldError as error:
+        allowed = (
+            'a share of the measured values such as "2 %" or 0.02 (95 %), or by column: '
+            '{ amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
+        )
+        value = toml_text(stated)
+        return {}, [data_fault(table.file, _UNCERTAINTY, error.problem, value=value, allowed=allowed)]
+    return {column.name: width * _size(kind, columns, column.name) for column in measured}, []
 
 
 def _by_column(

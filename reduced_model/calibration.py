@@ -59,7 +59,7 @@ def calibrate(scene: AnyScene) -> Calibration:
             "finite_element_solves": float(chamber.check.solves),
             "unknowns": float(chamber.statistics.unknowns),
             "relative_residual": chamber.statistics.relative_residual,
-            "tube_table_nodes": float(heads.head.value.size),
+            "tube_table_nodes": float(heads.siphon.knots.size),
             "tube_table_error": heads.interpolation_error,
             "wall_pressure_table_error_Pa": float(np.max(chamber.wall_pressure.interpolation)),
             "hydrostatic_pressure_table_error_Pa": float(np.max(chamber.hydrostatic_pressure.interpolation)),

@@ -31,7 +31,6 @@ from ringbalance.reports.prose import (
     key_words,
     named_with_origin,
     paths_named,
-    series,
     share_glyphs,
 )
 from ringbalance.reports.section import Record
@@ -49,6 +48,7 @@ from ringbalance.results.numbers import (
     PLUS_MINUS,
     measured,
 )
+from ringbalance.results.rows import series
 from ringbalance.scene.describe import usual_name
 
 _Facts = tuple[tuple[str, str], ...]

@@ -110,11 +110,6 @@ def _index(match: re.Match[str]) -> str:
     return (match[1] or match[2]) + match[3].translate(_SUBSCRIPTS) + ("′" if match[4] else "")
 
 
-def series(names: list[str]) -> str:
-    """Names as a sentence has them: "a, b and c"."""
-    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
-
-
 def resting(evidence: Mapping[str, Any], *paths: str) -> str:
     """The inputs among some that are neither given nor measured, with origin and value."""
     origins = evidence["scene"].get("origins") or {}

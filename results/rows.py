@@ -175,6 +175,11 @@ def sentences() -> Mapping[str, _Sentence]:
     return {code: _Sentence(**entry) for code, entry in tomllib.loads(content).items()}
 
 
+def series(names: Sequence[str]) -> str:
+    """Names as a sentence has them: "a, b and c"."""
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
+
+
 def _value_text(value: Value, unit: str = "", *, digits: int = 4) -> str:
     """The one filter for numbers in sentences and templates.
 
@@ -189,7 +194,7 @@ def _value_text(value: Value, unit: str = "", *, digits: int = 4) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, Sequence):
-        return f"{', '.join(value[:-1])} and {value[-1]}" if len(value) > 1 else "".join(value)
+        return series(value)
     if unit == "%":
         return percent(value, digits=digits)
     exact = len(str(value)) if isinstance(value, int) else digits

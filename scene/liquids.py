@@ -5,12 +5,10 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
@@ -21,6 +19,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, did_you_mean
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.models import Liquid
+from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.units import FieldError
 
 _ZERO_CELSIUS = 273.15
@@ -171,17 +170,12 @@ def _plain(name: str) -> str:
 
 @cache
 def _library() -> Mapping[str, tuple[KnownLiquid, FloatArray]]:
-    table = list(csv.DictReader(_data_lines("fluid_properties.csv")))
+    table = packaged_rows("ringbalance.scene", "data", "fluid_properties.csv")
     entries = (
         _entry(key, [line for line in table if line["fluid"] == key])
         for key in dict.fromkeys(line["fluid"] for line in table)
     )
     return MappingProxyType({liquid.name: (liquid, rows) for liquid, rows in entries})
-
-
-def _data_lines(name: str) -> list[str]:
-    text = (resources.files("ringbalance.scene") / "data" / name).read_text(encoding="utf-8")
-    return [line for line in text.splitlines() if not line.startswith("#")]
 
 
 def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, FloatArray]:
@@ -218,8 +212,8 @@ def _water_properties(*, temperature: float) -> tuple[float, float, float]:
 
 @cache
 def _water_series() -> FloatArray:
-    lines = _data_lines("water.csv")
-    return np.array([[float(value) for value in line.split(",")] for line in lines[1:]])
+    rows = packaged_rows("ringbalance.scene", "data", "water.csv")
+    return np.array([[float(value) for value in row.values()] for row in rows])
 
 
 def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:

@@ -7,18 +7,17 @@ with a standard deviation, as uncertainties has it, or with both.
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
-from importlib import resources
 from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.toml import toml_text
 
 
@@ -63,9 +62,7 @@ class _Dimension:
 
 
 def _dimensions() -> Mapping[str, _Dimension]:
-    data = resources.files("ringbalance.scene") / "data" / "units.csv"
-    lines = data.read_text(encoding="utf-8").splitlines()
-    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    rows = packaged_rows("ringbalance.scene", "data", "units.csv")
     return MappingProxyType({row["dimension"]: _dimension(row) for row in rows})
 
 

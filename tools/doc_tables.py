@@ -18,6 +18,7 @@ from api_page import name_reference
 from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
+from ringbalance.export.blocks import declared
 from ringbalance.identification.kinds.kind import Kind
 from ringbalance.identification.reading import KINDS
 from ringbalance.reports.prose import equations as report_equations
@@ -90,6 +91,27 @@ def finding_table() -> str:
     )
 
 
+def block_table() -> str:
+    """Variables of the blocks that are exported."""
+    heads = ("block", "variable", "side", "unit", "from", "to", "meaning")
+    return _markdown(
+        heads,
+        [
+            (
+                f"`{kind}`",
+                f"`{each['name'].replace('#', 'a')}`" + (", ..." if "#" in each["name"] else ""),
+                "in" if each.get("input") else "out",
+                each["range"].get("unit", "-"),
+                each["range"].get("min", "0"),
+                each["range"].get("max", "1").replace("MOST", "largest"),
+                each["description"].replace("#", "A").replace("MOST", "the largest fill ratio"),
+            )
+            for kind in ("law", "disc", "controller")
+            for each in declared()[kind]
+        ],
+    )
+
+
 def equations() -> bytes:
     """SVG of each equation of the report and of the cases by its LaTeX, as the file keeps them."""
     latex = {
@@ -106,6 +128,7 @@ PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
         "docs/measurements.md": lambda: {"kinds": kind_table("")},
         "docs/fit.md": lambda: {"fit_kinds": kind_table("liquid_ring", "eccentric_mass")},
         "docs/findings.md": lambda: {"findings": finding_table()},
+        "docs/export.md": lambda: {"block_variables": block_table()},
         "docs/is-k-50-right.md": document_tables,
         "docs/standing.md": lambda: {"standing": standing_table(_documents())},
     }

@@ -72,8 +72,9 @@ def verify(
     try:
         chosen, more = _chosen(case_ids, own)
     except UnknownCaseError as error:
-        # A case whose text cannot be read is unknown, too.
-        for wrong in (*errors, error):
+        # A case whose text cannot be read is unknown, too; what is wrong with it is said alone.
+        said: Sequence[Exception] = errors or [error]
+        for wrong in said:
             _say(wrong)
         return _BAD_INPUT
     errors += more
@@ -208,4 +209,7 @@ def _print_results(results: Sequence[CaseResult]) -> None:
     for result in () if display().brief else results:
         console.print(result.rows().view(headline=False), "")
     counts = Counter(result.verdict for result in results)
-    console.print(", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]))
+    total = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
+    if broken := sum(result.broken for result in results):
+        total += f"; {broken} of these proves nothing, because a mutation was not caught"
+    console.print(total)

@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, vibration_rates
+from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, loop_rate
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.faults import SceneError
@@ -154,7 +154,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         problem = f"the controller {scene.controller.kind!r} has no linear loop"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
     settings, dt = scene.controller, scene.controller.period
-    rate = float(np.max(np.mean(vibration_rates(scene, BalancerModel.of(flow_law)), axis=1)))
+    rate = loop_rate(scene, BalancerModel.of(flow_law))
     integral = 0.0 if settings.integral_time is None else dt / settings.integral_time
     derivative = settings.derivative_time / dt
     return LinearLoop(

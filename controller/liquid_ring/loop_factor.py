@@ -68,7 +68,7 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
     learns the true one: what noise leaves is taken at a loop factor of one.  A trial has no linear loop, and
     the same bound on the noise is used for it.
     """
-    rate, noise = float(np.max(np.mean(vibration_rates(scene, model), axis=1))), _noise_at_limit(scene)
+    rate, noise = loop_rate(scene, model), _noise_at_limit(scene)
     error = 0.0
     value: float | None = None
     integral = derivative = 0.0
@@ -127,6 +127,11 @@ def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
         for change in run["change"][0, :pairs].tolist()
     ]
     return np.asarray(np.clip(np.array(fills), lowest, highest), dtype=np.float64)
+
+
+def loop_rate(scene: Scene, model: BalancerModel) -> float:
+    """b of the fastest pair, the mean of its two chambers, m/s."""
+    return float(np.max(np.mean(vibration_rates(scene, model), axis=1)))
 
 
 def vibration_rates(scene: Scene, model: BalancerModel) -> FloatArray:

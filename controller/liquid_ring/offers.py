@@ -18,7 +18,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.liquid_ring.devices import AMPLITUDE, CAVITY, FITTED, LOSS, MOMENT, PHASE
-from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
+from ringbalance.controller.liquid_ring.loop_factor import loop_rate
 from ringbalance.controller.terms import dead_time
 from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Point, Trials, rounded
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -63,7 +63,7 @@ class _Loop:
 
     @classmethod
     def of(cls, scene: Scene, model: BalancerModel) -> _Loop:
-        rate = float(np.max(np.mean(vibration_rates(scene, model), axis=1)))
+        rate = loop_rate(scene, model)
         return cls(rate=rate, dead_time=dead_time(scene, model, rate=rate))
 
 
@@ -206,7 +206,7 @@ def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
 
 def _open_time(scene: Scene, model: BalancerModel) -> float:
     """Valve-open time in which the full tube would correct the initial vibration, s."""
-    rate = float(np.max(np.mean(vibration_rates(scene, model), axis=1)))
+    rate = loop_rate(scene, model)
     return scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
 
 

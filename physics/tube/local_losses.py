@@ -12,12 +12,10 @@ bend then costs more or less by its sense of turning, which a scene does not giv
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
 from typing import Final
 
 import numpy as np
@@ -30,6 +28,7 @@ from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import BoolArray, FloatArray, clipped, plain
 from ringbalance.scene.models import Bend, Tube
+from ringbalance.scene.platform.files import packaged_rows
 
 LAMINAR_ENTRY_LENGTH: Final = 0.056
 """Entry length of laminar flow in diameters per Re."""
@@ -67,9 +66,7 @@ class _EndTable:
 @lru_cache(maxsize=2)
 def _end_table(end: str) -> _EndTable:
     """The table of the "entrance" or the "exit", as it comes with the package."""
-    path = resources.files("ringbalance.physics") / "data" / "end_losses.csv"
-    lines = [x for x in path.read_text(encoding="utf-8").splitlines() if not x.startswith("#")]
-    rows = [row for row in csv.DictReader(lines) if row["end"] == end]
+    rows = [r for r in packaged_rows("ringbalance.physics", "data", "end_losses.csv") if r["end"] == end]
     power = 1 if end == "entrance" else 0
     nodes = [row for row in rows if row["kind"] == "node"]
     a, y = (np.array([float(row[name]) for row in nodes]) for name in ("a", "fine"))

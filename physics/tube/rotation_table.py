@@ -14,11 +14,9 @@ S = R/Re and R = omega d^2/nu:
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -27,6 +25,7 @@ from scipy.interpolate import RectBivariateSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.scene.arrays import BoolArray, FloatArray, clipped
+from ringbalance.scene.platform.files import packaged_rows
 
 Rows = Sequence[Mapping[str, str]]
 
@@ -153,9 +152,7 @@ def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
 @lru_cache(maxsize=1)
 def _friction_table() -> _FrictionTable:
     """The table that comes with the package. Returns: The table, read once."""
-    path = resources.files("ringbalance.physics") / "data" / "rotating_friction.csv"
-    lines = path.read_text(encoding="utf-8").splitlines()
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    rows = packaged_rows("ringbalance.physics", "data", "rotating_friction.csv")
     part = {name: [r for r in rows if r["table"] == name] for name in {row["table"] for row in rows}}
     slow, fast = (_rectangle(name, part[name]) for name in ("slow", "fast"))
     inner = {"slow_check": float(slow_first(1e6)), "fast_check": float(fast_first(1e4))}

@@ -32,11 +32,11 @@ from ringbalance.reports.figure import (
     plain_number,
 )
 from ringbalance.reports.judged import judgement_record
-from ringbalance.reports.prose import series
 from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import is_papers
 from ringbalance.results.numbers import shown
+from ringbalance.results.rows import series
 from ringbalance.scene.models import Scene
 
 SETTINGS: Final[dict[str, dict[str, Any]]] = {

@@ -8,6 +8,7 @@ user's own cache folder.
 
 from __future__ import annotations
 
+import csv
 import errno
 import os
 import re
@@ -17,6 +18,7 @@ import stat
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from importlib.resources import files
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -54,6 +56,12 @@ def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path
     _remove_abandoned(target.parent)
     _replace_whole(target, content, mode=0o600 if private else 0o666)
     return path
+
+
+def packaged_rows(package: str, *place: str) -> list[dict[str, str]]:
+    """Rows of a CSV file that comes with the program, by its path below a package; "#" begins a comment."""
+    lines = files(package).joinpath(*place).read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
 def check_file(path: Path, *, apart_from: Path | None = None) -> None:

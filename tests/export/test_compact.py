@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from law_queries import answers, queries
 
-from ringbalance.export import point
 from ringbalance.export.compact import TOLERANCE, CompactLaw, compact_law
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.pieces import point
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene

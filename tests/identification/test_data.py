@@ -86,8 +86,10 @@ def test_a_relative_uncertainty_of_a_vibration_is_that_of_both_its_components(
     sound_files: Mapping[str, str], paper_scene: Scene
 ) -> None:
     found = read("# uncertainty = 0.02\n" + sound_files["trial_weight"], paper_scene)
+    percent = read('# uncertainty = "2 %"\n' + sound_files["trial_weight"], paper_scene)
     assert found.uncertainty["amplitude"] == pytest.approx(0.02 * found.columns["amplitude"])
     assert found.uncertainty["phase"] == pytest.approx([0.02] * 3)
+    assert percent.uncertainty["phase"].tolist() == found.uncertainty["phase"].tolist()
 
 
 def test_the_uncertainty_of_a_row_comes_before_that_of_the_file(
@@ -166,7 +168,7 @@ def test_both_characters_for_micro_and_the_degree_sign_are_known(
         ("flow", ",series", ",series [mm]", ["series [mm]", "text has no unit"]),
         ("flow", "## unc", "# uncertainty = 2 #", ["uncertainty = 2", "below 1"]),
         ("flow", "## unc", "# uncertainty = 0 #", ["uncertainty = 0", "above 0"]),
-        ("flow", "## unc", '# uncertainty = "5 %" #', ['"5 %"', "0.02"]),
+        ("flow", "## unc", '# uncertainty = "5 mm" #', ['"5 mm"', '"2 %"']),
         ("flow", "## unc", '# uncertainty = {flow="5 %"} #', ["uncertainty.flow", "flow_rate"]),
         ("flow", "## unc", '# uncertainty = {flow_rate="5 g"} #', ["flow_rate", "unit of mass"]),
         ("flow", "## unc", '# uncertainty = {flow_rate="0 %"} #', ["flow_rate", "above zero"]),

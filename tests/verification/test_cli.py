@@ -13,7 +13,7 @@ from ringbalance.cli import main
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.cli import _exit_code, verify
+from ringbalance.verification.cli import _exit_code, _print_results, verify
 from ringbalance.verification.evidence import Found
 from ringbalance.verification.runner import run_definition
 
@@ -74,7 +74,11 @@ def test_a_scene_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 def test_only_code_verification_and_missed_defects_fail_the_run(
-    claim: CaseDefinition, verification: CaseDefinition, made_up_code: Any, paper_scene: Scene
+    claim: CaseDefinition,
+    verification: CaseDefinition,
+    made_up_code: Any,
+    paper_scene: Scene,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     wrong = made_up_code(found=Found(value=20.0))
     refuted = run_definition(claim, wrong, scene=paper_scene)
@@ -90,6 +94,9 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     blind = made_up_code(defect=lambda found, _, __: found)
     broken = run_definition(claim, blind, scene=paper_scene, mutations=True)
     assert _exit_code([broken]) == 1
+    _print_results([broken, refuted])
+    total = " ".join(capsys.readouterr().out.split("\n\n")[-1].split())
+    assert total.endswith("; 1 of these proves nothing, because a mutation was not caught")
     assert _exit_code([dataclasses.replace(broken, mutations=())]) == 0
 
 

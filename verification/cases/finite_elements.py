@@ -4,11 +4,9 @@ extremes), balances of force, torque, flux and volume on solved meshes, and the 
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from importlib.resources import files
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,7 +21,7 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.scene.platform.files import cache_folder
+from ringbalance.scene.platform.files import cache_folder, packaged_rows
 from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 from ringbalance.verification.extremes.point import Ending
 from ringbalance.verification.extremes.study import SIZES, Size, find_extremes
@@ -116,10 +114,9 @@ def gci_celik2008(scene: Scene, level: Level, defect: str | None = None) -> Evid
 
 @lru_cache(maxsize=1)
 def _published_examples() -> dict[str, _Example]:
-    path = files("ringbalance.verification.cases") / "gci_celik2008" / "data" / "celik2008_examples.csv"
-    lines = path.read_text(encoding="utf-8").splitlines()
     examples: dict[str, _Example] = {}
-    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+    place = ("gci_celik2008", "data", "celik2008_examples.csv")
+    for row in packaged_rows("ringbalance.verification.cases", *place):
         number = {key: float(value) for key, value in row.items() if key != "case"}
         r21, r32 = number["r21"], number["r32"]
         if not examples:

@@ -196,12 +196,12 @@ class CalibratedLaw:
             primed=primed,
         )
         shape = asked.fill_ratio.shape
-        # Read-only arrays would be another type to compile for.
+        # Copies: arrays that may not be written are another type to compile for.
         flat = (
-            np.require(asked.fill_ratio, requirements="CW").ravel(),
-            np.require(asked.opposite_fill_ratio, requirements="CW").ravel(),
-            np.require(asked.gas_pressure, requirements="CW").ravel(),
-            np.require(asked.primed, requirements="CW").ravel(),
+            np.array(asked.fill_ratio).ravel(),
+            np.array(asked.opposite_fill_ratio).ravel(),
+            np.array(asked.gas_pressure).ravel(),
+            np.array(asked.primed).ravel(),
         )
         velocity, width, regime, after = self._widened(flat) if self.variants else self._answers(flat)
         return Flow(

@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import controller, disc
+from ringbalance.export import chamber, controller, disc
 from ringbalance.export.compact import VELOCITIES, CompactLaw
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -125,7 +125,7 @@ def law_block(law: CompactLaw) -> Block:
         constants=law.constants,
         pieces=law.pieces,
         start=tuple(row),
-        modules=(point,),
+        modules=(point, chamber),
         steps="answer_all",
         timed=False,
         variables=_variables("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
@@ -174,7 +174,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
         constants=tuple(constants),
         pieces=compact.pieces,
         start=tuple(row),
-        modules=(point, disc),
+        modules=(point, chamber, disc),
         steps="step",
         timed=True,
         variables=_variables("disc", place, most=law.max_fill_ratio, chambers=scene.disc.chambers),
@@ -299,8 +299,8 @@ def _variables(
         heads["range"] = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
         heads["description"] = each["description"].replace("MOST", number_text(most))
         letters = chamber_letters(chambers) if "#" in each["name"] else (None,)
-        for chamber, letter in enumerate(letters):
+        for number, letter in enumerate(letters):
             texts = {key: heads[key].replace("#", letter or "") for key in ("name", "description")}
-            at = place(each["place"], chamber if letter else None)
+            at = place(each["place"], number if letter else None)
             found.append(Variable(**{**heads, **texts, "name": texts["name"].lower(), "place": at}))
     return tuple(found)

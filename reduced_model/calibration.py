@@ -15,9 +15,10 @@ from ringbalance.reduced_model.chamber.contributions import AsynchronousInstabil
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.gas_line import line_answers
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel
+from ringbalance.reduced_model.law.making import calibrated_law
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid

@@ -14,8 +14,9 @@ import numpy as np
 from ringbalance.controller.loop_records import MomentTable
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_laws
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.making import nominal_laws
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import deviates, quantiles

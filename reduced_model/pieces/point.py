@@ -107,38 +107,6 @@ def width(p: Pieces, row: int, t: float) -> float:
 
 
 @both_ways
-def chamber_piece(c: Law, p: Pieces, fill: float) -> int:
-    """Row of a chamber's surface and moment that holds a fill within the range."""
-    return piece(p, c[int(fill * c[CHAMBER_SCALE] + c[CHAMBER_CELLS])], fill)
-
-
-@both_ways
-def surface_radius(c: Law, p: Pieces, fill: float) -> float:
-    """Radius of a chamber's concentric free surface, m."""
-    x = within(c, fill)
-    row = chamber_piece(c, p, x)
-    t = x - p[row][END]
-    return sqrt(larger(p[row][SQUARE_0] + t * (p[row][SQUARE_1] + t * p[row][SQUARE_2]), 0.0))
-
-
-@both_ways
-def moment(c: Law, p: Pieces, fill: float) -> float:
-    """Balancing moment of one chamber, kg m; a pair's is the difference of two."""
-    x = within(c, fill)
-    row = chamber_piece(c, p, x)
-    t = x - p[row][END]
-    return p[row][MOMENT_0] + t * (p[row][MOMENT_1] + t * p[row][MOMENT_2])
-
-
-@both_ways
-def moment_uncertainty(c: Law, p: Pieces, fill: float) -> float:
-    """Expanded uncertainty (95 %) of `moment`, kg m."""
-    x = within(c, fill)
-    row = chamber_piece(c, p, x)
-    return width(p, row, x - p[row][END])
-
-
-@both_ways
 def level(c: Law, p: Pieces, w: Query, fill: float) -> float:
     """Hydrostatic pressure of a chamber's liquid, with its half-width; a fill within the range."""
     row = piece(p, c[int(fill * c[LEVEL_SCALE] + c[LEVEL_CELLS])], fill)
@@ -495,11 +463,3 @@ def answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
         w[STATUS] = EXTRAPOLATED
     if w[REGIME] == REVERSE:
         w[VELOCITY] = -w[VELOCITY]
-
-
-@both_ways
-def answer_all(c: Law, p: Pieces, w: Query) -> None:
-    """The answer, and surface radius, m, and moment, kg m, of the driven chamber."""
-    answer(c, p, w, True)
-    w[RADIUS] = surface_radius(c, p, w[FILL])
-    w[MOMENT] = moment(c, p, w[FILL])

@@ -14,8 +14,9 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.reduced_model.calibration_record import Calibration, priming_pressure
 from ringbalance.reduced_model.estimates import range_flow
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.heads import LOSS, TubeHeads

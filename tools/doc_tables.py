@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import scene_reference
 from api_page import name_reference
+from benchmark_tables import kept, levels_table, markdown, models_table, workers_table
 from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
@@ -37,7 +38,7 @@ _PLACE: Final = re.compile(r"\{(\w+)[^}]*\}")
 
 def kind_table(*balancers: str) -> str:
     """Kinds of measurement that scenes of some balancers predict, or of test benches, and their columns."""
-    return _markdown(
+    return markdown(
         ("kind", "what it is", "measured", "further columns"),
         [
             (
@@ -67,17 +68,12 @@ def _explained(kind: Kind, *, measured: bool) -> list[str]:
 def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
     """What stands behind each quantity, by the documents of the cases; heavy ones count as kept."""
     kept = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
-    return _markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
-
-
-def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    return markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
 
 
 def finding_table() -> str:
     """Codes of findings, with what stands under them."""
-    return _markdown(
+    return markdown(
         ("code", "severity", "values", "sentence"),
         [
             (
@@ -94,7 +90,7 @@ def finding_table() -> str:
 def block_table() -> str:
     """Variables of the blocks that are exported."""
     heads = ("block", "variable", "side", "unit", "from", "to", "meaning")
-    return _markdown(
+    return markdown(
         heads,
         [
             (
@@ -130,6 +126,8 @@ PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
         "docs/findings.md": lambda: {"findings": finding_table()},
         "docs/export.md": lambda: {"block_variables": block_table()},
         "docs/is-k-50-right.md": document_tables,
+        "docs/how-to-choose.md": lambda: {"models": models_table(kept()), "levels": levels_table(kept())},
+        "docs/clusters.md": lambda: {"workers": workers_table(kept())},
         "docs/standing.md": lambda: {"standing": standing_table(_documents())},
     }
 )

@@ -33,8 +33,6 @@ VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
 _MOST: Final = 10
 """Designs that are judged at the most, but for one."""
-_FEW: Final = 512
-"""Devices at the most that choose between them; the verdict takes as many as `tune` does."""
 _SLOPE: Final = 3
 """Designs to both sides over which the growth of the fraction is taken."""
 _MOVED: Final = 0.05
@@ -209,7 +207,7 @@ def _best(
 def _judging(space: Space, found: Hunt, at: int) -> Callable[[], Judgement | None]:
     finalist = found.finalists[at]
     search = found.whole and not space.sets_controller
-    return partial(judged_design, space.hasty, finalist.point, place=finalist.place, search=search, most=_FEW)
+    return partial(judged_design, space.hasty, finalist.point, place=finalist.place, search=search)
 
 
 def _smaller(found: Hunt, place: int, judged: Mapping[int, Judgement]) -> tuple[float, Proportion] | None:

@@ -32,6 +32,7 @@ from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
+from ringbalance.reduced_model.tube.heads import roots_of
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import cleared, resting_pressure
 from ringbalance.scene.arrays import FloatArray
@@ -58,9 +59,9 @@ class Rival:
 
     def __init__(self, scene: Scene, model: BalancerModel) -> None:
         assert isinstance(model.flow, CalibratedLaw)
-        assert model.flow.heads.hump_head is not None
+        assert model.flow.heads.hump is not None
         self.scene, self.model, self.law = scene, model, model.flow
-        self.crest, self.hump_head = model.flow.path, model.flow.heads.hump_head
+        self.crest, self.hump = model.flow.path, model.flow.heads.hump
         self.ambient = scene.gas.ambient_pressure
         self.upstream = crest_span(scene.tube)[1] * scene.tube.length
         lift = Lift.of(scene, law=model.flow)
@@ -86,7 +87,7 @@ class Rival:
         return resting - cavity, resting - max(gas, cavity)
 
     def spill(self, margin: float) -> float:
-        return math.exp(float(self.hump_head.inverse(math.log(max(margin, 1e-9) / self.law.density))))
+        return float(replace(self.law.heads, siphon=self.hump).velocity(max(margin, 1e-9) / self.law.density))
 
     def cleared(self, y: Y) -> float:
         return float(cleared(self.crest, self.spill(self.margins(y)[1])))
@@ -96,17 +97,17 @@ class Rival:
         margin = full_margin
         if not primed:
             margin = gas_margin + (self.cleared(y) * (full_margin - gas_margin) if gas_margin > 0 else 0.0)
-        rho, log_u = self.law.density, math.log(max(speed, 1e-12))
+        rho, speed = self.law.density, max(speed, 1e-12)
         own, other = (float(self.law.hydrostatic_pressure(x)) for x in (y[0], 0.5 - y[0]))
-        whole = rho * math.exp(float(self.law.heads.head(log_u)))
-        upper = rho * math.exp(float(self.hump_head(log_u)))
+        whole = rho * float(roots_of(self.law.heads.siphon, speed)) ** 8
+        upper = rho * float(roots_of(self.hump, speed)) ** 8
         full = (y[2] - y[3] + own - other - whole) / (rho * self.scene.tube.length)
         return min(float(full), (margin - upper) / (rho * self.upstream))
 
     def lift(self, y: Y, begun: float) -> float:
         """Acceleration of liquid that the gas has to lift to the crest's end first."""
         place = self.place(y, begun)
-        loss = self.law.density * math.exp(float(self.hump_head(math.log(max(y[1], 1e-12)))))
+        loss = self.law.density * float(roots_of(self.hump, max(y[1], 1e-12))) ** 8
         loss *= self.entrance + (1 - self.entrance) * place / self.span[1]
         out = max(1 - place / self.span[0], 0.0)
         height = (float(self.crest.column_pressure) - self.law.path.port_pressure) * out**2

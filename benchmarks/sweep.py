@@ -1,20 +1,29 @@
-"""A sweep against a loop of calibrations, its growth with its size, runs, and a thousand workers on paper.
+"""A sweep against a loop of calibrations and against runs, models against each other, and workers on paper.
 
-python benchmarks/sweep.py [DESIGNS]
+python benchmarks/sweep.py [DESIGNS]    prints what it measures; with --keep it is what the documents show
 """
 
 from __future__ import annotations
 
 import heapq
+import json
 import sys
 import time
 from collections.abc import Callable
+from datetime import date
 from functools import partial
+from pathlib import Path
+from typing import Any, Final
 
 import ringbalance as rb
 from ringbalance.design.work import CALL, bundle_size
 
-CALIBRATED = 20
+KEPT: Final = Path(__file__).parent / "sweep.json"
+SHOWN: Final = ("wall_pressure", "velocity")
+"""Of the quantities whose models are compared."""
+ON_PAPER: Final = (1000, 10_000, 100_000)
+"""Designs of a sweep by many workers."""
+CALIBRATED, CHECKED = 20, 12
 DRIVEN, RUNS = 20, 200
 """Designs that are run, and devices of each at most."""
 VARY = {"tube.bore": "0.7mm:2.5mm", "rotor.speed": "5000rpm:7000rpm", "gas.pressure": "0.5MPa:1MPa"}
@@ -40,28 +49,58 @@ def on_paper(workers: int, *, designs: int, each: float) -> float:
     return designs * each / (workers * max(free))
 
 
-def main(designs: int) -> None:
-    """Print times a design, and the ratios."""
+def measured(designs: int) -> dict[str, Any]:
+    """Processor time a design of each level, s; what rows leave out; errors and rates of the models."""
     scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
     small = rb.sweep(scene, VARY, sample=f"latin:{CALIBRATED}")
     scenes = [small.point_scene(row) for row in range(CALIBRATED)]
     rb.calibrate(scenes[0])
-    one = seconds(lambda: [rb.calibrate(each) for each in scenes]) / CALIBRATED
-    print(f"calibrate: {1e3 * one:.0f} ms each")
-    for intervals, sizes in ((False, (1, 4, 16, 64)), (True, (1, 4, 8))):
-        for count in (designs * size // 8 for size in sizes):
-            run = partial(rb.sweep, scene, VARY, sample=f"latin:{count}", intervals=intervals)
-            spent = seconds(run) / count
-            what = f"{count} designs, {'with' if intervals else 'without'} intervals"
-            print(f"{what}: {1e3 * spent:.2f} ms each, calibrate takes {one / spent:.0f} times as long")
+    spent = {"calibrate": seconds(lambda: [rb.calibrate(each) for each in scenes]) / CALIBRATED}
+    for name, intervals in (("static", False), ("intervals", True)):
+        run = partial(rb.sweep, scene, VARY, sample=f"latin:{designs}", intervals=intervals)
+        spent[name] = seconds(run) / designs
     ran = [seconds(partial(rb.objective, scene, point, runs=RUNS)) for point in small.points[:DRIVEN]]
-    each = sum(ran) / DRIVEN
-    print(f"up to {RUNS} devices each: {each:.2f} s, from {min(ran):.2f} to {max(ran):.2f} s")
-    for workers in (10, 100, 1000):
-        for count in (1000, 10_000, 100_000):
-            share = on_paper(workers, designs=count, each=each)
-            print(f"{workers} workers on paper, {count} designs with runs: {share:.0%} of their time is used")
+    (velocity,) = (
+        each
+        for each in rb.sweep(scene, VARY, sample=f"latin:{designs}", check=CHECKED).to_dict()["left_out"]
+        if each["quantity"] == "velocity"
+    )
+    trade, each = rb.trade(scene).to_dict(), sum(ran) / DRIVEN
+    return {
+        "date": date.today().isoformat(),
+        "designs": designs,
+        "runs": RUNS,
+        "checked": CHECKED,
+        "seconds": spent | {"runs": each, "call": CALL},
+        "workers": [
+            {"workers": workers, "used": [on_paper(workers, designs=count, each=each) for count in ON_PAPER]}
+            for workers in (10, 100, 1000)
+        ],
+        "on_paper": ON_PAPER,
+        "velocity": {name: velocity[name] for name in ("error", "uncertainty")},
+        "models": [
+            {
+                "quantity": study["title"].partition(",")[0],
+                "model": model["model"],
+                "error": model["error"],
+                "uncertainty": None if model["error"] else study["uncertainty"],
+                "designs_per_second": timed["designs_per_second"],
+            }
+            for study in trade["quantities"]
+            if study["quantity"] in SHOWN
+            for model, timed in zip(study["models"], trade["times"][study["quantity"]], strict=True)
+        ],
+    }
+
+
+def main(arguments: list[str]) -> None:
+    """Print, or keep, what is measured."""
+    numbers = [int(word) for word in arguments if word != "--keep"]
+    record = json.dumps(measured(*numbers or [1000]), indent=1) + "\n"
+    if "--keep" in arguments:
+        KEPT.write_text(record, encoding="utf-8")
+    print(record)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
+    main(sys.argv[1:])

@@ -1,6 +1,7 @@
 """Law, disc and controller for other programs: some four hundred numbers, and one source.
 
-`compact.py` makes the law's numbers, `point.py` answers one query from them, `disc.py` and `controller.py` go
+`compact.py` makes the numbers of the law, whose `pieces.point` answers one query from them, with `chamber.py`
+beside it; `disc.py` and `controller.py` go
 on in time, `blocks.py` has what a host sees, `translate.py` writes them in other languages; `hosts.py`
 and `fmu.py` put frames around them.
 """

@@ -17,11 +17,12 @@ from typing import Any, Final, Literal
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import controller, disc, point
+from ringbalance.export import chamber, controller, disc
 from ringbalance.export.compact import VELOCITIES, CompactLaw
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import FILLING, LAG
 from ringbalance.scene.faults import SceneError
@@ -50,6 +51,20 @@ class Variable:
     description: str
     range: Mapping[str, str]
     """Unit, minimum, maximum and nominal value, as far as its kind has them."""
+
+    @property
+    def bounds(self) -> str:
+        """Least and greatest value."""
+        if self.kind == "Boolean":
+            return "0 or 1"
+        return f"{float(self.range['min']):g} to {float(self.range['max']):g}"
+
+    @property
+    def explained(self) -> str:
+        """Side, unit, bounds and meaning, in a line."""
+        unit = self.range.get("unit", "1")
+        of_unit = "" if unit == "1" else f"{unit}, "
+        return f"{'in' if self.input else 'out'}, {of_unit}{self.bounds}: {self.description}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +125,7 @@ def law_block(law: CompactLaw) -> Block:
         constants=law.constants,
         pieces=law.pieces,
         start=tuple(row),
-        modules=(point,),
+        modules=(point, chamber),
         steps="answer_all",
         timed=False,
         variables=_variables("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
@@ -159,7 +174,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
         constants=tuple(constants),
         pieces=compact.pieces,
         start=tuple(row),
-        modules=(point, disc),
+        modules=(point, chamber, disc),
         steps="step",
         timed=True,
         variables=_variables("disc", place, most=law.max_fill_ratio, chambers=scene.disc.chambers),
@@ -213,8 +228,12 @@ def controller_block(scene: Scene) -> Block:
     """
     kind = scene.controller.kind
     if kind != "target_vector":
-        problem = f"the controller {kind!r} is not exported"
-        raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
+        problem = f"the controller {kind!r} runs in this program alone and is not exported"
+        allowed = (
+            'controller.kind = "target_vector", with the settings that `ringbalance tune` names as the '
+            "best of that kind"
+        )
+        raise SceneError.of_file(scene.file, problem, allowed)
     chambers = scene.disc.chambers
 
     def place(offset: str, chamber: int | None) -> int:
@@ -259,11 +278,12 @@ def _settings(scene: Scene) -> Numbers:
 
 def declared_units() -> Mapping[str, Mapping[str, str]]:
     """Units of all blocks' variables in base units, as FMI has them."""
-    units: Mapping[str, Mapping[str, str]] = _declared()["units"]
+    units: Mapping[str, Mapping[str, str]] = declared()["units"]
     return units
 
 
-def _declared() -> dict[str, Any]:
+def declared() -> dict[str, Any]:
+    """Variables of each kind of block, `MOST` for the largest fill ratio and `#` for a chamber, and units."""
     return tomllib.loads(
         files("ringbalance.export").joinpath("templates/variables.toml").read_text(encoding="utf-8")
     )
@@ -274,13 +294,13 @@ def _variables(
 ) -> tuple[Variable, ...]:
     """As declared. Args: `place`: of an offset's name, and of a chamber where each has one."""
     found = []
-    for each in _declared()[kind]:
+    for each in declared()[kind]:
         heads = {**each, "input": each.get("input", False)}
         heads["range"] = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
         heads["description"] = each["description"].replace("MOST", number_text(most))
         letters = chamber_letters(chambers) if "#" in each["name"] else (None,)
-        for chamber, letter in enumerate(letters):
+        for number, letter in enumerate(letters):
             texts = {key: heads[key].replace("#", letter or "") for key in ("name", "description")}
-            at = place(each["place"], chamber if letter else None)
+            at = place(each["place"], number if letter else None)
             found.append(Variable(**{**heads, **texts, "name": texts["name"].lower(), "place": at}))
     return tuple(found)

@@ -9,18 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from ringbalance.export import point
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tables import HermiteTable
-from ringbalance.reduced_model.tube.regime import CLEARING, TubePath
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, carried_by
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.table import Table
+from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -43,10 +45,10 @@ _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
 _SAMPLES: Final = 2001
+_SHARES: Final = ((SHARE, 3), (BACK_SHARE, 2))
+"""Column of a share there and back, and the degree of its pieces."""
 _CELLS: Final = 8
 """Of equal length, each of which knows at which piece to begin looking."""
-_EDGE: Final = 1e-9
-"""Of a cell, by which rounding may not lead before the first."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""
 
@@ -132,16 +134,22 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    builder = _Builder(numbers=[0.0] * point.PLACES, rows=[])
-    missed = _add_tube(builder, law)
-    level_error = _add_levels(builder, law)
-    _add_chamber(builder, scene, law)
-    for at, value in _scalars(law, missed).items():
-        builder.numbers[at] = float(value)
+    tables = law.heads.tables
+    rows = LawRows.of(len(tables), cells=_CELLS)
+    missed = max(_add_way(rows, law, way, table) for way, table in enumerate(tables))
+    level_error = _add_levels(rows, law)
+    _add_chamber(rows, scene, law)
+    error = _AT_CREST * missed + law.heads.interpolation_error
+    scalars = law.scalars() | {
+        point.TABULATION: error**2,
+        point.LOWEST: VELOCITIES[0],
+        point.HIGHEST: VELOCITIES[1],
+    }
+    numbers, pieces = rows.arrays(scalars)
     made = CompactLaw(
         scene=scene.file,
-        constants=tuple(builder.numbers),
-        pieces=tuple(map(tuple, builder.rows)),
+        constants=tuple(numbers.tolist()),
+        pieces=tuple(map(tuple, pieces.tolist())),
         head_error=missed,
         level_error=level_error,
     )
@@ -150,48 +158,14 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
 
 def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
     """Over fills of both chambers, pressures of six decades and both states of the tube."""
-    drawn, top = np.random.default_rng(0), law.max_fill_ratio
-    fill, opposite = drawn.uniform(0.0, top, (2, _DRAWN))
-    pressure, worst = 10 ** drawn.uniform(2, 8, _DRAWN), 0.0
-    for primed in (False, True):
-        right = law.evaluate(
-            fill_ratio=fill, opposite_fill_ratio=opposite, gas_pressure=pressure, primed=primed
-        ).velocity
-        for at in np.flatnonzero((np.abs(right) > VELOCITIES[0]) & (np.abs(right) < VELOCITIES[1])):
-            answer = made.answer(
-                fill_ratio=float(fill[at]),
-                opposite_fill_ratio=float(opposite[at]),
-                gas_pressure=float(pressure[at]),
-                primed=primed,
-            )
-            worst = max(worst, abs(answer.velocity / float(right[at]) - 1.0))
+    drawn, worst = np.random.default_rng(0), 0.0
+    fills, pressures = drawn.uniform(0.0, law.max_fill_ratio, (_DRAWN, 2)), 10 ** drawn.uniform(2, 8, _DRAWN)
+    for at, ((fill, opposite), pressure) in enumerate(zip(fills.tolist(), pressures.tolist(), strict=True)):
+        asked = {"fill_ratio": fill, "opposite_fill_ratio": opposite, "gas_pressure": pressure}
+        right = float(law.evaluate(**asked, primed=at % 2 > 0).velocity)
+        if VELOCITIES[0] < abs(right) < VELOCITIES[1]:
+            worst = max(worst, abs(made.answer(**asked, primed=at % 2 > 0).velocity / right - 1.0))
     return worst
-
-
-def _scalars(law: CalibratedLaw, missed: float) -> dict[int, float]:
-    path, inputs = law.path, law.inputs
-    by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
-    return {
-        point.LARGEST_FILL: law.max_fill_ratio,
-        point.AMBIENT: law.ambient_pressure,
-        point.GAS_FACTOR: law.gas_factor,
-        point.PORT: path.port_pressure,
-        point.CREST: path.crest,
-        point.COLUMN: path.column_pressure,
-        point.TRAPPED: path.trapped,
-        point.VAPOUR: path.vapour_pressure,
-        point.RELEASED: path.released,
-        point.CAVITY_KNOWN: path.cavity_fitted,
-        point.OF_DENSITY: by_density,
-        point.OF_BLOWN: by_density + inputs.relative_gas_pressure**2,
-        point.OF_SPEED: by_speed,
-        point.OF_GAS: inputs.relative_gas_pressure**2,
-        point.OF_CREST: inputs.hump_pressure**2 + inputs.vapour_pressure**2,
-        point.OF_LIQUID: by_density + by_speed,
-        point.TABULATION: (_AT_CREST * missed) ** 2,
-        point.LOWEST: VELOCITIES[0],
-        point.HIGHEST: VELOCITIES[1],
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,57 +195,35 @@ class _Column:
         t = (x[inside] - x[last]) / (x[last] - x[first])
         return np.asarray(polyval(t, self.polynomial(x, first, last)) - self.value[inside])
 
-    def largest(self, x: FloatArray, ends: list[int], of: FloatArray | float = 1.0) -> float:
+    def largest(self, x: FloatArray, ends: IntArray, of: FloatArray | float = 1.0) -> float:
         """Error of all pieces. Args: `of`: what it is relative to, at the samples."""
-        scale = np.broadcast_to(of, x.shape)
-        return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairwise(ends))
+        scale, pairs = np.broadcast_to(of, x.shape), pairwise(ends.tolist())
+        return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
+
+    def pieces(self, x: FloatArray, ends: IntArray) -> FloatArray:
+        """Coefficients in powers of x - end, shape (degree + 1, pieces)."""
+        found = [self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())]
+        return np.transpose(found) / np.diff(x[ends]) ** np.arange(self.degree + 1)[:, None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Builder:
-    """The law's numbers and pieces, as far as they are."""
-
-    numbers: list[float]
-    rows: list[list[float]]
-
-    def add(self, x: FloatArray, ends: list[int], columns: Sequence[_Column], *, ended: bool = True) -> None:
-        """Pieces in powers of the distance from their ends, and these before them if they are asked for."""
-        for first, last in pairwise(ends if columns else ()):
-            row = [float(x[last])] if ended else []
-            for column in columns:
-                powers = (x[last] - x[first]) ** np.arange(column.degree + 1)
-                row += (column.polynomial(x, first, last) / powers).tolist()
-            self.rows.append([*row, *[0.0] * (point.WIDTH_SLOPE + 1 - len(row))])
-
-    def add_cells(self, x: FloatArray, ends: list[int]) -> tuple[float, float]:
-        """Cells for the pieces that are added next. Returns: cells for one of x, and the place of x = 0."""
-        scale = _CELLS / (x[-1] - x[0])
-        place = len(self.numbers)
-        for edge in np.linspace(x[0], x[-1], _CELLS + 1)[:-1]:
-            self.numbers.append(float(len(self.rows) + np.searchsorted(x[ends[1:]], edge, side="right")))
-        self.numbers.append(float(len(self.rows) + len(ends) - 2))
-        return float(scale), float(place - x[0] * scale + _EDGE)
-
-
-def _add_levels(builder: _Builder, law: CalibratedLaw) -> float:
+def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
     """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
-    table = law.hydrostatic_pressure
-    # Every node of the law's table is a sample, so that a table with few nodes is met exactly.
-    parts = max(1, round(_SAMPLES / (table.value.size - 1)))
-    x = np.linspace(0.0, law.max_fill_ratio, parts * (table.value.size - 1) + 1)
-    slowest = float(np.exp(law.heads.head(np.log(VELOCITIES[0])))) * law.density
-    level = _Column(value=table(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    # Every knot of the law's table is a sample, so that a table with few knots is met exactly.
+    pieces = law.levels.knots.size - 1
+    x = np.linspace(0.0, law.max_fill_ratio, max(1, round(_SAMPLES / pieces)) * pieces + 1)
+    slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
+    level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
-    while len(ends := _ends(x, [level, width])) > _MOST_LEVELS + 1:
+    while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
     error = level.largest(x, ends)
-    cells = builder.add_cells(x, ends)
-    builder.numbers[point.LEVEL_SCALE], builder.numbers[point.LEVEL_CELLS] = cells
-    builder.add(x, ends, [level, replace(width, value=np.hypot(width.value, error))])
+    rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = rows.add_cells(x[ends])
+    widened = replace(width, value=np.hypot(width.value, error))
+    rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
     return error
 
 
-def _add_chamber(builder: _Builder, scene: Scene, law: CalibratedLaw) -> None:
+def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
     x = np.linspace(0.0, law.max_fill_ratio, _SAMPLES)
     columns = []
@@ -280,66 +232,36 @@ def _add_chamber(builder: _Builder, scene: Scene, law: CalibratedLaw) -> None:
         columns.append(_Column(value=value, allowed=allowed, degree=2))
     columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
-    cells = builder.add_cells(x, ends)
-    builder.numbers[point.CHAMBER_SCALE], builder.numbers[point.CHAMBER_CELLS] = cells
-    builder.add(x, ends, columns)
+    rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
+    rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
-def _add_tube(builder: _Builder, law: CalibratedLaw) -> float:
-    """Velocities over pressures. Returns: their largest relative error."""
-    heads, log_u = law.heads, np.log(np.geomspace(*VELOCITIES, _SAMPLES))
-    ways = [way for way in (heads.hump_head, heads.return_hump_head) if way is not None]
-    if len(ways) == 2 and np.array_equal(ways[0].value, ways[1].value):
-        del ways[1]
-    builder.numbers[point.WAY_BACK] = float(len(ways))
-    builder.rows.extend([] for _ in range(1 + len(ways)))
-    beside = [_share(heads.head, way, log_u, degree=3 - at) for at, way in enumerate(ways)]
-    if ways:
-        beside.insert(1, _half_width(np.hypot(heads.fraction_uncertainty(log_u), _OF_SHARE)))
-    columns = _velocities(law, heads.head, heads.uncertainty(log_u), log_u)
-    missed = [_add_velocities(builder, point.SIPHON, *columns, beside)]
-    for at, way in enumerate(ways, start=point.THERE):
-        columns = _velocities(law, way, heads.hump_uncertainty(log_u), log_u)
-        missed.append(_add_velocities(builder, at, *columns))
-        builder.rows[at] += [*law.path.clearing_velocities, *_carried(law.path)]
-    return max(missed)
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float:
+    """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
+    slowest, fastest = roots_of(table, VELOCITIES)
+    s, density = np.geomspace(slowest, fastest, _SAMPLES), law.density
+    x, value = density**0.125 * s, table.quintic(s) / density**0.5
+    ratio = _Column(value=value, allowed=_OF_HEADS * value)
+    loss = _half_width(table.straight(s, LOSS) ** 2)
+    beside = _shares(table, s) if way == point.SIPHON else []
+    ends = _ends(x, [ratio, loss, *beside])
+    more = (*law.path.clearing_velocities, *carried_by(law.path)) if way else (ends.size - 1,)
+    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
+    if beside:
+        rows.add(*(each.pieces(x, ends) for each in beside))
+    return ratio.largest(x, ends, of=value)
 
 
-def _carried(path: TubePath) -> tuple[float, float]:
-    """Factor of the velocity, and what is taken from it, for how far it carries gas out."""
-    low, high = CLEARING
-    froude = path.froude_velocity * (high - low)
-    return (1.0 / froude, low / (high - low)) if froude else (0.0, -1.0)
+def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
+    """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
+    found = [_share(table.cubic(s, at), degree) for at, degree in _SHARES if at < table.count]
+    if found:
+        found.insert(1, _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)))
+    return found
 
 
-def _velocities(
-    law: CalibratedLaw, head: HermiteTable, loss: FloatArray, log_u: FloatArray
-) -> tuple[FloatArray, list[_Column]]:
-    """Eighth root of the pressure; velocity over its square root, and squared half-width of the loss."""
-    log_pressure = head(log_u) + np.log(law.density)
-    ratio = np.exp(log_u - log_pressure / 2)
-    return np.exp(log_pressure / 8), [_Column(value=ratio, allowed=_OF_HEADS * ratio), _half_width(loss**2)]
-
-
-def _add_velocities(
-    builder: _Builder, way: int, x: FloatArray, columns: list[_Column], beside: Sequence[_Column] = ()
-) -> float:
-    """Pieces of one way with those beside them, and its own row. Returns: their largest relative error."""
-    ends = _ends(x, [*columns, *beside])
-    scale, cells = builder.add_cells(x, ends)
-    builder.add(x, ends, columns)
-    builder.add(x, ends, beside, ended=False)
-    lowest, ratio = float(x[0]), columns[0]
-    builder.rows[way] = [lowest**8, float(ratio.value[0]) / lowest**4, float(x[-1]), scale, cells]
-    if way == point.SIPHON:
-        builder.rows[way] += [float(len(ends) - 1), 0.0, 0.0, 0.0]
-    return ratio.largest(x, ends, of=ratio.value)
-
-
-def _share(head: HermiteTable, way: HermiteTable, log_u: FloatArray, *, degree: int) -> _Column:
-    """Part of the pressure that is lost up to the crest."""
-    share = np.exp(way(log_u) - head(log_u))
-    return _Column(value=share, allowed=_OF_SHARE * share, degree=degree)
+def _share(value: FloatArray, degree: int) -> _Column:
+    return _Column(value=value, allowed=_OF_SHARE * value, degree=degree)
 
 
 def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
@@ -347,7 +269,7 @@ def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
     return _Column(value=value, allowed=allowed, degree=1)
 
 
-def _ends(x: FloatArray, columns: Sequence[_Column]) -> list[int]:
+def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:
     """Samples at which pieces meet, each piece as long as its errors allow, and those at both ends."""
 
     def fits(first: int, last: int) -> bool:
@@ -359,8 +281,8 @@ def _ends(x: FloatArray, columns: Sequence[_Column]) -> list[int]:
 
     ends = [0]
     while ends[-1] < x.size - 1:
-        ends.append(_furthest(lambda last: fits(ends[-1], last), ends[-1] + 1, x.size - 1))
-    return ends
+        ends.append(_furthest(partial(fits, ends[-1]), ends[-1] + 1, x.size - 1))
+    return np.array(ends)
 
 
 def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:

@@ -8,7 +8,7 @@ waits for the longest of these and one period more.  Source: `controller.algorit
 
 from math import sqrt
 
-from ringbalance.export.point import Law, Query, larger, smaller
+from ringbalance.reduced_model.pieces.point import Law, Query, larger, smaller
 
 # fmt: off
 # Settings; of each chamber its direction, twice, so that what follows the last is the first, and its offset.

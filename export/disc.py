@@ -9,7 +9,8 @@ Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and nam
 
 from math import sqrt
 
-from ringbalance.export.point import (
+from ringbalance.export.chamber import moment
+from ringbalance.reduced_model.pieces.point import (
     AMBIENT,
     BLOCK,
     BLOCKED,
@@ -26,7 +27,6 @@ from ringbalance.export.point import (
     Pieces,
     Query,
     larger,
-    moment,
     set_answer,
     set_levels,
     smaller,

@@ -33,10 +33,14 @@ def c_files(block: Block, name: str) -> dict[str, str]:
 def block_c_files(block: Block, name: str) -> dict[str, str]:
     """The same with the names that all blocks have."""
     upper = name.upper()
-    places = [f"    {upper}_{each.name.upper()} = {each.place}" for each in block.variables]
+    last = block.variables[-1]
+    places = [
+        f"    {upper}_{each.name.upper()} = {each.place}{',' * (each is not last)} /* {each.explained} */"
+        for each in block.variables
+    ]
     run = f"{block.steps}({_rows(block)}, s->w{', time' if block.timed else ''});"
     source = filled("block_c", block, name, head=_head(block, name), run=run)
-    header = filled("block_h", block, name, places=",\n".join(places))
+    header = filled("block_h", block, name, places="\n".join(places))
     return {f"{name}.h": header, f"{name}.c": source}
 
 
@@ -79,8 +83,7 @@ def _sides(block: Block) -> tuple[list[Variable], list[Variable]]:
 
 
 def _st_declared(each: Variable) -> str:
-    unit = f", {each.range['unit']}" if "unit" in each.range else ""
-    return f"    {each.name} : {_ST_TYPES[each.kind]}; (* {each.description}{unit} *)"
+    return f"    {each.name} : {_ST_TYPES[each.kind]}; (* {each.explained} *)"
 
 
 def _st_set(each: Variable) -> str:
@@ -102,7 +105,9 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     source = python_functions(block.source(("answer", *_OF_CHAMBER) if law else ()))
     if law:
         return {f"{name}.py": filled("python", block, name, source=source)}
-    inputs, outputs = ("\n".join(f'    "{v.name}": {v.place},' for v in side) for side in _sides(block))
+    inputs, outputs = (
+        "\n".join(f'    "{v.name}": {v.place},  # {v.explained}' for v in side) for side in _sides(block)
+    )
     run = f"{block.steps}({_rows(block)}, self.w, time)"
     text = filled(
         "block_python", block, name, source=source, inputs=inputs, outputs=outputs, run=run, kind=block.kind

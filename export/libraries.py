@@ -14,10 +14,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
+from ringbalance.scene.platform.display import announced
+
 Version = Literal["fmi2", "fmi3"]
 EXTRA: Final = "export-all"
 """Of the project, with the cross-compiler."""
-_OPTIONS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+_OPTIONS: Final = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 _SUFFIXES: Final = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 _SYSTEMS: Final = {"linux": "linux-gnu.2.17", "darwin": "macos", "windows": "windows-gnu"}
 """As the cross-compiler calls them; the oldest C library that it links for is that of 2012."""
@@ -35,7 +37,7 @@ def local_library(sources: Mapping[str, str], name: str, version: Version) -> di
     if compiler is None or place is None:
         return {}
     try:
-        return {place: _compiled([compiler], sources, Path(place).name)}
+        return {place: _compiled([compiler, "-O2"], sources, Path(place).name)}
     except OSError:
         return {}
 
@@ -43,15 +45,19 @@ def local_library(sources: Mapping[str, str], name: str, version: Version) -> di
 def every_library(sources: Mapping[str, str], name: str, version: Version) -> dict[str, bytes]:
     """For Linux, macOS and Windows on both processors, as far as the standard names them.
 
+    The cross-compiler compiles the C library of each system with what it is asked for, and keeps all in its
+    own cache: seconds for Linux and macOS, a minute of processor time and more for Windows, once.
+
     Raises: OSError: the cross-compiler fails.
     """
+    asked = [(system, processor) for system in _SYSTEMS for processor in _PROCESSORS]
+    places = {each: place for each in asked if (place := _place(version, name, *each))}
     made = {}
-    for system in _SYSTEMS:
-        for processor in _PROCESSORS:
-            if place := _place(version, name, system, processor):
-                target = f"{processor}-{_SYSTEMS[system]}"
-                compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
-                made[place] = _compiled(compiler, sources, Path(place).name)
+    for done, ((system, processor), place) in enumerate(places.items(), start=1):
+        with announced(f"compiling for {system} on {processor}, {done} of {len(places)} (minutes, once) ..."):
+            target = f"{processor}-{_SYSTEMS[system]}"
+            compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s", "-Os"]
+            made[place] = _compiled(compiler, sources, Path(place).name)
     return made
 
 

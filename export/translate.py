@@ -112,6 +112,8 @@ def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
 
 def _function(node: ast.FunctionDef) -> Function:
     documented = ast.get_docstring(node) or ""
+    # What marks a function for the program's own compiled code is nothing to another host.
+    node.decorator_list = []
     return Function(
         name=node.name,
         summary=documented.split("\n")[0],

@@ -22,8 +22,9 @@ from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import at_rest
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray

@@ -14,7 +14,6 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.device import Device
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import with_values_at
@@ -85,35 +84,12 @@ def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> fl
     return abs(float(flow.velocity)) or 1.0
 
 
-def _power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
-    """Heads in proportion to a power of the velocity, those of the law at one velocity, m/s."""
-    heads = law.heads
-    near, far = heads.hump_head, heads.return_hump_head
-    return replace(
-        law,
-        heads=replace(
-            heads,
-            head=_straight(heads.head, velocity, exponent),
-            hump_head=None if near is None else _straight(near, velocity, exponent),
-            return_hump_head=None if far is None else _straight(far, velocity, exponent),
-        ),
-    )
-
-
-def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteTable:
-    nodes: FloatArray = table.nodes
-    at = float(np.clip(np.log(velocity), nodes[0], nodes[-1]))
-    value = table(at) + exponent * (nodes - at)
-    return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value)
-
-
 def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
     """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
     if name in _EXPONENTS:
-        return _power_of(law, velocity, _EXPONENTS[name])
+        return replace(law, heads=law.heads.power(velocity=velocity, exponent=_EXPONENTS[name]))
     if name == UNBROKEN:
-        heads = replace(law.heads, hump_head=None, return_hump_head=None)
-        return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)
+        return replace(law, path=replace(law.path, hump_pressure=None))
     if name == BROKEN:
         return replace(law, path=replace(law.path, vapour_pressure=0.0, released=0.0))
     if name == _UNSPILT:

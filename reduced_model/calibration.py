@@ -15,9 +15,10 @@ from ringbalance.reduced_model.chamber.contributions import AsynchronousInstabil
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.gas_line import line_answers
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel
+from ringbalance.reduced_model.law.making import calibrated_law
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid
@@ -59,7 +60,7 @@ def calibrate(scene: AnyScene) -> Calibration:
             "finite_element_solves": float(chamber.check.solves),
             "unknowns": float(chamber.statistics.unknowns),
             "relative_residual": chamber.statistics.relative_residual,
-            "tube_table_nodes": float(heads.head.value.size),
+            "tube_table_nodes": float(heads.siphon.knots.size),
             "tube_table_error": heads.interpolation_error,
             "wall_pressure_table_error_Pa": float(np.max(chamber.wall_pressure.interpolation)),
             "hydrostatic_pressure_table_error_Pa": float(np.max(chamber.hydrostatic_pressure.interpolation)),

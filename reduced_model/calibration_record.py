@@ -18,14 +18,13 @@ from ringbalance.reduced_model.chamber.contributions import AsynchronousInstabil
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.gas_line import LineAnswer
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.calibrated_law import WIDTH, CalibratedLaw, DriveUncertainty
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.pressure_profile import HumpProfile, TubeLiquid
 from ringbalance.reduced_model.residual_liquid import Holding, ResidualLiquid
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.reduced_model.tube import regime
-from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.regime import TubeEnds, gas_over_crest, possible_cavity, stall_pressure
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
@@ -300,15 +299,14 @@ def _crest_part(law: CalibratedLaw, point: OperatingPoint, ends: TubeEnds, margi
 
 def _law_without_inputs(scene: Scene, calibration: Calibration) -> CalibratedLaw:
     """The law with the uncertainties of numerics and models alone."""
-    chamber, law, point = calibration.chamber, calibration.flow_law, calibration.operating_point
+    chamber, law = calibration.chamber, calibration.flow_law
+    width = chamber.hydrostatic_pressure.half_widths(inputs=np.zeros_like(chamber.fill_ratio))
     return replace(
         law,
-        heads=law.heads.without_inputs(scene=scene, velocity=point.loss_velocity or 1.0),
+        heads=law.heads.without_inputs(scene=scene),
         inputs=DriveUncertainty(),
         variants=(),
-        hydrostatic_pressure_uncertainty=chamber.hydrostatic_pressure.uncertainty_table(
-            inputs=np.zeros_like(chamber.fill_ratio)
-        ),
+        levels=law.levels.with_column(WIDTH, width),
     )
 
 

@@ -18,6 +18,7 @@ from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.tube.flow import column_pressure, column_radius
+from ringbalance.reduced_model.tube.heads import roots_of
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_middle,
@@ -163,13 +164,13 @@ def _profile(
 
 def _pressure_over_crest(law: CalibratedLaw, ends: TubeEnds, reverse: bool, velocity: float) -> float | None:
     """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
-    head = law.heads.to_crest(reverse=reverse)
-    if head is None or velocity == 0:
+    way = law.heads.to_crest(reverse=reverse)
+    if way is None or velocity == 0:
         return None
-    log_u, driving = np.log(velocity), driving_pressure(law.path, ends)
-    if law.density * float(np.exp(law.heads.head(log_u))) > driving * (1 - 1e-9):
+    whole, part = (law.density * float(roots_of(table, velocity)) ** 8 for table in (law.heads.siphon, way))
+    if whole > driving_pressure(law.path, ends) * (1 - 1e-9):
         return None
-    return float(resting_pressure(law.path, ends) - law.density * np.exp(head(log_u)))
+    return float(resting_pressure(law.path, ends)) - part
 
 
 def _flowing(

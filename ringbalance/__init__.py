@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
+    from ringbalance.scene.platform.progress_line import ProgressLine as ProgressLine
     from ringbalance.studies import Fit as Fit
     from ringbalance.studies import extremes as extremes
     from ringbalance.studies import fit as fit
@@ -123,6 +124,7 @@ _NAMES = {
         "MomentCurve",
         "Regime",
     ),
+    "scene.platform.progress_line": ("ProgressLine",),
     "scene": (
         "Scene",
         "SceneError",

@@ -25,7 +25,7 @@ from ringbalance.scene.narrowing import AnyScene, Kind, scene_as
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
 from ringbalance.scene.toml import toml_bytes, toml_text
 from ringbalance.scene.uncertain import NORMAL_95
-from ringbalance.scene.units import DIMENSIONS, plain_number
+from ringbalance.scene.units import DIMENSIONS, plain_number, written_like
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")
 """Paths on which a mesh, or the meshing of a solid, depends."""
@@ -216,7 +216,7 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
             schema.tables[path].keys if path in schema.tables else keys[name].takes if name in keys else None
         )
         value, deviation = _plain(value, takes)
-        content[name] = _written(value, takes)
+        content[name] = _written(value, takes, like=content.get(name))
         if deviation:
             width = _written(NORMAL_95 * deviation, takes)
             _place(document, f"uncertainty.{name}", width, schema=schema, origin=origin)
@@ -244,8 +244,11 @@ def _plain(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> tu
         return str(value), 0.0
 
 
-def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> Any:
-    """A value as a scene file would have it: a number for a quantity with a unit is one in SI."""
+def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None, *, like: object = None) -> Any:
+    """A value as a scene file would have it: a number for a quantity with a unit is one in SI.
+
+    Args: `like`: what stands there now; its unit is kept.
+    """
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
         keys = takes.keys if isinstance(takes, Entries) else takes if isinstance(takes, Mapping) else {}
@@ -257,4 +260,4 @@ def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> 
     dimension = takes.dimension if isinstance(takes, Reader) else None
     if dimension is None or isinstance(value, bool) or not isinstance(value, int | float):
         return value
-    return f"{value!r} {DIMENSIONS[dimension].si_unit}"
+    return written_like(value, like, dimension)

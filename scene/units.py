@@ -165,6 +165,34 @@ def _parsed_text(text: str, dimension: str) -> float:
     return _parsed(text, dimension)
 
 
+def written_like(value: float, like: object, dimension: str) -> str:
+    """An SI value to its last bit, in the unit of the text that stands for another one.
+
+    In SI where there is no such text, its unit does not give the value back, or that saves many digits.
+    """
+    kind = DIMENSIONS[dimension]
+    in_si = f"{value!r} {kind.si_unit}"
+    unit = _unit_of(like, dimension) if isinstance(like, str) else ""
+    if not unit or not abs(value) <= kind.largest:
+        return in_si
+    entry = kind.units[_canonical(unit)]
+    number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
+    texts = (f"{number:.{digits}g} {unit}" for digits in (15, 16, 17))
+    text = next((each for each in texts if parse_quantity(each, dimension) == value), in_si)
+    return in_si if len(in_si) + _SAVED <= len(text) else text
+
+
+@lru_cache(1024)
+def _unit_of(text: str, dimension: str) -> str:
+    """As the text has it; empty where it is no quantity of this dimension."""
+    kind = DIMENSIONS[dimension]
+    try:
+        unit = _split(text, kind)[1]
+    except FieldError:
+        return ""
+    return unit if _canonical(unit) in kind.units else ""
+
+
 def parse_number(text: str) -> float:
     """Read a number that stands without a unit, such as a cell of a table.
 

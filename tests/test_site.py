@@ -173,3 +173,12 @@ def test_a_browser_asks_for_nothing(site: Path, tmp_path: Path) -> None:
     leaking = tmp_path / "leaking.html"
     leaking.write_text('<img src="https://example.org/a.png">', encoding="utf-8")
     assert "https://example.org/a.png" in requested(leaking, tmp_path)
+
+
+def test_an_equation_within_a_line_stands_on_its_line(site: Path) -> None:
+    page = (site / "docs" / "how-it-works.html").read_text(encoding="utf-8")
+    depths = [float(depth) for depth in re.findall(r'<svg style="vertical-align: (-?[\d.]+)px"', page)]
+    assert len(depths) > 20
+    # Of r at least the margin of the picture; of a fraction the lower half of it.
+    assert max(depths) <= -1.0
+    assert min(depths) < -5.0

@@ -15,9 +15,11 @@ from typing import Any, Final
 
 import scene_reference
 from api_page import name_reference
+from benchmark_tables import kept, levels_table, markdown, models_table, workers_table
 from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
+from ringbalance.export.blocks import declared
 from ringbalance.identification.kinds.kind import Kind
 from ringbalance.identification.reading import KINDS
 from ringbalance.reports.prose import equations as report_equations
@@ -36,7 +38,7 @@ _PLACE: Final = re.compile(r"\{(\w+)[^}]*\}")
 
 def kind_table(*balancers: str) -> str:
     """Kinds of measurement that scenes of some balancers predict, or of test benches, and their columns."""
-    return _markdown(
+    return markdown(
         ("kind", "what it is", "measured", "further columns"),
         [
             (
@@ -66,17 +68,12 @@ def _explained(kind: Kind, *, measured: bool) -> list[str]:
 def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
     """What stands behind each quantity, by the documents of the cases; heavy ones count as kept."""
     kept = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
-    return _markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
-
-
-def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    return markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
 
 
 def finding_table() -> str:
     """Codes of findings, with what stands under them."""
-    return _markdown(
+    return markdown(
         ("code", "severity", "values", "sentence"),
         [
             (
@@ -86,6 +83,27 @@ def finding_table() -> str:
                 _PLACE.sub(r"*\1*", each.text),
             )
             for code, each in sentences().items()
+        ],
+    )
+
+
+def block_table() -> str:
+    """Variables of the blocks that are exported."""
+    heads = ("block", "variable", "side", "unit", "from", "to", "meaning")
+    return markdown(
+        heads,
+        [
+            (
+                f"`{kind}`",
+                f"`{each['name'].replace('#', 'a')}`" + (", ..." if "#" in each["name"] else ""),
+                "in" if each.get("input") else "out",
+                each["range"].get("unit", "-"),
+                each["range"].get("min", "0"),
+                each["range"].get("max", "1").replace("MOST", "largest"),
+                each["description"].replace("#", "A").replace("MOST", "the largest fill ratio"),
+            )
+            for kind in ("law", "disc", "controller")
+            for each in declared()[kind]
         ],
     )
 
@@ -106,7 +124,10 @@ PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
         "docs/measurements.md": lambda: {"kinds": kind_table("")},
         "docs/fit.md": lambda: {"fit_kinds": kind_table("liquid_ring", "eccentric_mass")},
         "docs/findings.md": lambda: {"findings": finding_table()},
+        "docs/export.md": lambda: {"block_variables": block_table()},
         "docs/is-k-50-right.md": document_tables,
+        "docs/how-to-choose.md": lambda: {"models": models_table(kept()), "levels": levels_table(kept())},
+        "docs/clusters.md": lambda: {"workers": workers_table(kept())},
         "docs/standing.md": lambda: {"standing": standing_table(_documents())},
     }
 )

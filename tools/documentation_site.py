@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from docutils import nodes
 from sphinx.application import Sphinx
-from typesetting import typeset
+from typesetting import typeset, typeset_inline
 
 LIST_OF_PAGES: Final = "docs/README"
 _SECTION: Final = re.compile(r"^## (.+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
@@ -36,7 +36,7 @@ def add_order(app: Sphinx, docname: str, source: list[str]) -> None:
 
 def inline_math(self: Any, node: nodes.math) -> None:
     """An equation within a line."""
-    self.body.append(f'<span class="math">{typeset(node.astext())}</span>')
+    self.body.append(f'<span class="math">{typeset_inline(node.astext())}</span>')
     raise nodes.SkipNode
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from benchmark_tables import markdown
 
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import calibrate
@@ -35,16 +36,11 @@ def document_tables() -> dict[str, str]:
     }
 
 
-def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    lines = [heads, tuple("---" for _ in heads), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
-
-
 def _liquids_table(liquids: list[Record]) -> str:
     """One row a liquid."""
     heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
     more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
-    return _table((*heads, *more), [tuple(_liquid_cells(record)) for record in liquids])
+    return markdown((*heads, *more), [tuple(_liquid_cells(record)) for record in liquids])
 
 
 _LIQUID_HEADS: Final = (
@@ -80,7 +76,7 @@ def _bores_table(calibration: Calibration) -> str:
     for i, viscosity in enumerate(_VISCOSITIES):
         middle, low, high = (column[i] for column in columns)
         rows.append((shown(viscosity, "m^2/s", digits=2), _bore(middle), f"{_bore(low)} to {_bore(high)}"))
-    return _table(("viscosity", "k = 50 at a bore of", "within its uncertainty from"), rows)
+    return markdown(("viscosity", "k = 50 at a bore of", "within its uncertainty from"), rows)
 
 
 def rule(calibration: Calibration) -> str:
@@ -127,4 +123,4 @@ def _hidden_table(velocity_of_50: float, calibration: Calibration) -> str:
                 percent(float(error), signed=True, digits=2),
             )
         )
-    return _table(("velocity", "gas", "k of the tube", "Eq. 18 reads", "Eq. 19 is off by"), rows)
+    return markdown(("velocity", "gas", "k of the tube", "Eq. 18 reads", "Eq. 19 is off by"), rows)

@@ -10,13 +10,27 @@ with warnings.catch_warnings():
     from ziamath.zmath import Latex
 
 
+_MARGIN = 1.0
+"""px of the picture around what is set."""
+
+
 def typeset(latex: str) -> str:
     """One equation as an SVG document in the current text colour, 16 px high.
 
     Raises: ValueError: LaTeX that cannot be set.
     """
+    return _set(latex).svg()
+
+
+def typeset_inline(latex: str) -> str:
+    """One equation as `typeset` has it, with its base line on that of the text around it."""
+    depth = _set(latex).getyofst() - _MARGIN
+    return typeset(latex).replace("<svg ", f'<svg style="vertical-align: {depth:.2f}px" ', 1)
+
+
+def _set(latex: str) -> Latex:
     try:
-        return Latex(latex, size=16, color="currentColor").svg()
+        return Latex(latex, size=16, color="currentColor")
     # The library has no error class of its own: wrong LaTeX ends in whatever its parser met.
     except Exception as error:
         raise ValueError(f"this equation cannot be set: {latex}") from error

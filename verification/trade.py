@@ -25,8 +25,8 @@ from ringbalance.reduced_model.chamber.contributions import chamber_fills, chamb
 from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.chamber.values import RingValues, paper_closed_forms
-from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.terms import TERMS, models_used

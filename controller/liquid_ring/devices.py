@@ -7,17 +7,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from ringbalance.controller.loop_records import MomentTable
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_laws
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.making import nominal_laws
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
-from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import deviates, quantiles
 from ringbalance.scene.loop_models import Rotor
@@ -243,14 +243,8 @@ def _as_drawn(
 ) -> BalancerModel:
     """With its loss and its cavity."""
     more = math.log1p(spread.loss) * z[LOSS]
-    tables = ("head", "hump_head", "return_hump_head")
-    raised: dict[str, Any] = {name: _raised(getattr(law.heads, name), more) for name in tables}
     path = replace(law.path, released=q[CAVITY]) if spread.cavity else law.path
-    return BalancerModel.of(replace(law, heads=replace(law.heads, **raised), path=path))
-
-
-def _raised(table: HermiteTable | None, more: float) -> HermiteTable | None:
-    return None if table is None else replace(table, value=table.value + more)
+    return BalancerModel.of(replace(law, heads=law.heads.raised(more), path=path))
 
 
 def _states(scene: Scene, name: str) -> bool:
@@ -271,7 +265,7 @@ def _loss(scene: Scene, model: BalancerModel, *, remade: bool) -> float:
     )
     u = abs(float(flow.velocity)) or 1.0
     if remade and isinstance(law, CalibratedLaw):
-        return float(law.heads.without_inputs(scene=scene, velocity=u).uncertainty(math.log(u)))
+        return float(law.heads.without_inputs(scene=scene).uncertainty(u))
     return float(flow.uncertainty) / u
 
 

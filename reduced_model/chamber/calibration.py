@@ -19,12 +19,7 @@ from ringbalance.reduced_model.chamber.contributions import (
 )
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues, chamber_pressure, measured_closed_forms
-from ringbalance.reduced_model.tables import (
-    HermiteTable,
-    level_table,
-    table_from_samples,
-    tables_from_samples,
-)
+from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables, spline
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Disc, Scene
@@ -50,11 +45,11 @@ class Curve:
     """95 % uncertainty for what no model holds: surface tension, friction at walls, high waves."""
     inputs: FloatArray
     """Expanded uncertainty (95 %) by the scene's uncertain inputs."""
-    table: HermiteTable
-    """Interpolates the values."""
+    table: Table
+    """Interpolates the values, with slopes and curvatures."""
     interpolation: FloatArray
     """Expanded uncertainty (95 %) of the table about each of the fills that are nodes, between which a table
-    may have more."""
+    may have more knots."""
     status: Status
     """That of the whole range of fills."""
 
@@ -63,15 +58,14 @@ class Curve:
         """Half-width of the value for the scene's inputs as they stand: numerical and unmodelled terms."""
         return np.hypot(self.numerical, self.unmodelled)
 
-    def uncertainty_table(self, *, inputs: FloatArray) -> HermiteTable:
-        """Half-width over the fill ratio: numerical, unmodelled terms, interpolation and some inputs.
+    def half_widths(self, *, inputs: FloatArray) -> FloatArray:
+        """At the table's knots: numerical, unmodelled terms, interpolation and some inputs.
 
         Args: `inputs`: expanded uncertainty (95 %) by those inputs, along the fill ratio.
         """
-        count, nodes = self.interpolation.size, self.table.nodes
+        count, knots = self.interpolation.size, self.table.knots
         squares = (self.uncertainty**2 + inputs**2)[:count] + self.interpolation**2
-        # Errors step from node to node: where walls do, and where waves may become resonant.
-        return level_table(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+        return np.interp(knots, np.linspace(knots[0], knots[-1], count), np.sqrt(squares))
 
 
 CHAMBER_INPUTS: Final = (
@@ -261,7 +255,7 @@ def _as_measured(factor: float, ring: RingValues) -> RingValues:
 
 def _curve(
     estimate: Estimate,
-    table: HermiteTable,
+    table: Table,
     missed: FloatArray,
     *,
     excess: float,
@@ -312,17 +306,15 @@ _PLACES: Final = np.arange(1, 8) / 8
 """Within a piece, at which the table is compared."""
 
 
-def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[HermiteTable, FloatArray]:
+def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray]:
     """A table through equally spaced fills, and its expanded uncertainty (95 %) between them, at each."""
-    start, stop = float(nodes[0]), float(nodes[-1])
-    table = table_from_samples(start=start, stop=stop, value=value)
-    coarse = table_from_samples(start=start, stop=stop, value=value[::2])
+    coarse = spline(nodes[::2], value[::2] - value[0])
     # Twice the step at worst triples the error; half of what the coarse table misses is on the safe side.
-    missed = float(np.max(np.abs(coarse(nodes) - value)))
-    return table, np.full(nodes.shape, missed / 2)
+    missed = float(np.max(np.abs(coarse(nodes) - (value - value[0]))))
+    return smooth_table(nodes, value), np.full(nodes.shape, missed / 2)
 
 
-def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[HermiteTable, FloatArray]:
+def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray]:
     """The same for the pressure at R2, Pa; of an imported chamber with the closed form at more fills.
 
     Args: `nodes`: equally spaced from zero. `value`: with gravity, where that is modelled.
@@ -335,18 +327,17 @@ def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[
     every = (squares.size - 1) // (nodes.size - 1)
     change, missed = _even_table(nodes, value - scale * squares[::every])
     fine = np.linspace(0.0, float(nodes[-1]), squares.size)
-    table = table_from_samples(start=0.0, stop=float(nodes[-1]), value=scale * squares + change(fine))
-    return table, scale * error + missed
+    return smooth_table(fine, scale * squares + change.quintic(fine)), scale * error + missed
 
 
 def pressure_tables(
     scenes: Sequence[Scene], nodes: FloatArray, values: Sequence[FloatArray]
-) -> Sequence[HermiteTable]:
+) -> Sequence[Table]:
     """The tables of `pressure_table` for scenes that differ in numbers alone."""
     if scenes[0].disc.geometry is not None:
         pairs = zip(scenes, values, strict=True)
         return [pressure_table(scene, nodes, value)[0] for scene, value in pairs]
-    return tables_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=np.stack(values, axis=1))
+    return smooth_tables(nodes, np.stack(values, axis=1))
 
 
 @lru_cache(maxsize=16)
@@ -355,9 +346,9 @@ def _samples(disc: Disc, count: int, largest: float) -> tuple[FloatArray, FloatA
     every = -(-_PIECES // (count - 1))
     fills = np.linspace(0.0, largest, every * (count - 1) + 1)
     squares = _square(disc, fills)
-    table = table_from_samples(start=0.0, stop=largest, value=squares)
+    curve = spline(fills, squares - squares[0])
     between = fills[:-1, None] + np.diff(fills)[:, None] * _PLACES
-    missed = np.abs(table(between) - _square(disc, between)).reshape(count - 1, -1).max(axis=1)
+    missed = np.abs(curve(between) + squares[0] - _square(disc, between)).reshape(count - 1, -1).max(axis=1)
     return squares, np.maximum(np.append(missed[:1], missed), np.append(missed, missed[-1:]))
 
 

@@ -24,8 +24,10 @@ import math
 from typing import Final
 
 from ringbalance.physics.gas import flow_shape, flow_shape_slope
-from ringbalance.reduced_model.injection.dynamics import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, P, Record
+from ringbalance.reduced_model.injection.dynamics import PIECES, P, Record
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.pieces.inverse import level_with_slope, root_of_velocity, velocity_under
+from ringbalance.reduced_model.pieces.point import SIPHON, THERE, WAY_BACK
 from ringbalance.reduced_model.tube import regime
 from ringbalance.reduced_model.tube.regime import CLEARING, cleared, crest_margins, driving_pressure
 from ringbalance.scene.platform.compiled import in_place, inlined
@@ -33,32 +35,11 @@ from ringbalance.scene.platform.compiled import in_place, inlined
 Four = tuple[float, float, float, float]
 _SLOWEST: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""
-_NEWTON_STEPS: Final = 60
-"""At the most; each that leaves the interval known to hold the root is replaced by half of that."""
-_CONVERGED: Final = 1e-9
-"""Of a piece of a table: Newton's next change would be below round-off."""
 _SEPARATED: Final = int(Regime.SEPARATED)
 _SLOW_FROUDE: Final = CLEARING[0]
 _FAST_FROUDE: Final = CLEARING[1]
 _HALF_CLEARED: Final = (_SLOW_FROUDE + _FAST_FROUDE) / 2
 """Froude number at which gas and cavity count the same."""
-
-
-@inlined
-def table(plant: Record, which: int, x: float) -> tuple[float, float]:
-    """Value and slope of a table; it continues straight beyond its ends."""
-    place = (x - plant.table_start[which]) * plant.nodes_per[which]
-    cell = min(max(math.floor(place), 0), plant.pieces[which] - 1)
-    c = plant.cells[which, cell]
-    t = place - cell
-    held = min(max(t, 0.0), 1.0)
-    # In halves, which a processor works out side by side.
-    square = held * held
-    inside = (c[0] + held * c[1]) + square * ((c[2] + held * c[3]) + square * (c[4] + held * c[5]))
-    slope = (c[1] + 2 * held * c[2]) + square * ((3 * c[3] + 4 * held * c[4]) + square * (5 * c[5]))
-    if t != held:
-        inside += (t - held) * slope
-    return inside, slope * plant.nodes_per[which]
 
 
 @in_place
@@ -74,79 +55,51 @@ def tabled(
     back = q > p
     which = (0 if max(p, q) > 0.0 else 2) + (0 if primed else 1)
     driven = plant.total - x if back else x
-    place = (driven - plant.table_start[which]) * plant.nodes_per[which]
-    cell = min(max(math.floor(place), 0), plant.pieces[which] - 1)
-    c = plant.cells[which, cell]
+    place = (driven - plant.lowest_fill) * plant.cells_per_fill
+    cell = min(max(math.floor(place), 0), PIECES - 1)
+    c = plant.rows[which * PIECES + cell]
     t = min(max(place - cell, 0.0), 1.0)
     square = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
     faster = math.exp(log_speed)
     speed = math.copysign(math.sqrt(abs(square)), square) * faster
-    slope = (c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])) * plant.nodes_per[which]
+    slope = (c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])) * plant.cells_per_fill
     slope *= 0.5 * faster * faster / max(abs(speed), _SLOWEST)
     return -speed if back else speed, slope, c[4] > 0.0, c[5] == _SEPARATED
 
 
-@in_place
-def _inverse(plant: Record, which: int, y: float) -> float:
-    """The x of a value, to round-off, for a table that grows; it continues straight beyond its ends."""
-    last = plant.pieces[which] - 1
-    low, high, place = 0.0, last + 1.0, _guess(plant, which, y)
-    for _ in range(_NEWTON_STEPS):
-        place = min(max(place, 0.0), last + 1.0)
-        cell = min(max(math.floor(place), 0), last)
-        c = plant.cells[which, cell]
-        t = place - cell
-        found = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
-        slope = c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))
-        low, high = (place, high) if found < y else (low, place)
-        change = (y - found) / slope
-        if abs(change) < _CONVERGED or place == (0.0 if change < 0.0 else last + 1.0):
-            place += change
-            break
-        place = place + change if low <= place + change <= high else (low + high) / 2.0
-    return float(plant.table_start[which] + place / plant.nodes_per[which])
-
-
 @inlined
-def _guess(plant: Record, which: int, y: float) -> float:
-    """Place of a value on the straight line through both ends of a table."""
-    last = plant.pieces[which] - 1
-    first, c = plant.cells[which, 0, 0], plant.cells[which, last]
-    return float((last + 1.0) * (y - first) / (c[0] + c[1] + c[2] + c[3] + c[4] + c[5] - first))
-
-
-@inlined
-def crest_table(direction: int) -> int:
-    """Number of the table of the loss up to the crest."""
-    return TO_CREST if direction > 0 else RETURN_CREST
+def crest_table(plant: Record, direction: int) -> int:
+    """Row of the loss up to the crest."""
+    return THERE if direction > 0 else int(plant.numbers[WAY_BACK])
 
 
 @in_place
 def quasi_steady(plant: Record, which: int, pressure: float, log_speed: float) -> float:
     """Quasi-steady velocity, m/s, under a pressure above zero; `log_speed`: of a factor on it."""
-    return math.exp(_inverse(plant, which, math.log(pressure / plant.density)) + log_speed)
+    return velocity_under(plant.numbers, plant.rows, which, pressure) * math.exp(log_speed)
 
 
 @inlined
-def law_log(speed: float, log_speed: float) -> float:
-    """ln of the velocity that the law itself has where a factor on it gives this one."""
-    return math.log(max(abs(speed), _SLOWEST)) - log_speed
+def law_speed(speed: float, log_speed: float) -> float:
+    """Velocity that the law itself has where a factor on it gives this one."""
+    return abs(speed) * math.exp(-log_speed)
 
 
 @inlined
-def tube_loss(plant: Record, which: int, speed: float, log_of_law: float) -> tuple[float, float]:
+def tube_loss(plant: Record, which: int, speed: float, of_law: float) -> tuple[float, float]:
     """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
     if abs(speed) < _SLOWEST:
         return 0.0, 0.0
-    value, slope = table(plant, which, log_of_law)
-    loss = math.copysign(math.exp(value), speed)
-    return loss, loss * slope / speed
+    root, growth = root_of_velocity(plant.roots[which], plant.rows, which, of_law)
+    fourth = root * root * root * root
+    loss = fourth * fourth / plant.density
+    return math.copysign(loss, speed), 8.0 * loss / root / growth * (of_law / abs(speed))
 
 
 @inlined
 def hydrostatic(plant: Record, x: float) -> tuple[float, float]:
     """P(x), not below zero, Pa, and its slope."""
-    value, slope = table(plant, HYDROSTATIC, x)
+    value, slope = level_with_slope(plant.numbers, plant.rows, x)
     return max(value, 0.0), slope if value > 0.0 else 0.0
 
 
@@ -202,12 +155,12 @@ def _crest_margin(
         return primed_margin, 1.0, 0.0
     if gas_margin <= 0.0:
         return gas_margin, 0.0, 0.0
-    which = crest_table(direction)
+    which = crest_table(plant, direction)
     spill = quasi_steady(plant, which, gas_margin, log_speed)
     carried, slope = cleared(plant, spill), _clearing_slope(plant, spill)
     more = max(primed_margin - gas_margin, 0.0)
     if slope > 0.0:
-        slope /= plant.density * tube_loss(plant, which, spill, law_log(spill, log_speed))[1]
+        slope /= plant.density * tube_loss(plant, which, spill, law_speed(spill, log_speed))[1]
     return gas_margin + carried * more, carried, slope * more
 
 
@@ -222,11 +175,11 @@ def _directed(
     """Velocity of flow in one direction, and whether the column is separated."""
     if not can_flow(plant, at, primed):
         return 0.0, False
-    full = quasi_steady(plant, HEAD, driving_pressure(plant, at), log_speed)
+    full = quasi_steady(plant, SIPHON, driving_pressure(plant, at), log_speed)
     if not plant.crest:
         return full, False
     margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
-    broken = quasi_steady(plant, crest_table(direction), margin, log_speed)
+    broken = quasi_steady(plant, crest_table(plant, direction), margin, log_speed)
     return min(broken, full), broken < full
 
 
@@ -270,12 +223,12 @@ def clearance(plant: Record, at: Four, direction: int, log_speed: float) -> floa
     half = _HALF_CLEARED * plant.froude_velocity
     if half == 0.0:
         return math.inf
-    log_of_law = law_log(half, log_speed)
+    of_law = law_speed(half, log_speed)
     spills = (
         crest_margins(plant, at)[1] / plant.density
-        - tube_loss(plant, crest_table(direction), half, log_of_law)[0]
+        - tube_loss(plant, crest_table(plant, direction), half, of_law)[0]
     )
-    flows = driving_pressure(plant, at) / plant.density - tube_loss(plant, HEAD, half, log_of_law)[0]
+    flows = driving_pressure(plant, at) / plant.density - tube_loss(plant, SIPHON, half, of_law)[0]
     return float(min(spills, flows))
 
 
@@ -290,14 +243,14 @@ def _fills(
     """Whether a column that flows is a continuous one: gas carried out, no cavity open to the port."""
     if not plant.crest:
         return True
-    which, driving = crest_table(direction), driving_pressure(plant, at)
+    which, driving = crest_table(plant, direction), driving_pressure(plant, at)
     if not primed and clearance(plant, at, direction, log_speed) <= 0.0:
         return False
     if at[3] >= plant.port_pressure:
         return True
     margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
     broken = quasi_steady(plant, which, margin, log_speed)
-    return broken >= quasi_steady(plant, HEAD, driving, log_speed)
+    return broken >= quasi_steady(plant, SIPHON, driving, log_speed)
 
 
 @inlined
@@ -315,8 +268,8 @@ def accelerations(
     Returns: the two, then the derivatives of the smaller one by the speed, by the pressure upstream (of gas
     or liquid), by the gas pressure downstream and by the liquid's pressure there.
     """
-    log_of_law = law_log(speed, log_speed)
-    loss, slope = tube_loss(plant, HEAD, speed, log_of_law)
+    of_law = law_speed(speed, log_speed)
+    loss, slope = tube_loss(plant, SIPHON, speed, of_law)
     length, covered = plant.length, 1.0 if at[3] > plant.port_pressure else 0.0
     per, each = 1.0 / length, 1.0 / (plant.density * length)
     full = driving_pressure(plant, at) * each - loss * per
@@ -324,7 +277,7 @@ def accelerations(
         return full, math.inf, -slope * per, each, -each, -each * covered
     fraction = plant.crest_end if direction > 0 else plant.return_crest_end
     margin, carried, more = _crest_margin(plant, at, direction, primed, log_speed)
-    upper_loss, upper_slope = tube_loss(plant, crest_table(direction), speed, log_of_law)
+    upper_loss, upper_slope = tube_loss(plant, crest_table(plant, direction), speed, of_law)
     per_upper, each_upper = 1.0 / (fraction * length), 1.0 / (plant.density * fraction * length)
     broken = margin * each_upper - upper_loss * per_upper
     if full <= broken:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -23,7 +22,10 @@ from ringbalance.physics.gas import (
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.tables import HermiteTable
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.inverse import ROOT_PLACES, root_cells
+from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
+from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.arrays import FloatArray, plain
@@ -49,18 +51,15 @@ class Event(StrEnum):
 Record = Any
 """One element of an array with one of the types below; compiled code changes it in place."""
 
-HYDROSTATIC: Final = 0
-"""P(x), Pa."""
-HEAD: Final = 1
-"""ln((k + 1) u^2/2) over ln u."""
-TO_CREST: Final = 2
-"""ln((alpha + k_up) u^2/2) over ln u, flow out of chamber 0."""
-RETURN_CREST: Final = 3
-"""The same for flow out of chamber 1."""
 FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
 """Whether gas is on and the tube primed, in the tables of a law that gives velocities alone."""
-PIECES: Final = 4096
-"""Room for the pieces of a table, fixed, so that compiled code serves every law."""
+PIECES: Final = 2048
+"""Of each of these tables."""
+NUMBERS: Final = 2560
+"""Room for the numbers of a law, fixed, so that compiled code serves every law."""
+WAYS: Final = 3
+ROWS: Final = len(FLOWS) * PIECES
+"""Room for its pieces."""
 
 _PLANT_REAL: Final = (
     "density",  # kg/m^3
@@ -92,13 +91,15 @@ _PLANT_REAL: Final = (
     "residual",  # of a single run, as below
     "relative_error",  # allowed to one step
     "first_step",  # s, after a jump of the rates
+    "lowest_fill",  # at which `rows` begin
+    "cells_per_fill",
 )
 _PLANT_WHOLE: Final = (
     "crest",  # whether there is one
     "trapped",
     "one_way",  # whether liquid leaves only a chamber with gas or a high level, as under the paper's Eq. 19
     "inertia",
-    "tabled",  # whether the law gives velocities alone, which `cells` then hold by fill
+    "tabled",  # whether the law gives velocities alone, which `rows` then hold by fill
     "lifts",  # whether an unprimed tube is filled up to the crest before liquid passes
     "line",  # whether valve and line take time to pass gas
     "most_steps",
@@ -107,10 +108,9 @@ PLANT: Final = np.dtype(
     [(name, np.float64) for name in _PLANT_REAL]
     + [(name, np.int64) for name in _PLANT_WHOLE]
     + [
-        ("table_start", np.float64, (4,)),
-        ("nodes_per", np.float64, (4,)),  # unit of the argument
-        ("pieces", np.int64, (4,)),
-        ("cells", np.float64, (4, PIECES, 6)),
+        ("numbers", np.float64, (NUMBERS,)),  # of the law, as `point` reads it
+        ("roots", np.float64, (WAYS, ROOT_PLACES)),  # where to look for the root of a velocity
+        ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # its pieces, or those of a law that is tabled
     ]
 )
 """Constants of a plant with moving liquid, filling gas and late valves."""
@@ -198,23 +198,14 @@ def gives_forces(law: FlowLaw) -> bool:
     return isinstance(law, CalibratedLaw | PaperLaw)
 
 
-def _straight(value: float, slope: float) -> HermiteTable:
-    """value + slope x."""
-    return HermiteTable(
-        start=0.0,
-        step=1.0,
-        value=np.array([value, value + slope]),
-        slope=np.full(2, slope),
-        curvature=np.zeros(2),
-    )
-
-
 RELATIVE_ERROR: Final = 1e-9
 """Of each state, allowed to one step of a single run."""
 MOST_STEPS: Final = 200_000
 """Within one interval of time."""
 _FIRST_STEP: Final = 1e-4
 """s, at the most after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
+_NO_HEADS: Final = np.array([1e-12, 2e-12])
+"""Eighth roots of heads, above which a table goes on with one ratio."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -360,9 +351,7 @@ def _fill_calibrated(plant: npt.NDArray[np.void], law: CalibratedLaw, tube: Tube
     plant["gas_factor"] = law.gas_factor
     start, end = crest_span(tube)
     plant["crest_end"], plant["return_crest_end"] = end, 1 - start
-    ahead, back = law.heads.hump_head, law.heads.return_hump_head
-    to_crest = (ahead, back) if ahead and back else ()
-    _fill_tables(plant, (law.hydrostatic_pressure, law.heads.head, *to_crest))
+    _fill_rows(plant, len(law.heads.tables), *law.constants)
 
 
 def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
@@ -370,19 +359,21 @@ def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
     plant["density"], plant["one_way"] = law.density, True
     if law.return_pressure is not None:
         plant["column_pressure"] = law.return_pressure
-    loss = math.log((law.drag_coefficient + 1) / 2)
-    _fill_tables(plant, (_straight(0.0, law.pressure_per_fill_difference), _straight(loss, 2.0)))
+    rise, ratio = law.pressure_per_fill_difference, math.sqrt(2 / (law.drag_coefficient + 1))
+    level = Table(knots=np.array([0.0, 1.0]), columns=np.array([0.0, rise, rise, rise, 0.0, 0.0, 0.0, 0.0]))
+    head = Table(knots=_NO_HEADS, columns=np.repeat([ratio, 0.0, 0.0, 0.0], 2))
+    rows = LawRows.of(1)
+    rows.add_levels(level)
+    rows.add_way(point.SIPHON, head, law.density)
+    _fill_rows(plant, 1, *rows.arrays({point.LARGEST_FILL: law.max_fill_ratio}))
 
 
-def _fill_tables(plant: npt.NDArray[np.void], tables: Sequence[HermiteTable]) -> None:
-    """P(x) and the heads, in the order of their numbers."""
-    for which, table in enumerate(tables):
-        pieces = table.coefficients.T
-        if len(pieces) > PIECES:
-            raise ValueError(f"a table of the law has {len(pieces)} pieces, at most {PIECES} can be compiled")
-        plant["cells"][0, which, : len(pieces)] = pieces
-        plant["pieces"][0, which] = len(pieces)
-        plant["table_start"][0, which], plant["nodes_per"][0, which] = table.start, 1.0 / table.step
+def _fill_rows(plant: npt.NDArray[np.void], ways: int, numbers: FloatArray, rows: FloatArray) -> None:
+    if numbers.size > NUMBERS or len(rows) > ROWS:
+        raise ValueError(f"the law has {len(rows)} pieces, at most {ROWS} can be compiled")
+    plant["numbers"][0, : numbers.size], plant["rows"][0, : len(rows)] = numbers, rows
+    for way in range(ways):
+        plant["roots"][0, way] = root_cells(numbers, rows, way)
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
@@ -395,7 +386,7 @@ def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
     lowest, highest = max(0.0, total - largest), min(total, largest)
     x = np.linspace(lowest, highest, PIECES + 1)
     plant["tabled"] = True
-    plant["table_start"], plant["pieces"], plant["nodes_per"] = lowest, PIECES, PIECES / (highest - lowest)
+    plant["lowest_fill"], plant["cells_per_fill"] = lowest, PIECES / (highest - lowest)
     for which, (gas, primed) in enumerate(FLOWS):
         flow = law.evaluate(
             fill_ratio=x,
@@ -408,7 +399,8 @@ def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
         ends = square[:-1] * square[1:] <= 0
         powers[:, ends] = 0.0
         powers[0, ends], powers[1, ends] = square[:-1][ends], np.diff(square)[ends]
-        plant["cells"][0, which] = np.stack([*powers, flow.primed[:-1], flow.regime[:-1]], axis=1)
+        inside = slice(which * PIECES, (which + 1) * PIECES)
+        plant["rows"][0, inside, :6] = np.stack([*powers, flow.primed[:-1], flow.regime[:-1]], axis=1)
 
 
 def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:

@@ -24,7 +24,7 @@ from ringbalance.reduced_model.injection.column import (
     ends,
     gas_volume,
     hydrostatic,
-    law_log,
+    law_speed,
     line_rates,
     quasi_steady,
     tube_loss,
@@ -115,7 +115,9 @@ def lift_rates(
     margin = crest_margins(plant, at)[1] + height
     along = (1.0 - entrance) / crest_stop(plant, direction)
     share, length = entrance + along * place, place * plant.length
-    loss, loss_slope = tube_loss(plant, crest_table(direction), speed, law_log(speed, motion.log_speed))
+    loss, loss_slope = tube_loss(
+        plant, crest_table(plant, direction), speed, law_speed(speed, motion.log_speed)
+    )
     found = (margin / rho - share * loss) / length
     by_place = (slope / rho - along * loss) / length - found / place
     each = 1.0 / (rho * length)
@@ -132,7 +134,7 @@ def lift_speed(plant: Record, motion: Record, at: tuple[float, float, float, flo
     if margin <= 0.0:
         return 0.0
     share = plant.lift_entrance + (1.0 - plant.lift_entrance) * place / crest_stop(plant, direction)
-    return quasi_steady(plant, crest_table(direction), margin / share, motion.log_speed)
+    return quasi_steady(plant, crest_table(plant, direction), margin / share, motion.log_speed)
 
 
 @in_place

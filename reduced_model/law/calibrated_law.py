@@ -6,48 +6,67 @@ Beside it the moment of a pair of chambers, from the same chamber.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
-from ringbalance.physics.gas import pressure_factor
-from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
-from ringbalance.reduced_model.chamber.contributions import gravity_shares
-from ringbalance.reduced_model.chamber.values import RingValues, share_across
-from ringbalance.reduced_model.law.flow_law import CALIBRATED, Conditions, Flow, Regime, law_text, save_record
-from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples, tables_from_samples
-from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, siphon_margin
-from ringbalance.reduced_model.tube.flow import tube_path
-from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
-from ringbalance.reduced_model.tube.regime import (
-    TubeEnds,
-    TubePath,
-    crest_margins,
-    driving_pressure,
-    possible_cavity,
+from ringbalance.reduced_model.law.flow_law import (
+    FILL_SLACK,
+    Conditions,
+    Flow,
+    Regime,
+    law_text,
+    save_record,
 )
-from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
-from ringbalance.scene.designs import Designs, alike
-from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
+from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.compiled_point import answer_each
+from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.table import Table
+from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
+from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+
+WIDTH: Final = 3
+"""Column of a half-width over the fill ratio."""
+_FEW: Final = 500
+"""Points up to which compiled code would take longer to load than they take without."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveUncertainty:
+    """Expanded uncertainties (95 %) of what drives the flow."""
+
+    relative_density: float = 0.0
+    relative_speed: float = 0.0
+    relative_gas_pressure: float = 0.0
+    hump_pressure: float = 0.0
+    """Pa."""
+    vapour_pressure: float = 0.0
+    """Pa."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalibratedMoment:
     """U(x) of one chamber along its middle, and W(x) across it; a pair's is U(x_A) - U(x_C), W alike."""
 
-    chamber_moment: HermiteTable
-    """U, kg m, over the fill ratio."""
-    half_width: HermiteTable
-    """Expanded uncertainty (95 %) of U, kg m, over the fill ratio: numerical, interpolation and left-out
-    terms."""
-    across: HermiteTable | None = None
+    along: Table
+    """Over the fill ratio: U, kg m, with slope and curvature, and its expanded uncertainty (95 %), kg m:
+    numerical, interpolation and left-out terms."""
+    across: Table | None = None
     """W, kg m, over the fill ratio, in the sense of the rotation; None for a symmetric chamber."""
+
+    def chamber_moment(self, fill_ratio: npt.ArrayLike) -> FloatArray:
+        """U, kg m."""
+        return self.along.quintic(fill_ratio)
+
+    def half_width(self, fill_ratio: npt.ArrayLike) -> FloatArray:
+        """Expanded uncertainty (95 %) of U, kg m."""
+        return self.along.straight(fill_ratio, WIDTH)
 
     def pair_moment(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> FloatArray:
         return np.asarray(self.chamber_moment(fill_ratio) - self.chamber_moment(opposite_fill_ratio))
@@ -56,7 +75,8 @@ class CalibratedMoment:
         along = self.pair_moment(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
         if self.across is None:
             return np.asarray(along, dtype=np.complex128)
-        return np.asarray(along + 1j * (self.across(fill_ratio) - self.across(opposite_fill_ratio)))
+        across = self.across.quintic(fill_ratio) - self.across.quintic(opposite_fill_ratio)
+        return np.asarray(along + 1j * across)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +84,8 @@ class CalibratedLaw:
     """Flow of the tube for any fills, gas pressure and history: blocked, siphon, separated or reverse.
 
     The velocity is continuous in fills and pressure, except where the physics jumps: when a column separates
-    at rest, and when a chamber's liquid leaves the port open.
+    at rest, and when a chamber's liquid leaves the port open.  The arithmetic is that of `point`, interpreted
+    for a few points and compiled for many, with the same bits.
 
     `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
     (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
@@ -82,10 +103,8 @@ class CalibratedLaw:
     """V, m^3."""
     tube_area: float
     """S, m^2."""
-    hydrostatic_pressure: HermiteTable
-    """Of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa, over its fill ratio."""
-    hydrostatic_pressure_uncertainty: HermiteTable
-    """Its expanded uncertainty (95 %), Pa, over the fill ratio."""
+    levels: Table
+    """Over the fill ratio: `hydrostatic_pressure` with slope and curvature, and its half-width, Pa."""
     path: TubePath
     """Radii of the tube, as pressures."""
     heads: TubeHeads
@@ -108,6 +127,52 @@ class CalibratedLaw:
     def density(self) -> float:
         return self.path.density
 
+    @cached_property
+    def constants(self) -> tuple[FloatArray, FloatArray]:
+        """Numbers and pieces, all that `point` needs to answer a query."""
+        (siphon, *ways), density = self.heads.tables, self.density
+        rows = LawRows.of(len(self.heads.tables))
+        rows.add_levels(self.levels)
+        rows.add_way(point.SIPHON, siphon, density, siphon.knots.size - 1)
+        if ways:
+            rows.add_shares(siphon, density)
+        for at, way in enumerate(ways, start=point.THERE):
+            rows.add_way(at, way, density, *self.path.clearing_velocities, *carried_by(self.path))
+        return rows.arrays(self.scalars())
+
+    def scalars(self) -> dict[int, float]:
+        """What is no table, at the places of `point`."""
+        path, inputs, heads = self.path, self.inputs, self.heads
+        by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
+        slowest, fastest = (heads.siphon.knots**4 * heads.siphon.column(0))[[0, -1]]
+        return {
+            point.LARGEST_FILL: self.max_fill_ratio,
+            point.AMBIENT: self.ambient_pressure,
+            point.GAS_FACTOR: self.gas_factor,
+            point.PORT: path.port_pressure,
+            point.CREST: path.crest,
+            point.COLUMN: path.column_pressure,
+            point.TRAPPED: path.trapped,
+            point.VAPOUR: path.vapour_pressure,
+            point.RELEASED: path.released,
+            point.CAVITY_KNOWN: path.cavity_fitted,
+            point.OF_DENSITY: by_density,
+            point.OF_BLOWN: by_density + inputs.relative_gas_pressure**2,
+            point.OF_SPEED: by_speed,
+            point.OF_GAS: inputs.relative_gas_pressure**2,
+            point.OF_CREST: inputs.hump_pressure**2 + inputs.vapour_pressure**2,
+            point.OF_LIQUID: by_density + by_speed,
+            point.TABULATION: heads.interpolation_error**2,
+            point.LOWEST: slowest,
+            point.HIGHEST: fastest,
+            point.WAY_BACK: float(len(heads.tables) - 1),
+        }
+
+    @cached_property
+    def _lists(self) -> tuple[list[float], list[list[float]]]:
+        numbers, pieces = self.constants
+        return numbers.tolist(), pieces.tolist()
+
     def evaluate(
         self,
         *,
@@ -116,6 +181,9 @@ class CalibratedLaw:
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
+        y = self._opposite(fill_ratio) if opposite_fill_ratio is None else opposite_fill_ratio
+        if self._is_plain(fill_ratio, y, gas_pressure, primed):
+            return _one_flow(self._answer(fill_ratio, y, gas_pressure, primed))
         asked = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
@@ -124,11 +192,73 @@ class CalibratedLaw:
             gas_pressure=gas_pressure,
             primed=primed,
         )
-        forward = self._directed(asked, reverse=False)
-        if np.all(forward.velocity > 0):
-            return _joined(forward, forward, np.zeros_like(asked.primed))
-        backward = self._directed(asked, reverse=True)
-        return _joined(forward, backward, (backward.velocity > 0) & ~(forward.velocity > 0))
+        return self._flow(np.array([getattr(asked, each.name) for each in fields(asked)], dtype=np.float64))
+
+    def _is_plain(self, x: Any, y: Any, p: Any, primed: Any) -> bool:
+        """Whether these are four numbers that need no other check, of a law without variants."""
+        most = self.max_fill_ratio + FILL_SLACK
+        return (
+            isinstance(x, _NUMBER)
+            and isinstance(y, _NUMBER)
+            and isinstance(p, _NUMBER)
+            and isinstance(primed, _TRUTH)
+            and -FILL_SLACK <= x <= most
+            and -FILL_SLACK <= y <= most
+            and -self.ambient_pressure <= p <= point.GREATEST_PRESSURE
+            and not self.variants
+        )
+
+    def _opposite(self, fill_ratio: Any) -> Any:
+        return self.max_fill_ratio - fill_ratio if isinstance(fill_ratio, _NUMBER) else None
+
+    def _answer(self, x: Any, y: Any, p: Any, primed: Any) -> list[float]:
+        """A query of `point` with its answer."""
+        query = [float(x), float(y), float(p), float(primed), *_REST_OF_QUERY]
+        point.answer(*self._lists, query, True)
+        return query
+
+    def _answers(self, asked: FloatArray) -> FloatArray:
+        """Answers to queries of shape (4, n): the places of `_ANSWER`, shape (6, n)."""
+        if asked.shape[1] <= _FEW:
+            each = [self._answer(*query) for query in asked.T.tolist()]
+            return np.reshape([[query[place] for query in each] for place in _ANSWER], (len(_ANSWER), -1))
+        answers = np.empty((len(_ANSWER), asked.shape[1]))
+        answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers)
+        return answers
+
+    def _flow(self, asked: FloatArray) -> Flow:
+        """Args: `asked`: fill, opposite fill, pressure and primed, shape (4, ...)."""
+        shape, asked = asked.shape[1:], np.ascontiguousarray(asked.reshape(4, -1))
+        velocity, width, regime, primed, margin, square = self._answers(asked)
+        if self.variants:
+            speeds, margins = self._by_fitted(asked, np.sign(velocity))
+            width, square = np.hypot(width, np.abs(np.sign(velocity)) * speeds), square + margins
+            open_now = (velocity > 0) & (margin * margin < square)
+            regime = np.where(open_now, Regime.UNDECIDED, regime)
+        return Flow(
+            velocity=velocity.reshape(shape),
+            regime=regime.astype(np.int64).reshape(shape),
+            uncertainty=width.reshape(shape),
+            primed=(primed != 0).reshape(shape),
+        )
+
+    def _by_fitted(self, asked: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the variants add to the half-width of the velocity, and to the margin's, squared."""
+        sides = [each._answers(asked) for each in self.variants]
+        speeds = [np.maximum(direction * side[0], 0.0) for side in sides]
+        squares = [
+            [((high - low) / 2) ** 2 for low, high in zip(each[::2], each[1::2], strict=True)]
+            for each in (speeds, [side[4] for side in sides])
+        ]
+        return np.sqrt(sum(squares[0])), np.asarray(sum(squares[1]))
+
+    def hydrostatic_pressure(self, fill_ratio: npt.ArrayLike) -> FloatArray:
+        """Of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa."""
+        return self.levels.quintic(fill_ratio)
+
+    def hydrostatic_pressure_uncertainty(self, fill_ratio: npt.ArrayLike) -> FloatArray:
+        """Its expanded uncertainty (95 %), Pa."""
+        return self.levels.straight(fill_ratio, WIDTH)
 
     def ends(
         self,
@@ -156,34 +286,11 @@ class CalibratedLaw:
         """Whether a chamber of that fill keeps it against a lower one with the gas off."""
         return self.path.holds(max(float(self.hydrostatic_pressure(fill_ratio)), 0.0))
 
-    def drive(self, asked: Conditions, *, reverse: bool) -> Drive:
-        """What acts on the tube in one direction; `reverse`: out of the opposite chamber."""
-        own, other = asked.fill_ratio, asked.opposite_fill_ratio
-        ends = self.ends(fill_ratio=own, opposite_fill_ratio=other, gas_pressure=asked.gas_pressure)
-        return Drive(
-            ends=ends.reversed() if reverse else ends,
-            upstream_uncertainty=self.hydrostatic_pressure_uncertainty(other if reverse else own),
-            downstream_uncertainty=self.hydrostatic_pressure_uncertainty(own if reverse else other),
-            primed=asked.primed,
-        )
-
-    def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
-        flow = DirectedFlow.of(
-            path=self.path,
-            heads=self.heads,
-            hump_head=self.heads.to_crest(reverse=reverse),
-            inputs=self.inputs,
-            drive=self.drive(asked, reverse=reverse),
-        )
-        sides = [variant._directed(asked, reverse=reverse) for variant in self.variants]
-        return flow.widened(sides[::2], sides[1::2])
-
     def table(self) -> Mapping[str, FloatArray]:
-        heads = {
-            "log_head": self.heads.head,
-            "log_hump_head": self.heads.hump_head,
-            "log_return_hump_head": self.heads.return_hump_head,
-        }
+        siphon, path = self.heads.siphon, self.path
+        velocity = siphon.knots**4 * siphon.column(0)
+        ways = {"log_hump_head": self.heads.to_crest(reverse=False)}
+        ways["log_return_hump_head"] = self.heads.to_crest(reverse=True)
         scalars = (
             "density",
             "port_pressure",
@@ -192,229 +299,72 @@ class CalibratedLaw:
             "released",
             "froude_velocity",
         )
-        values = {name: getattr(self.path, name) for name in scalars}
+        values = {name: getattr(path, name) for name in scalars}
         return (
-            {"log_velocity": self.heads.head.nodes}
-            | {name: table.value.copy() for name, table in heads.items() if table is not None}
-            | {
-                "fill_ratio": self.hydrostatic_pressure.nodes,
-                "hydrostatic_pressure": self.hydrostatic_pressure.value.copy(),
-            }
+            {"log_velocity": np.log(velocity), "log_head": 8 * np.log(siphon.knots)}
+            | {name: 8 * np.log(roots_of(way, velocity)) for name, way in ways.items() if way is not None}
+            | {"fill_ratio": self.levels.knots.copy(), "hydrostatic_pressure": self.levels.column(0).copy()}
             | {name: np.array([value]) for name, value in values.items() if value is not None}
         )
 
     def cavity_margin(
         self, *, fills: tuple[float, float], gas_pressure: float, reverse: bool
     ) -> tuple[float, float] | tuple[None, None]:
-        """`siphon_margin` over a primed tube's cavity in one direction, Pa; both None without a crest."""
-        head, path = self.heads.to_crest(reverse=reverse), self.path
-        if head is None:
+        """`point.set_margin` over a primed tube's cavity in one direction, Pa; both None without a crest."""
+        if not self.path.crest:
             return None, None
-        x, y, p = (np.asarray(v, dtype=np.float64) for v in (*fills, gas_pressure))
-        asked = Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=np.asarray(True))
-        drive = self.drive(asked, reverse=reverse)
-        driving, (low, high) = driving_pressure(path, drive.ends), possible_cavity(path, drive.ends)
-        margin, width = siphon_margin(
-            path=path,
-            heads=self.heads,
-            hump_head=head,
-            inputs=self.inputs,
-            drive=drive,
-            at_rest=np.asarray(crest_margins(path, drive.ends)[0]),
-            spread=np.asarray(max(path.released, 1 - path.released) * (high - low)),
-            velocity=velocity_of(table=self.heads.head, head=driving / self.density, where=driving > 0),
-        )
+        (c, p), w = self._lists, [*fills, gas_pressure, 1.0, *_REST_OF_QUERY]
+        point.set_levels(c, p, w, *fills)
+        w[point.UP_GAS] = self.gas_factor * gas_pressure
+        if reverse:
+            point.turn(w)
+        point.set_drive(c, w)
+        point.set_crest(c, w)
+        w[point.HOLDS], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
+        if w[point.DRIVING] > 0:
+            point.velocity(c, p, w, point.SIPHON, w[point.DRIVING])
+            row = int(w[point.ROW] + p[point.SIPHON][point.SHARES])
+            way = int(c[point.WAY_BACK]) if reverse else point.THERE
+            lost = point.lost_part(p, row, w[point.TO_END], way)
+            off = point.lost_width(p, row, w[point.TO_END])
+        spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
+        point.set_margin(c, w, lost, off, point.known_of(c, w, lost, spread))
         sides = [
             each.cavity_margin(fills=fills, gas_pressure=gas_pressure, reverse=reverse)[0] or 0.0
             for each in self.variants
         ]
         by_fitted = ((high - low) / 2 for low, high in zip(sides[::2], sides[1::2], strict=True))
-        return float(margin), math.hypot(float(width), *by_fitted)
+        return w[point.MARGIN], math.hypot(math.sqrt(w[point.MARGIN_SQUARE]), *by_fitted)
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
 
 
-def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -> Flow:
-    """One flow from both directions, of which at most one flows."""
-    ahead = forward.velocity > 0
-    regime = np.select(
-        [ahead & forward.undecided, ahead & forward.separated, ahead, reverse],
-        [Regime.UNDECIDED, Regime.SEPARATED, Regime.SIPHON, Regime.REVERSE],
-    )
+def carried_by(path: TubePath) -> tuple[float, float]:
+    """Factor of a velocity, and what is taken from it, for how far it carries gas out from over the crest."""
+    low, high = CLEARING
+    froude = path.froude_velocity * (high - low)
+    return (1.0 / froude, low / (high - low)) if froude else (0.0, -1.0)
+
+
+_NUMBER: Final = (float, int)
+_TRUTH: Final = (bool, np.bool_)
+_REST_OF_QUERY: Final = [0.0] * (point.PLACES_OF_QUERY - 4)
+_ANSWER: Final = (
+    point.VELOCITY,
+    point.UNCERTAINTY,
+    point.REGIME,
+    point.PRIMED_AFTER,
+    point.MARGIN,
+    point.MARGIN_SQUARE,
+)
+
+
+def _one_flow(query: list[float]) -> Flow:
+    velocity, width, regime, _, primed = query[point.VELOCITY : point.PRIMED_AFTER + 1]
     return Flow(
-        velocity=np.where(reverse, -backward.velocity, forward.velocity),
-        regime=np.asarray(np.where(ahead | reverse, regime, Regime.BLOCKED), dtype=np.int64),
-        uncertainty=np.where(reverse, backward.half_width, forward.half_width),
-        primed=np.where(reverse, backward.primed, forward.primed),
+        velocity=np.asarray(velocity),
+        regime=np.asarray(int(regime)),
+        uncertainty=np.asarray(width),
+        primed=np.asarray(primed != 0.0),
     )
-
-
-# Density and speed act on both chambers and on the tube at once, so the law handles them separately.
-_SHARED: Final = ("density", "speed")
-_VARIED_FILLS: Final = np.array([0.2, 0.5, 0.8])
-"""Of the greatest fill ratio: where the velocity's dependence on fitted inputs is looked at."""
-_VARIED_PRESSURES: Final = np.array([0.7, 1.0, 1.4])
-"""Of the scene's gas pressure."""
-_LITTLE: Final = 1e-2
-"""Of the largest effect of a direction, below which it is left out: its square counts."""
-_NEXT_TO_NOTHING: Final = 1e-4
-"""Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
-
-
-def calibrated_law(
-    *, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads, varied: bool = True
-) -> CalibratedLaw:
-    """Put the flow law together.
-
-    Args: `varied`: whether inputs that were fitted together are varied for the law's uncertainty.
-
-    Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
-    """
-    own = [
-        e.hydrostatic_pressure
-        for name, e in chamber.input_effects.items()
-        if name not in _SHARED and name != FITTED
-    ]
-    inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
-    no_inputs = np.zeros_like(chamber.fill_ratio)
-    law = _put_together(
-        scene,
-        heads=heads,
-        hydrostatic_pressure=chamber.hydrostatic_pressure.table,
-        hydrostatic_pressure_uncertainty=chamber.hydrostatic_pressure.uncertainty_table(inputs=inputs),
-        inputs=_drive_uncertainty(scene),
-        moment=CalibratedMoment(
-            chamber_moment=chamber.moment.table,
-            half_width=chamber.moment.uncertainty_table(inputs=no_inputs),
-            across=_across_table(scene, chamber.moment.table.nodes),
-        ),
-    )
-    return replace(law, variants=_variants(scene)) if varied and scene.fitted.quantities else law
-
-
-def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
-    """Nominal laws along the directions of the fitted inputs that the velocity depends on, low and high.
-
-    The directions are turned to the singular vectors of the velocity's changes over fills and pressures.
-    """
-    gravity = gravity_shares(scene).mean > scene.tolerance
-
-    def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
-        sides = [side for both in direction_sides(scene, turned=turned).values() for side in both]
-        made = zip(nominal_laws(sides, gravity=gravity), sides, strict=True)
-        return tuple(_variant(scene, law, side) for law, side in made)
-
-    pressure = _VARIED_PRESSURES * scene.gas.pressure
-    fill = _VARIED_FILLS[:, None] * scene.disc.max_fill_ratio
-    velocities = np.array(
-        [law.evaluate(fill_ratio=fill, gas_pressure=pressure, primed=True).velocity.ravel() for law in laws()]
-    )
-    changes = (velocities[1::2] - velocities[::2]).T
-    _, size, turned = np.linalg.svd(changes, full_matrices=False)
-    return laws(turned[size > _LITTLE * size[0]].T) if size[0] > 0 else ()
-
-
-def _variant(scene: Scene, law: CalibratedLaw, side: Scene) -> CalibratedLaw:
-    """Law of a scene beside another one; gas pressures are asked for as that has them."""
-    asked = scene.gas.pressure
-    return replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) if asked else law
-
-
-def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
-    """The calibrated law without finite elements and without uncertainties, in a few milliseconds.
-
-    Its velocities are within 1e-4 of those of `calibrated_law`, by fewer nodes of the heads; half-widths are
-    zero.  For the many scenes that differ from a calibrated one in their values, such as those of a fit.
-    Args: `gravity`: whether the chamber's values hold gravity, as `calibrate` decides for the scene.
-    Raises: ValueError: bends that do not fit into the tube.
-    Source: Eqs. 13 to 18 of the liquid-ring paper; `RingValues.of`, `TubeHeads.nominal`.
-    """
-    return nominal_laws([scene], gravity=gravity)[0]
-
-
-def nominal_laws(scenes: Sequence[Scene], *, gravity: bool) -> tuple[CalibratedLaw, ...]:
-    """The same of many scenes; those that differ in numbers alone, and not in their fills, at once."""
-    laws: dict[int, CalibratedLaw] = {}
-    for places in alike(scenes):
-        some = [scenes[place] for place in places]
-        laws |= zip(places, _nominal(some, gravity=gravity), strict=True)
-    return tuple(laws[place] for place in range(len(scenes)))
-
-
-def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLaw]:
-    """Of scenes that are alike."""
-    fills = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0]
-    ends = {"start": 0.0, "stop": float(fills[-1])}
-    heads = TubeHeads.nominal(Designs.stacked(scenes))
-    rings = [RingValues.of(scene, fill_ratio=fills, gravity=gravity) for scene in scenes]
-    moments = [
-        scene.disc.moment_factor * ring.moment.value for scene, ring in zip(scenes, rings, strict=True)
-    ]
-    levels = pressure_tables(scenes, fills, [ring.hydrostatic_pressure.value for ring in rings])
-    curves = tables_from_samples(value=np.stack(moments, axis=1), **ends)
-    exact = flat_table(**ends)
-    for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):
-        yield _put_together(
-            scene,
-            heads=head,
-            hydrostatic_pressure=level,
-            hydrostatic_pressure_uncertainty=exact,
-            inputs=DriveUncertainty(),
-            moment=CalibratedMoment(
-                chamber_moment=moment, half_width=exact, across=_across_table(scene, fills)
-            ),
-        )
-
-
-def _put_together(
-    scene: Scene,
-    *,
-    heads: TubeHeads,
-    hydrostatic_pressure: HermiteTable,
-    hydrostatic_pressure_uncertainty: HermiteTable,
-    inputs: DriveUncertainty,
-    moment: CalibratedMoment,
-) -> CalibratedLaw:
-    return CalibratedLaw(
-        name=CALIBRATED,
-        max_fill_ratio=scene.disc.max_fill_ratio,
-        ambient_pressure=scene.gas.ambient_pressure,
-        chamber_volume=chamber_volume(disc=scene.disc),
-        tube_area=scene.tube.area,
-        hydrostatic_pressure=hydrostatic_pressure,
-        hydrostatic_pressure_uncertainty=hydrostatic_pressure_uncertainty,
-        path=tube_path(scene),
-        heads=heads,
-        inputs=inputs,
-        gas_factor=pressure_factor(scene),
-        moment=moment,
-    )
-
-
-def _drive_uncertainty(scene: Scene) -> DriveUncertainty:
-    width = independent_half_widths(scene)
-    hump = scene.tube.hump_radius or 0.0
-    moved = scene.liquid.density * scene.rotor.speed**2 * hump * width.get("hump_radius", 0.0)
-    return DriveUncertainty(
-        relative_density=width.get("density", 0.0) / scene.liquid.density,
-        relative_speed=width.get("speed", 0.0) / abs(scene.rotor.speed),
-        relative_gas_pressure=width.get("pressure", 0.0) / scene.gas.pressure if scene.gas.pressure else 0.0,
-        hump_pressure=moved,
-        vapour_pressure=math.hypot(width.get("vapour_pressure", 0.0), width.get("ambient_pressure", 0.0)),
-    )
-
-
-def _across_table(scene: Scene, fills: FloatArray) -> HermiteTable | None:
-    """W(x), the moment across a chamber's middle, kg m; None where it turns moments by next to nothing.
-
-    Gravity is left out, whose mean changes U and W alike in the first place.
-    Args: `fills`: nodes, equally spaced from zero.
-    Source: rho int y dV over the liquid, times the scene's factor on moments.
-    """
-    disc = scene.disc
-    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING:
-        return None
-    a = surface_radius(disc=disc, fill_ratio=fills)
-    value = scene.liquid.density * disc.axial_width * moment_across(disc=disc, surface_radius=a)
-    return table_from_samples(start=0.0, stop=float(fills[-1]), value=disc.moment_factor * value)

@@ -12,11 +12,10 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, DriveUncertainty
 from ringbalance.reduced_model.law.flow_law import FORMAT, VERSION, CompleteLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
-from ringbalance.reduced_model.tables import HermiteTable
-from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.faults import Fault, SceneError
@@ -27,10 +26,10 @@ _RECORDS: Final[Mapping[str, type]] = MappingProxyType(
         for record in (
             CalibratedLaw,
             CalibratedMoment,
-            HermiteTable,
             DriveUncertainty,
             PaperLaw,
             PaperMoment,
+            Table,
             TubeHeads,
             TubePath,
         )
@@ -45,7 +44,6 @@ _POSITIVE: Final = frozenset(
         "max_fill_ratio",
         "axial_width",
         "central_angle",
-        "step",
         "gas_factor",
     }
 )

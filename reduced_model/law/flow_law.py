@@ -25,7 +25,7 @@ CALIBRATED: Final = "calibrated"
 """Name of the law that `calibrate` makes, which is used where no other is asked for."""
 UNCHECKED: Final = "calibrated, unchecked"
 """The same without finite elements beside it and effects of uncertain inputs, for runs of many designs."""
-_FILL_SLACK: Final = 1e-9
+FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
 
 
@@ -159,7 +159,7 @@ class Conditions:
 
 def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
     x = np.asarray(plain_number(fill_ratio, "")[0], dtype=np.float64)
-    if not ((x >= -_FILL_SLACK) & (x <= largest + _FILL_SLACK)).all():
+    if not ((x >= -FILL_SLACK) & (x <= largest + FILL_SLACK)).all():
         raise ValueError(f"{name} must lie within [0, {largest:g}]")
     return clipped(x, 0.0, largest)
 
@@ -178,7 +178,7 @@ def law_text(law: Any) -> str:
 
 
 FORMAT: Final = "ringbalance law"
-VERSION: Final = 3
+VERSION: Final = 4
 
 
 def save_record(*, path: Path, record: object) -> Path:

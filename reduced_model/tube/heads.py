@@ -1,10 +1,10 @@
-"""The tube's loss as tables of head against velocity, which a flow law can invert in microseconds."""
+"""The tube's loss as the law holds it: velocity over the root of a head, along the head's eighth root."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,14 +17,14 @@ from ringbalance.physics.tube.loss import (
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, tables_from_samples
+from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, spline, table_at
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_span,
     head_behind_crest,
     reversed_tube,
 )
-from ringbalance.scene.arrays import BoolArray, FloatArray, plain
+from ringbalance.scene.arrays import FloatArray, clipped, plain
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import SceneError
@@ -33,11 +33,25 @@ from ringbalance.scene.toml import toml_text
 from ringbalance.scene.uncertain import independent_half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
-"""m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
-_NODES: Final = 2049
-"""Of a table; more sharpen nothing but the bend where the flow turns turbulent."""
-_NOMINAL_NODES: Final = 257
-_UNCERTAINTY_NODES: Final = 513
+"""m/s; below, the flow creeps and the head is proportional to u; above, to its square."""
+_SAMPLES: Final = 2049
+"""At which knots may stand; more sharpen nothing but the bend where the flow turns turbulent."""
+_NOMINAL_KNOTS: Final = 257
+LOSS, SHARE_WIDTH, SHARE, BACK_SHARE = 3, 4, 5, 7
+"""Columns of a table: half-width of the loss, behind the ratio with its derivatives; of the whole tube also
+half-width of the share, the share and its slope, and the same of the way back."""
+_OF_TOLERANCE: Final = 1e-7
+"""Largest relative error of a velocity between knots, of the scene's tolerance."""
+_FINEST: Final = 1e-5
+"""Tolerance below which knots do not become more."""
+_OF_SHARES: Final = 1000.0
+"""Times that of a share, which decides on nothing but the regime."""
+_OF_WIDTHS: Final = 1e-4
+"""Of a half-width, and a tenth of that of the largest one."""
+_OF_HEAD: Final = 2.0
+"""Relative error of a head over that of the velocity that it drives, at the most."""
+_NEWTON_STEPS: Final = 30
+_ROUND_OFF: Final = 1e-15
 _LEVELLED: Final = 0.05
 """Of ln of a head: a few percent, a fraction of what such errors change it by."""
 _RISE: Final = 1e-9
@@ -46,88 +60,244 @@ _RISE: Final = 1e-9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TubeHeads:
-    """Heads of the full tube over ln u (u in m/s), natural logarithms of m^2/s^2."""
+    """Heads of the full tube in tables of `point`, along the eighth root of a head, (m/s)^(1/4)."""
 
-    head: HermiteTable
-    """ln((k + 1) u^2/2): between the chambers."""
-    hump_head: HermiteTable | None
-    """ln((alpha + k_up) u^2/2): from the driven chamber to the lowest pressure on the path, at the end of the
-    crest's arc or just behind it; None without a crest."""
-    return_hump_head: HermiteTable | None
-    """The same from the opposite chamber, for reverse flow."""
-    uncertainty: HermiteTable
-    """Expanded uncertainty (95 %) of k over k + 1."""
-    hump_uncertainty: HermiteTable
-    """Expanded uncertainty (95 %) of k_up over alpha + k_up, with the place of the crest's end."""
-    fraction_uncertainty: HermiteTable
-    """Expanded uncertainty (95 %) of (alpha + k_up)/(k + 1)."""
+    siphon: Table
+    """Of (k + 1) u^2/2, between the chambers: u/sqrt(head), half-width of k over k + 1, and with a crest that
+    of the share (alpha + k_up)/(k + 1) of the head that is lost up to it, and the share; where the way back
+    differs, its share too."""
+    hump: Table | None
+    """Of (alpha + k_up) u^2/2, from the driven chamber to the lowest pressure on the path, at the end of the
+    crest's arc or just behind it: u/sqrt(head), half-width of k_up over alpha + k_up with the place of the
+    crest's end; None without a crest."""
+    return_hump: Table | None
+    """The same from the opposite chamber, for reverse flow; None: it is the same, or there is no crest."""
     interpolation_error: float = 0.0
-    """Largest relative error of the head tables found between their nodes; zero where none was looked for."""
+    """Largest relative error of a head found between knots; zero where none was looked for."""
 
     @classmethod
     def nominal(cls, designs: Designs) -> tuple[TubeHeads, ...]:
-        """The heads of every design without uncertainties and on few nodes.
+        """The heads of every design without uncertainties and on few knots.
 
         These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values.
         Raises: ValueError: as `TubeHeads.of`. SceneError: the scene's `model_errors` make no loss.
         """
-        return cls._tabled(designs.scene, _sampled(designs.scene, _NOMINAL_NODES))
-
-    @classmethod
-    def _tabled(cls, scene: Scene, values: list[FloatArray]) -> tuple[TubeHeads, ...]:
-        """From `log_heads` over the velocities, shape (nodes, designs)."""
-        if not all(np.all(np.diff(value, axis=0) > 0) for value in values):
-            raise _inconsistent(scene)
-        start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-        exact = flat_table(start=start, stop=stop)
-        tables = [tables_from_samples(start=start, stop=stop, value=value) for value in values]
+        log_u = _places(_NOMINAL_KNOTS)
+        lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
+        exact = _Widths(*([np.zeros(log_u.size)] * 4))
         return tuple(
-            cls(
-                head=between,
-                hump_head=to_crest[0] if to_crest else None,
-                return_hump_head=to_crest[1] if to_crest else None,
-                uncertainty=exact,
-                hump_uncertainty=exact,
-                fraction_uncertainty=exact,
-            )
-            for between, *to_crest in zip(*tables, strict=True)
+            cls._tabled([each.of_design(i) for each in lost], exact, shortest=0)[0]
+            for i in range(lost[0].root.shape[1])
         )
 
     @classmethod
     def bare(cls, scene: Scene) -> TubeHeads:
         """The same heads as `of`, without their uncertainties: a fraction of its work. Raises: as `of`."""
-        return cls._tabled(scene, _sampled(scene, _NODES))[0]
+        return cls._with_widths(scene, _Widths(*([np.zeros(2 * _SAMPLES - 1)] * 4)))
 
     @classmethod
     def of(cls, scene: Scene) -> TubeHeads:
-        """Tabulate the heads of a scene's tube.
+        """Tabulate the heads of a scene's tube, on as many knots as its tolerance asks for.
 
         Raises: ValueError: arcs of bends longer than the tube.
         Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
         """
         place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
-        start, stop = np.log(TABLE_VELOCITIES)
-        widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
-        places, values = np.linspace(start, stop, 2 * _NODES - 1), _sampled(scene, 2 * _NODES - 1)
-        heads = cls._tabled(scene, [value[::2] for value in values])[0]
-        tables = (heads.head, heads.hump_head, heads.return_hump_head)
-        missed = [
-            np.max(np.abs(table(places) - value[:, 0]))
-            for table, value in zip(tables, values, strict=False)
-            if table is not None
-        ]
-        return replace(heads, interpolation_error=float(max(missed)), **widths)
+        log_u, every = _places(2 * _SAMPLES - 1), _places(_SAMPLES)
+        widths = _widths(scene, np.exp(every), place=place)
+        return cls._with_widths(scene, _Widths(*(np.interp(log_u, every, width) for width in widths)))
 
-    def to_crest(self, *, reverse: bool) -> HermiteTable | None:
+    @classmethod
+    def _with_widths(cls, scene: Scene, widths: _Widths) -> TubeHeads:
+        """Of a scene's tube, with half-widths at the samples."""
+        log_u = _places(2 * _SAMPLES - 1)
+        lost = [_Lost.of(log_u, value[:, 0]) for value in _sampled(scene, log_u)]
+        heads, missed = cls._tabled(
+            lost, widths, shortest=2, allowed=_OF_TOLERANCE * max(scene.tolerance, _FINEST)
+        )
+        return replace(heads, interpolation_error=_OF_HEAD * missed)
+
+    @classmethod
+    def _tabled(
+        cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float = 0.0
+    ) -> tuple[TubeHeads, float]:
+        """From losses and half-widths at samples; `shortest`: as `knots_of`, or 0 for a knot at each sample.
+
+        Returns: The heads, and the largest relative error of a velocity.
+        """
+        whole, *ways = lost
+        alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
+        ways = ways[:1] if alike else ways
+        columns = [whole.ratio(allowed), _half_width(widths.whole)]
+        if ways:
+            columns += [_half_width(widths.share), *(whole.share(way, allowed) for way in ways)]
+        there = zip(ways, widths.ways, strict=False)
+        tables = [(way, [way.ratio(allowed), _half_width(width)]) for way, width in there]
+        made, missed = [], 0.0
+        for each, some in [(whole, columns), *tables]:
+            knots = knots_of(each.root, some, shortest=shortest) if shortest else np.arange(each.root.size)
+            made.append(table_at(each.root, knots, some))
+            missed = max(missed, float(np.max(np.abs(made[-1].quintic(each.root) / each.over_root - 1.0))))
+        return cls.with_ways(*made), missed
+
+    @classmethod
+    def with_ways(
+        cls, siphon: Table, hump: Table | None = None, back: Table | None = None, *, error: float = 0.0
+    ) -> TubeHeads:
+        """The heads with what there is of ways to a crest."""
+        return cls(siphon=siphon, hump=hump, return_hump=back, interpolation_error=error)
+
+    @property
+    def tables(self) -> tuple[Table, ...]:
+        """Of the whole tube, and of the ways to a crest, in the order of `point`."""
+        return tuple(each for each in (self.siphon, self.hump, self.return_hump) if each is not None)
+
+    def to_crest(self, *, reverse: bool) -> Table | None:
         """From the chamber that gives liquid; None without a crest."""
-        return self.return_hump_head if reverse else self.hump_head
+        return self.return_hump or self.hump if reverse else self.hump
 
-    def without_inputs(self, *, scene: Scene, velocity: float) -> TubeHeads:
-        """The heads with models' uncertainties alone, for velocities within a factor of e^4 of one, m/s."""
+    def velocity(self, head: npt.ArrayLike) -> FloatArray:
+        """Of a full tube under heads of at least zero, m/s."""
+        root, table = np.sqrt(np.sqrt(np.sqrt(np.asarray(head, dtype=np.float64)))), self.siphon
+        slower = np.minimum(root / table.knots[0], 1.0) ** 4
+        return np.asarray(root**4 * table.quintic(root) * slower)
+
+    def uncertainty(self, velocity: npt.ArrayLike) -> FloatArray:
+        """Expanded uncertainty (95 %) of k over k + 1 at velocities above zero, m/s."""
+        return self.siphon.straight(roots_of(self.siphon, velocity), LOSS)
+
+    def without_inputs(self, *, scene: Scene) -> TubeHeads:
+        """The heads with models' uncertainties alone."""
         place = crest_end_uncertainty(scene.tube, 0.0)
-        log_velocity = np.log(velocity) + np.linspace(-4.0, 4.0, 33)
-        widths = _widths(scene, log_velocity, place=place, by_inputs=False)
-        return replace(self, **widths)  # type: ignore[arg-type]
+
+        def widths(table: Table) -> _Widths:
+            return _widths(scene, _velocities(table), place=place, by_inputs=False)
+
+        whole = widths(self.siphon)
+        siphon = self.siphon.with_column(LOSS, whole.whole)
+        if self.hump is None:
+            return replace(self, siphon=siphon)
+        siphon, back = siphon.with_column(SHARE_WIDTH, whole.share), self.return_hump
+        return TubeHeads(
+            siphon=siphon,
+            hump=self.hump.with_column(LOSS, widths(self.hump).there),
+            return_hump=None if back is None else back.with_column(LOSS, widths(back).back),
+            interpolation_error=self.interpolation_error,
+        )
+
+    def raised(self, logarithm: float) -> TubeHeads:
+        """Every head times exp(logarithm)."""
+        root, ratio = np.exp(logarithm / 8), np.exp(-logarithm / 2)
+
+        def raised(table: Table) -> Table:
+            factors = np.ones(table.count)
+            factors[:LOSS] = ratio / root ** np.arange(LOSS)
+            factors[SHARE + 1 :: 2] = 1 / root
+            columns = np.repeat(factors, table.knots.size) * table.columns
+            return Table(knots=root * table.knots, columns=columns)
+
+        return self._changed(raised)
+
+    def power(self, *, velocity: float, exponent: float) -> TubeHeads:
+        """Heads in proportion to a power of the velocity, those of the tube at one velocity, m/s."""
+
+        def power(table: Table) -> Table:
+            u, at = _velocities(table), roots_of(table, velocity)
+            root, n = float(at) * (u / velocity) ** (exponent / 8), 8 / exponent - 4
+            ratio = u / root**4
+            columns = [ratio, n * ratio / root, n * (n - 1) * ratio / root**2]
+            columns += [table.column(number) for number in range(LOSS, min(table.count, SHARE))]
+            for number in range(SHARE, table.count, 2):
+                columns += [np.full_like(u, table.cubic(at, number)), np.zeros_like(u)]
+            return Table(knots=root, columns=np.concatenate(columns))
+
+        return self._changed(power)
+
+    def _changed(self, change: Callable[[Table], Table]) -> TubeHeads:
+        ways = (None if table is None else change(table) for table in (self.hump, self.return_hump))
+        hump, back = ways
+        return replace(self, siphon=change(self.siphon), hump=hump, return_hump=back)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Lost:
+    """One head over samples of the velocity; arrays of one shape."""
+
+    root: FloatArray
+    """s, the eighth root of the head."""
+    over_root: FloatArray
+    """u/s^4."""
+    log_head: FloatArray
+    slope: FloatArray
+    """d ln(head)/d(ln u)."""
+    curvature: FloatArray
+    """Its own derivative by ln u."""
+
+    @classmethod
+    def of(cls, log_u: FloatArray, log_head: FloatArray) -> _Lost:
+        """Args: shapes (samples, 1 or designs), or (samples,) both."""
+        at = np.ravel(log_u)
+        curve = spline(at, log_head)
+        slope, curvature = curve(at, nu=1), curve(at, nu=2)
+        rise = np.diff(log_head, axis=0) / np.diff(log_u, axis=0)
+        steepest = np.maximum(np.concatenate([rise[:1], rise]), np.concatenate([rise, rise[-1:]]))
+        # Where a head is next to level, a spline may fall: one velocity belongs to each head.
+        falls = slope < steepest / 3
+        return cls(
+            root=np.exp(log_head / 8),
+            over_root=np.exp(log_u - log_head / 2),
+            log_head=log_head,
+            slope=np.where(falls, steepest / 3, slope),
+            curvature=np.where(falls, 0.0, curvature),
+        )
+
+    def of_design(self, number: int) -> _Lost:
+        """One of many."""
+        return _Lost(**{name: value[:, number] for name, value in vars(self).items()})
+
+    def ratio(self, allowed: float) -> Column:
+        """u/s^4 over s, by the derivatives of ln u over ln s."""
+        ratio, rise = self.over_root, 8 / self.slope - 4
+        turn = -64 * self.curvature / self.slope**3
+        slope, curvature = ratio * rise / self.root, ratio * (rise * (rise - 1) + turn) / self.root**2
+        return Column(value=ratio, allowed=allowed * ratio, derivatives=(slope, curvature))
+
+    def share(self, way: _Lost, allowed: float) -> Column:
+        """Of this head, that is lost on the way to the crest, over s."""
+        share = np.exp(way.log_head - self.log_head)
+        slope = share * (way.slope / self.slope - 1) * 8 / self.root
+        return Column(value=share, allowed=_OF_SHARES * allowed * share, derivatives=(slope,))
+
+
+def _half_width(value: FloatArray) -> Column:
+    return Column(value=value, allowed=_OF_WIDTHS * (value + 0.1 * float(np.max(value))))
+
+
+def _places(count: int) -> FloatArray:
+    """Even in ln u."""
+    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+    return np.linspace(start, stop, count)
+
+
+def _velocities(table: Table) -> FloatArray:
+    """At the knots, m/s."""
+    return np.asarray(table.knots**4 * table.column(0))
+
+
+def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
+    """Eighth roots of the heads that velocities above zero lose, m/s."""
+    u, at = np.asarray(velocity, dtype=np.float64), _velocities(table)
+    inside, knots = clipped(u, at[0], at[-1]), table.knots
+    piece = np.searchsorted(at[1:-1], inside)
+    low, high = knots[piece], knots[piece + 1]
+    root = low + (high - low) * (inside - at[piece]) / (at[piece + 1] - at[piece])
+    for _ in range(_NEWTON_STEPS):
+        ratio, slope = table.quintic(root), table.quintic_slope(root)
+        change = (inside - root**4 * ratio) / (root**3 * (4 * ratio + root * slope))
+        root = np.minimum(np.maximum(root + change, low), high)
+        if np.all(np.abs(change) <= _ROUND_OFF * root):
+            break
+    return np.asarray(root * np.minimum(u / at[0], 1.0) ** 0.125 * np.maximum(u / at[-1], 1.0) ** 0.25)
 
 
 def _inconsistent(scene: Scene) -> Exception:
@@ -145,30 +315,19 @@ def _inconsistent(scene: Scene) -> Exception:
     return SceneError([replace(fault, value=toml_text(written))])
 
 
-def _sampled(scene: Scene, count: int) -> list[FloatArray]:
-    """`log_heads` over even places, shape (count, designs).
+def _sampled(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
+    """`log_heads` over even places, shape (samples, designs).
 
     Raises: as `TubeHeads.nominal`.
     """
-    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    places = np.linspace(start, stop, count)[:, None]
+    places = log_velocity[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         values = log_heads(scene, places)
-    if not np.all(np.isfinite(values)):
-        raise _inconsistent(scene)
-    if scene.tube.model_errors:
+    if scene.tube.model_errors and np.all(np.isfinite(values)):
         values = [_growing(scene, places, value) for value in values]
+    if not all(np.all(np.isfinite(value)) and np.all(np.diff(value, axis=0) > 0) for value in values):
+        raise _inconsistent(scene)
     return values
-
-
-def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
-    """Velocity that belongs to a head.
-
-    Returns: u, m/s, the shape of `head`.
-    """
-    # A pressure above zero may make a head that is rounded to zero.
-    flows = where & (np.asarray(head) > 0)
-    return np.where(flows, np.exp(table.inverse(np.log(np.where(flows, head, 1.0)))), 0.0)
 
 
 def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray) -> FloatArray:
@@ -184,31 +343,57 @@ def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray) -> Fl
     return highest + _RISE * log_velocity
 
 
-def _widths(
-    scene: Scene, log_velocity: FloatArray, *, place: float, by_inputs: bool = True
-) -> dict[str, HermiteTable]:
-    """Uncertainties of `TubeHeads` over even places in ln u, but for those of inputs fitted together.
+class _Widths(NamedTuple):
+    """Expanded uncertainties (95 %)."""
+
+    whole: FloatArray
+    """Of k over k + 1."""
+    share: FloatArray
+    """Of (alpha + k_up)/(k + 1), the larger one of both directions."""
+    there: FloatArray
+    """Of k_up over alpha + k_up."""
+    back: FloatArray
+    """The same of the way back."""
+
+    @property
+    def ways(self) -> tuple[FloatArray, FloatArray]:
+        """There and back."""
+        return self.there, self.back
+
+
+def _widths(scene: Scene, velocity: FloatArray, *, place: float, by_inputs: bool = True) -> _Widths:
+    """But for inputs fitted together.
 
     Args: `place`: uncertainty of the crest's end.
     """
-    tube, u, end = scene.tube, np.exp(log_velocity), crest_span(scene.tube)[1]
-    state = tube_state(scene, u)
-    right = with_errors(tube=tube, state=state)
-    parts: Mapping[str, FloatArray] = unfitted_parts(scene, model_parts(tube=tube, state=state))
+    state = tube_state(scene, velocity)
+    parts: Mapping[str, FloatArray] = unfitted_parts(scene, model_parts(tube=scene.tube, state=state))
     if by_inputs:
-        parts = uncertainty_parts(scene, velocity=u, state=state, fitted=False)
-    k, upstream = right.k, right.upstream_loss(end)
-    width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
+        parts = uncertainty_parts(scene, velocity=velocity, state=state, fitted=False)
+    width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(velocity)))
+    right = with_errors(tube=scene.tube, state=state)
+    there, share = _way_widths(scene.tube, state, right, parts, width, place)
+    seen, right_seen = (replace(each, bends=each.bends[::-1]) for each in (state, right))
+    back, share_back = _way_widths(reversed_tube(scene.tube), seen, right_seen, parts, width, place)
+    return _Widths(whole=width / (right.k + 1), share=np.maximum(share, share_back), there=there, back=back)
+
+
+def _way_widths(
+    tube: Tube,
+    state: TubeState,
+    right: TubeState,
+    parts: Mapping[str, FloatArray],
+    width: FloatArray,
+    place: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Of k_up over alpha + k_up and of (alpha + k_up)/(k + 1).
+
+    Args: `right`: the state with supposed errors. `width`: of k by all parts.
+    """
+    upstream, k = right.upstream_loss(crest_span(tube)[1]), right.k
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
-    to_crest = right.kinetic_factor + upstream
     moved = np.hypot(width * share, state.along * place)
-    found = {
-        "uncertainty": width / (k + 1),
-        "hump_uncertainty": moved / to_crest,
-        "fraction_uncertainty": _fraction_uncertainty(tube, state, parts, place),
-    }
-    ends = float(log_velocity[0]), float(log_velocity[-1])
-    return {name: level_table(start=ends[0], stop=ends[1], value=value) for name, value in found.items()}
+    return moved / (right.kinetic_factor + upstream), _fraction_uncertainty(tube, state, parts, place)
 
 
 def _fraction_uncertainty(

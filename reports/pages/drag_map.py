@@ -26,7 +26,7 @@ from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
-from ringbalance.reduced_model.tube.heads import crest_head
+from ringbalance.reduced_model.tube.heads import crest_head, roots_of
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import (
     TubeEnds,
@@ -389,13 +389,13 @@ def read_by_eq_18(
     Raises: ValueError: a law without a crest, whose column does not separate.
     Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.
     """
-    if law.heads.hump_head is None:
+    if law.heads.hump is None:
         raise ValueError("a tube without a siphon crest does not separate: give tube.hump_radius")
     u = np.asarray(velocity, dtype=np.float64)
     ends = law.ends(fill_ratio=0.0, opposite_fill_ratio=opposite_fill_ratio)
     excess = float(driving_pressure(law.path, ends) - crest_margins(law.path, ends)[0]) / law.density
     siphon, lower_bound = (
-        2 * np.exp(table(np.log(u))) / u**2 - 1 for table in (law.heads.head, law.heads.hump_head)
+        2 * roots_of(table, u) ** 8 / u**2 - 1 for table in (law.heads.siphon, law.heads.hump)
     )
     return siphon, lower_bound + 2 * excess / u**2
 

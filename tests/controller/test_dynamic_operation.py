@@ -18,6 +18,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
+from ringbalance.reduced_model.tube.heads import roots_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
 
@@ -106,14 +107,14 @@ class Independent:
         cavity = (law.path.vapour_pressure + max(q - AMBIENT, law.path.vapour_pressure)) / 2
         if primed:
             return cavity, 1.0
-        assert law.heads.hump_head is not None
+        assert law.heads.hump is not None
         assert law.path.hump_pressure is not None
         gas = max(q - AMBIENT, cavity)
         margin = p - AMBIENT + self.level(x) - law.path.hump_pressure - gas
         if margin <= 0:
             return gas, 0.0
-        table, head = law.heads.hump_head, math.log(margin / law.density)
-        spill = math.exp(brentq(lambda v: float(table(v)) - head, -80.0, 6.0, xtol=1e-13))
+        table, head = law.heads.hump, margin / law.density
+        spill = brentq(lambda v: float(roots_of(table, v)) ** 8 - head, 1e-35, 400.0, xtol=1e-13)
         part = min(max((spill / law.path.froude_velocity - 0.6) / 0.5, 0.0), 1.0)
         cleared = part * part * (3 - 2 * part)
         return gas + cleared * (cavity - gas), cleared
@@ -121,12 +122,12 @@ class Independent:
     def push(self, x: float, u: float, p: float, q: float, *, primed: bool) -> float:
         """du/dt: a full column first; if its crest would be below the pressure there, the separated one."""
         law, rho = self.law, self.law.density
-        assert law.heads.hump_head is not None
+        assert law.heads.hump is not None
         assert law.path.hump_pressure is not None
         hump = self.share * self.length
-        log_u = math.log(max(u, 1e-12))
-        whole = rho * math.exp(float(law.heads.head(log_u)))
-        upper = rho * math.exp(float(law.heads.hump_head(log_u)))
+        speed = max(u, 1e-12)
+        whole = rho * float(roots_of(law.heads.siphon, speed)) ** 8
+        upper = rho * float(roots_of(law.heads.hump, speed)) ** 8
         full = (p - q + self.level(x) - self.level(0.5 - x) - whole) / (rho * self.length)
         over = p - AMBIENT + self.level(x) - law.path.hump_pressure - upper
         cavity, _ = self.over_crest(x, p, q, primed=primed)

@@ -15,8 +15,8 @@ from ringbalance.controller.liquid_ring.devices import Spread
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.loop import simulate
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.flow_law import BalancerModel, MomentCurve
+from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene

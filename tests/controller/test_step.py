@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from ringbalance.reduced_model.injection import column, step
-from ringbalance.reduced_model.injection.dynamics import HEAD, TO_CREST, Dynamics
+from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.pieces.point import SIPHON, THERE
 
 
 def plain_form() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -41,13 +42,14 @@ def test_the_step_damps_what_is_infinitely_stiff() -> None:
     assert 1.0 - end @ np.linalg.solve(beta, np.ones(4)) == pytest.approx(0.0, abs=1e-4)
 
 
-def test_the_inverse_of_a_table_finds_what_the_table_gives(
+def test_a_loss_and_the_velocity_that_its_pressure_drives_are_each_others_inverse(
     calibrated: BalancerModel, plant: Callable[..., Dynamics]
 ) -> None:
     known = plant(calibrated, "tube inertia").kept_plant(total=0.5)[0]
-    for which in (HEAD, TO_CREST):
-        start = known["table_start"][which]
-        end = start + known["pieces"][which] / known["nodes_per"][which]
-        for x in [start - 3.0, start, *np.linspace(start, end, 300), end, end + 2.0]:
-            value = column.table(known, which, float(x))[0]
-            assert column._inverse(known, which, value) == pytest.approx(x, abs=1e-11)
+    for which in (SIPHON, THERE):
+        for speed in np.geomspace(1e-7, 1e4, 300).tolist():
+            head, slope = column.tube_loss(known, which, speed, speed)
+            pressure = float(head * known["density"])
+            assert column.quasi_steady(known, which, pressure, 0.0) == pytest.approx(speed, rel=1e-12)
+            faster = column.tube_loss(known, which, speed * (1 + 1e-7), speed * (1 + 1e-7))[0]
+            assert (faster - head) / (1e-7 * speed) == pytest.approx(slope, rel=1e-5)

@@ -15,7 +15,7 @@ import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
 from ringbalance.export.blocks import Block, controller_block, disc_block
 from ringbalance.export.compact import compact_law
-from ringbalance.export.hosts import c_files, python_files
+from ringbalance.export.hosts import c_files, python_files, st_files
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -133,5 +133,13 @@ def test_the_controller_passes_over_what_is_no_number_and_forgets_nothing(blocks
 
 def test_another_controller_is_refused() -> None:
     other = exact_scene("six_chamber").with_values({"controller.kind": "law_based"})
-    with pytest.raises(SceneError, match="law_based"):
+    with pytest.raises(SceneError, match=r"law_based.*runs in this program alone.*\n?.*best of that kind"):
         controller_block(other)
+
+
+def test_headers_and_declarations_say_unit_range_and_meaning(blocks: dict[str, Block]) -> None:
+    header = c_files(blocks["disc"], "m")["m.h"]
+    assert "/* out, Pa, 0 to 1e+08: absolute pressure of the gas in chamber F */" in header
+    assert header.count("/* in, ") + header.count("/* out, ") == len(blocks["disc"].variables)
+    assert "(* in, s, 0 to 1e+06: how long" in st_files(blocks["disc"], "m")["m.st"]
+    assert "# out, m, -1 to 1: zero-to-peak vibration" in python_files(blocks["disc"], "m")["m.py"]

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from law_queries import answers, queries
 
-from ringbalance.export import point
+from ringbalance.export import chamber
 from ringbalance.export.compact import TOLERANCE, CompactLaw, compact_law
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.pieces import point
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
@@ -42,11 +43,11 @@ def test_it_is_small_and_within_its_tolerance_of_the_calibrated_law(laws: Both) 
 def test_a_chamber_has_its_surface_and_its_moment(laws: Both, paper_scene: Scene) -> None:
     law, compact = laws
     fill = np.linspace(0.0, law.max_fill_ratio, 57)
-    moment = [point.moment(compact.constants, compact.pieces, each) for each in fill.tolist()]
+    moment = [chamber.moment(compact.constants, compact.pieces, each) for each in fill.tolist()]
     right = law.moment.chamber_moment(fill)
     assert moment == pytest.approx(right, abs=2e-5 * float(np.max(np.abs(right))))
     if compact.scene == paper_scene.file:
-        radius = [point.surface_radius(compact.constants, compact.pieces, each) for each in fill.tolist()]
+        radius = [chamber.surface_radius(compact.constants, compact.pieces, each) for each in fill.tolist()]
         assert radius == pytest.approx(surface_radius(disc=paper_scene.disc, fill_ratio=fill), rel=1e-5)
 
 

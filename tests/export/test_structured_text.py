@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from law_queries import answers, queries
 
-from ringbalance.export import point
 from ringbalance.export.blocks import Block, law_block
 from ringbalance.export.compact import CompactLaw
 from ringbalance.export.hosts import st_files
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.pieces import point
 
 parse = pytest.importorskip("blark.parse")
 Both = tuple[CalibratedLaw, CompactLaw]

@@ -32,6 +32,18 @@ def sector_chamber(
     return welded(chamber, chamber.points, chamber.cells) if angle > 2 * np.pi - 1e-9 else chamber
 
 
+def ribbed_chamber(angle: float) -> ChamberGeometry:
+    """A sector from 0.5 to 1 whose outer wall has a rib of a tenth in its middle."""
+
+    def place(cube: FloatArray) -> FloatArray:
+        bulge = 0.1 * np.exp(-(((cube[..., 1] - 0.5) / 0.1) ** 2))
+        radius = 0.5 + (0.5 - bulge) * cube[..., 0]
+        turn = angle * (cube[..., 1] - 0.5)
+        return np.stack([radius * np.cos(turn), radius * np.sin(turn), cube[..., 2]], axis=-1)
+
+    return block_chamber((4, 16, 3), place)
+
+
 def welded(like: ChamberGeometry, points: FloatArray, cells: IntArray) -> ChamberGeometry:
     """A chamber in which points at one place are one, without plates."""
     _, first, number = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)

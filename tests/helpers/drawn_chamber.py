@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import cast
 
+import meshio
 import numpy as np
 from block_discs import sector_chamber
 
@@ -184,6 +185,17 @@ def inp(drawing: Drawing) -> bytes:
             lines += [", ".join(words[:12]) + ("," if len(words) > 12 else "")]
             lines += [", ".join(words[12:])] if len(words) > 12 else []
     return ("\n".join(lines) + "\n").encode()
+
+
+def vtu(drawing: Drawing, folder: Path, *, binary: bool, compression: str | None = "zlib") -> bytes:
+    """As meshio writes it, each named part a field of its own."""
+    (folder / "own.msh").write_bytes(msh_2(drawing))
+    there = meshio.read(folder / "own.msh")
+    groups = there.cell_data["gmsh:physical"]
+    data = {name: [(each == number + 1) * 1 for each in groups] for number, name in enumerate(NAMES)}
+    mesh = meshio.Mesh(there.points, there.cells, cell_data=data)
+    meshio.vtu.write(folder / "own.vtu", mesh, binary=binary, compression=compression)
+    return (folder / "own.vtu").read_bytes()
 
 
 def scene_text(mesh: str, **disc: str | int) -> str:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ringbalance.export import point
 from ringbalance.export.compact import CompactLaw
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.pieces import point
 from ringbalance.scene.arrays import FloatArray
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from synthetic_rigs import observations
 
 from ringbalance.cli import main
 from ringbalance.controller.balancer import balancer_of
@@ -40,23 +40,8 @@ def scene() -> EccentricScene:
     return replace(loaded, uncertainty=())
 
 
-def observed(
-    kind: str, columns: Mapping[str, FloatArray], widths: Mapping[str, FloatArray] | None = None
-) -> Observations:
-    count = len(next(iter(columns.values())))
-    return Observations(
-        kind=kind,
-        file=f"{kind}.csv",
-        lines=np.arange(count) + 4,
-        series=np.full(count, "a"),
-        chamber=np.full(count, ""),
-        columns=columns,
-        uncertainty=widths or {},
-    )
-
-
 def run_up(true: EccentricScene, seed: int) -> Observations:
-    plain = observed("run_up", {"speed": SPEEDS, "amplitude": np.ones(24), "phase": np.zeros(24)})
+    plain = observations("run_up", {"speed": SPEEDS, "amplitude": np.ones(24), "phase": np.zeros(24)})
     found = KINDS["run_up"].predict(true, plain, None)
     draw = np.random.default_rng(seed).standard_normal(48)
     vector = (found + NOISE * draw).reshape(2, -1)
@@ -67,8 +52,8 @@ def run_up(true: EccentricScene, seed: int) -> Observations:
 def positioning(true: EccentricScene, seed: int, noise: float = 0.002) -> Observations:
     times, volts = np.tile(np.linspace(0.05, 1.0, 10), 3), np.repeat([6.0, 9.0, 12.0], 10)
     columns = {"time": times, "voltage": volts, "speed": np.full(30, 10.5), "angle": np.zeros(30)}
-    found = KINDS["positioning"].predict(true, observed("positioning", columns), None)
-    return observed(
+    found = KINDS["positioning"].predict(true, observations("positioning", columns), None)
+    return observations(
         "positioning", columns | {"angle": found + noise * np.random.default_rng(seed).standard_normal(30)}
     )
 
@@ -138,14 +123,14 @@ def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:
     offered = _offered_rows(first.scene, "run_up", few)
     chosen = next(i for i in range(len(offered)) if _words_of(offered, i) == told.gains[0].candidate)
     speed = offered.columns["speed"][[chosen]]
-    plain = observed("run_up", {"speed": speed, "amplitude": np.ones(1), "phase": np.zeros(1)})
+    plain = observations("run_up", {"speed": speed, "amplitude": np.ones(1), "phase": np.zeros(1)})
     real, imaginary = KINDS["run_up"].predict(first.scene, plain, None)
     row = {
         "speed": speed,
         "amplitude": np.hypot([real], [imaginary]),
         "phase": np.arctan2([imaginary], [real]),
     }
-    more = observed("run_up", row, {"amplitude": np.array([1.96 * NOISE])})
+    more = observations("run_up", row, widths={"amplitude": np.array([1.96 * NOISE])})
     again = fit(scene, data=[few, replace(more, file="more.csv")], parameters=["rotor.damping"])
     widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]
     assert widths[1] / widths[0] == pytest.approx(told.gains[0].ratio, rel=0.05)
@@ -174,7 +159,7 @@ def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: Ecc
         "speed": np.full(2, speed),
         "angle": np.zeros(2),
     }
-    start, end = KINDS["positioning"].predict(stiff, observed("positioning", columns), None)
+    start, end = KINDS["positioning"].predict(stiff, observations("positioning", columns), None)
     arm = plant.friction_arm[0] * plant.moment
     a, b, c = arm, plant.drive_damping + 2 * arm * speed, arm * speed**2 - plant.drive_gain * volts
     steady = (-b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
@@ -189,8 +174,8 @@ def test_a_long_motion_is_that_of_its_parts(scene: EccentricScene) -> None:
         return {"time": np.array(times), "voltage": 9 * many, "speed": 10.5 * many, "angle": 0 * many}
 
     predict = KINDS["positioning"].predict
-    whole = predict(scene, observed("positioning", columns([60.0])), None)
-    parts = predict(scene, observed("positioning", columns([20.0, 40.0, 60.0])), None)
+    whole = predict(scene, observations("positioning", columns([60.0])), None)
+    parts = predict(scene, observations("positioning", columns([20.0, 40.0, 60.0])), None)
     assert whole[0] == pytest.approx(parts[-1], rel=1e-4)
 
 
@@ -202,7 +187,7 @@ def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
         "angle": np.zeros(1),
     }
     stiff = with_values_at(scene, {"rotor.stiffness": 1e7})
-    assert KINDS["positioning"].predict(stiff, observed("positioning", columns), None)[0] == 0.0
+    assert KINDS["positioning"].predict(stiff, observations("positioning", columns), None)[0] == 0.0
 
 
 def test_every_uncertain_quantity_can_be_changed(scene: EccentricScene) -> None:

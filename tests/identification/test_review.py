@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from synthetic_rigs import observations
 
 from ringbalance.identification.criticism import Review
 from ringbalance.identification.device import Device, Models
@@ -19,11 +19,10 @@ from ringbalance.identification.next_measurement import (
     _words_of,
     next_measurement,
 )
-from ringbalance.identification.other_laws import LAMINAR, UNBROKEN, _power_of
+from ringbalance.identification.other_laws import LAMINAR, UNBROKEN
 from ringbalance.identification.reading import KINDS
 from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
@@ -35,25 +34,11 @@ SET = {
 }
 
 
-def observed(kind: str, columns: Mapping[str, FloatArray], widths: Mapping[str, FloatArray]) -> Observations:
-    count = len(next(iter(columns.values())))
-    return Observations(
-        kind=kind,
-        file=f"{kind}.csv",
-        sha256="0" * 64,
-        lines=np.arange(count) + 4,
-        series=np.full(count, "a"),
-        chamber=np.full(count, "A" if kind in ("injection", "transfer") else ""),
-        columns=columns,
-        uncertainty=widths,
-    )
-
-
 def transfers(
     true: Scene, models: Models, *, seed: int, known: bool = True, share: float = 0.01
 ) -> Observations:
     """Volumes moved, with a noise of one per cent."""
-    plain = observed("transfer", SET | {"volume": np.ones(ROWS)}, {})
+    plain = observations("transfer", SET | {"volume": np.ones(ROWS)}, ["A"] * ROWS)
     volume = KINDS["transfer"].predict(true, plain, models)
     sigma = share * volume
     noisy = volume + sigma * np.random.default_rng(seed).standard_normal(ROWS)
@@ -97,7 +82,10 @@ def test_a_disc_with_another_law_is_found_out(
     velocity = float(
         Device.of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
     )
-    other = replace(models, other=lambda law: _power_of(law, velocity, exponent))
+    other = replace(
+        models,
+        other=lambda law: replace(law, heads=law.heads.power(velocity=velocity, exponent=exponent)),
+    )
     data = transfers(true, other, seed=1, known=False)
     told = Review.of(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
     assert not told.holds

@@ -47,7 +47,7 @@ def saved(made: Rig, result: FitResult, folder: Path) -> Scene:
         folder / "fitted.toml",
         scene=scene_from(content=toml_bytes(document), file=str(source)),
         result=result,
-        data=[replace(each, sha256="0") for each in made.data],
+        data=made.data,
     )
     return liquid_ring_scene(load_scene(path))
 

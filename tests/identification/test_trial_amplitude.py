@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from synthetic_rigs import observations
 
 from ringbalance.identification.criticism import Review
 from ringbalance.identification.fitting import FitResult, fit
@@ -30,16 +31,9 @@ PER_G_MM = 1e-6 / 1e-6
 def observed(
     unbalance: FloatArray, angle: FloatArray, amplitude: FloatArray, width: FloatArray | None
 ) -> Observations:
-    count = unbalance.size
-    return Observations(
-        kind="trial_amplitude",
-        file="washers.csv",
-        lines=np.arange(count) + 4,
-        series=np.full(count, "plain"),
-        chamber=np.full(count, ""),
-        columns={"unbalance": unbalance, "angle": angle, "amplitude": amplitude},
-        uncertainty={} if width is None else {"amplitude": width},
-    )
+    columns = {"unbalance": unbalance, "angle": angle, "amplitude": amplitude}
+    widths = {} if width is None else {"amplitude": width}
+    return observations("trial_amplitude", columns, widths=widths)
 
 
 def rotor(scene: Scene, *, coefficient: float = 1.0, amplitude: float = 8e-6, phase: float = 0.7) -> Scene:

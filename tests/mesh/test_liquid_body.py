@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from block_discs import sector_chamber
+from block_discs import ribbed_chamber, sector_chamber
 
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -20,7 +20,6 @@ from ringbalance.physics.pressure.solve import quadratic_basis, side
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.chambers import block_chamber
 
 _ANGLE, _WIDTH = np.pi / 2, 1.3
 
@@ -79,13 +78,7 @@ def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fi
 
 
 def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:
-    def ribbed(cube: np.ndarray) -> np.ndarray:
-        bulge = 0.1 * np.exp(-(((cube[..., 1] - 0.5) / 0.1) ** 2))
-        radius = 0.5 + (0.5 - bulge) * cube[..., 0]
-        turned = _ANGLE * (cube[..., 1] - 0.5)
-        return np.stack([radius * np.cos(turned), radius * np.sin(turned), cube[..., 2]], axis=-1)
-
-    geometry = block_chamber((4, 16, 3), ribbed)
+    geometry = ribbed_chamber(_ANGLE)
     named = {name: geometry.boundaries[name] for name in ("outer_wall", "end_back")}
     object.__setattr__(geometry, "boundaries", named)
     body = liquid_body(tetrahedra(geometry), 0.95)

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from block_discs import sector_chamber
+from block_discs import ribbed_chamber, sector_chamber
 
 from ringbalance.mesh.geometry import liquid_area, surface_radius
 from ringbalance.mesh.section import NoPlaneWavesError, middle_section
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes, sloshing_response
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.chambers import block_chamber, disc_chamber
+from ringbalance.verification.reference.chambers import disc_chamber
 
 _FILL = 0.3
 
@@ -65,13 +65,7 @@ def test_a_section_holds_the_liquid_and_its_walls(disc: Disc, coarse: bool, laye
 
 
 def test_a_rib_that_parts_the_surface_is_refused() -> None:
-    def ribbed(cube: np.ndarray) -> np.ndarray:
-        bulge = 0.1 * np.exp(-(((cube[..., 1] - 0.5) / 0.1) ** 2))
-        radius = 0.5 + (0.5 - bulge) * cube[..., 0]
-        turned = np.pi / 2 * (cube[..., 1] - 0.5)
-        return np.stack([radius * np.cos(turned), radius * np.sin(turned), cube[..., 2]], axis=-1)
-
-    geometry = block_chamber((4, 16, 3), ribbed)
+    geometry = ribbed_chamber(np.pi / 2)
     with pytest.raises(NoPlaneWavesError, match="one line from wall to wall"):
         middle_section(geometry, surface_radius=0.95)
     assert middle_section(geometry, surface_radius=0.8).mesh.nelements > 100

@@ -171,29 +171,26 @@ def test_what_cannot_be_resolved_is_refused(
     assert "allowed: at least" in errors
 
 
-@pytest.mark.parametrize("inner", [20.0, 59.976, 59.99])
-def test_the_least_fill_that_the_message_allows_is_calibrated(
-    inner: float,
-    calibrated: Calibrate,
+@pytest.mark.parametrize(
+    ("text_with", "too_small"),
+    [
+        *(
+            (lambda fill, r=inner: text_of(angle=90.0, outer=60.0, inner=r, fill=fill), 1e-11)
+            for inner in (20.0, 59.976, 59.99)
+        ),
+        (lambda angle: text_of(angle=angle, fill=1.0), 1e-4),
+    ],
+)
+def test_the_least_that_the_message_allows_is_calibrated(
+    text_with: Callable[[float], str], too_small: float, calibrated: Calibrate
 ) -> None:
     with pytest.raises(SceneError) as refused:
-        loaded(text_of(angle=90.0, outer=60.0, inner=inner, fill=1e-11))
-    least = float(str(refused.value).split("allowed: at least ")[1].split()[0])
-    text = text_of(angle=90.0, outer=60.0, inner=inner, fill=least)
+        loaded(text_with(too_small))
+    text = text_with(float(str(refused.value).split("allowed: at least ")[1].split()[0]))
     code, document, _ = calibrated(text)
     assert code == 0
     assert_exact(document, loaded(text))
     assert np.all(np.diff(document["chamber"]["moment_kg_m"]) > 0)
-
-
-def test_the_least_angle_that_the_message_allows_is_calibrated(calibrated: Calibrate) -> None:
-    with pytest.raises(SceneError) as refused:
-        loaded(text_of(angle=1e-4, fill=1.0))
-    least = float(str(refused.value).split("allowed: at least ")[1].split()[0])
-    text = text_of(angle=least, fill=1.0)
-    code, document, _ = calibrated(text)
-    assert code == 0
-    assert_exact(document, loaded(text))
 
 
 def test_a_solve_that_failed_enters_nothing() -> None:

@@ -11,8 +11,9 @@ import pytest
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
+from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import Fitted, FittedQuantity, ModelError

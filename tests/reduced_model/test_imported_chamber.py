@@ -17,8 +17,8 @@ from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.chamber.contributions import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import share_across
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.files import load_law
+from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.scene.models import Scene
 
 FILLS = np.array([0.1, 0.25, 0.5])

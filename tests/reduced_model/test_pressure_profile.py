@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.making import calibrated_law
 from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reports.pages.drag_map import read_by_eq_18

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
-from ringbalance.scene.platform import terminal
+from ringbalance.scene.platform import progress_line, terminal
 from ringbalance.scene.platform.display import announced, displayed
+from ringbalance.scene.platform.progress_line import ProgressLine
 from ringbalance.scene.platform.terminal import activity
 
 
@@ -70,3 +72,47 @@ def test_a_quiet_run_shows_no_progress(capsys: pytest.CaptureFixture[str]) -> No
     with displayed(brief=False, quiet=True, log=None), activity("calibrate", "finite elements"):
         time.sleep(0.2)
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """One time, s, that a test moves."""
+    now = [0.0]
+    monkeypatch.setattr(progress_line, "monotonic", lambda: now[0])
+    return now
+
+
+def test_a_notebook_has_one_line_that_is_replaced(
+    clock: list[float], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown: list[str] = []
+    output = SimpleNamespace(update=lambda data, **_: shown.append(data["text/plain"]))
+    made = SimpleNamespace(display=lambda _, **__: output)
+    shell = SimpleNamespace(kernel=None)
+    notebook = SimpleNamespace(get_ipython=lambda: shell, display=made)
+    monkeypatch.setitem(sys.modules, "IPython", notebook)
+    line = ProgressLine()
+    for how_far in ((0.5, 120.0), ("too soon",), ("axes", 3, 12), (SimpleNamespace(text="points"),)):
+        line(*how_far)
+        clock[0] += 0.04
+    assert shown == ["0.5 of 120", "axes: 3 of 12"]
+    del shell.kernel
+    ProgressLine()("an interpreter is no notebook")
+    assert len(shown) == 2
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_terminal_keeps_one_line_and_a_file_gets_one_now_and_then(
+    clock: list[float], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ProgressLine()
+    for _ in range(3):
+        line(SimpleNamespace(text="points"))
+        clock[0] += 20.0
+    assert capsys.readouterr().err == "points\n"
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    line = ProgressLine()
+    line("runs ...")
+    clock[0] += 1.0
+    line("done")
+    assert capsys.readouterr().err == "\r\x1b[Kruns ...\r\x1b[Kdone"

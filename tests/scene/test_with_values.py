@@ -16,7 +16,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene import AnyScene, Scene, SceneError, bundled_scene, load_scene
-from ringbalance.scene.changes import document_of, nameless
+from ringbalance.scene.changes import document_of, file_text, nameless
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
@@ -186,3 +186,23 @@ def test_a_nameless_scene_has_the_values_and_the_hash_of_the_named_one(values: d
     assert toml_bytes(document_of(scene)) == before
     again = pickle.loads(pickle.dumps(scene))
     assert again.with_values(values).sha256 == digest
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "text"),
+    [
+        ("gas.pressure", 0.88e6, "0.88 MPa"),
+        ("tube.bore", 1.37e-3, "1.37 mm"),
+        ("liquid.temperature", 300.0, "26.85 degC"),
+        ("controller.integral_time", 10.0, "10.0 s"),
+        ("controller.integral_time", 30.0, "0.5 min"),
+        ("rotor.speed", 1000.0, "1000.0 rad/s"),
+        ("gas.valve_lag", 3e-3, "0.003 s"),
+    ],
+)
+def test_a_changed_value_keeps_the_unit_of_its_file(path: str, value: float, text: str) -> None:
+    """Where that gives the value back to its last bit without many digits; else it stands in SI."""
+    table, key = path.split(".")
+    changed = bundled(PAPER).with_values({path: value})
+    assert getattr(getattr(changed, table), key) == value
+    assert tomllib.loads(file_text(changed, to=Path()).decode())[table][key] == text

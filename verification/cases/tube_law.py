@@ -19,7 +19,7 @@ from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
-from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.liquids import liquid_at, liquids_at_room_temperature
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
@@ -75,8 +75,7 @@ def _driving_heads(scene: Scene, shares: npt.ArrayLike) -> tuple[float, ...]:
 @lru_cache(maxsize=64)
 def _running(scene: Scene, heads: tuple[float, ...]) -> TubeLoss:
     """A full tube at the velocities with (k(u) + 1) u^2/2 = head, m^2/s^2, above zero."""
-    head = np.array(heads)
-    return tube_loss(scene, velocity_of(table=TubeHeads.of(scene).head, head=head, where=head > 0))
+    return tube_loss(scene, TubeHeads.of(scene).velocity(heads))
 
 
 def _under_gas(scene: Scene) -> TubeLoss:

@@ -153,7 +153,7 @@ def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]
         yield "a number in the calibration is not finite"
     if ratio > 1:
         yield f"an error is {ratio:.3g} times its half-width"
-    nodes = calibration.chamber.wall_pressure.table.value.size
+    nodes = calibration.chamber.wall_pressure.table.knots.size
     for name, curve in (
         ("wall pressure", calibration.chamber.wall_pressure),
         ("moment", calibration.chamber.moment),

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from eccentric_runs import bundled, true_imbalance
+from eccentric_runs import bundled, normalised
 from scipy.stats import chi2
 
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of
@@ -52,12 +52,7 @@ def creeping() -> list[EccentricScene]:
 def test_errors_of_the_imbalance_are_those_claimed_while_masses_creep(number: int) -> None:
     """The sum of the squares over the seeds is chi-square; its limits let one run in a million pass."""
     scene = creeping()[number]
-    true = true_imbalance(scene)
-    total = 0.0
-    for seed in SEEDS:
-        run = simulate_eccentric(scene, seed=seed)
-        error = run.history["imbalance"][-1] - true
-        total += float(error @ np.linalg.solve(run.history["imbalance_covariance"][-1], error))
+    total = sum(normalised(scene, seed) for seed in SEEDS)
     low, high = chi2.ppf([1e-6, 1 - 1e-6], 2 * len(SEEDS))
     assert low < total < high
 

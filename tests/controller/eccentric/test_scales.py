@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from eccentric_runs import bundled, true_imbalance
+from eccentric_runs import bundled, normalised, true_imbalance
 from scipy.stats import binom, chi2
 
 from ringbalance.controller.eccentric_mass.devices import device
@@ -28,13 +28,6 @@ def shrunk(size: float) -> EccentricScene:
     wash = changed(wash, {"imbalance.radius": size * wash.imbalance.radius})
     noise = ("sensor.position_noise", "sensor.velocity_noise")
     return changed(wash, {path: size * value_at(wash, path) for path in noise})
-
-
-def normalised(scene: EccentricScene, seed: int) -> float:
-    """Squared error of the imbalance over the filter's covariance, at the end of a run."""
-    run = simulate_eccentric(scene, seed=seed)
-    error = run.history["imbalance"][-1] - true_imbalance(scene)
-    return float(error @ np.linalg.solve(run.history["imbalance_covariance"][-1], error))
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 30.0])

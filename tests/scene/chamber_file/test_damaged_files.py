@@ -13,7 +13,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from drawn_chamber import NAMES, drawn, inp, loaded, msh_2, msh_4, scene_text
+from drawn_chamber import drawn, inp, loaded, msh_2, msh_4, scene_text, vtu
 
 from ringbalance.scene import Scene, SceneError, load_scene
 
@@ -24,25 +24,14 @@ def _binary(folder: Path, version: str) -> bytes:
     return (folder / "binary.msh").read_bytes()
 
 
-def _vtu(folder: Path, *, binary: bool) -> bytes:
-    (folder / "own.msh").write_bytes(msh_2(drawn()))
-    there = meshio.read(folder / "own.msh")
-    groups = there.cell_data["gmsh:physical"]
-    data = {name: [(each == number + 1) * 1 for each in groups] for number, name in enumerate(NAMES)}
-    meshio.vtu.write(
-        folder / "own.vtu", meshio.Mesh(there.points, there.cells, cell_data=data), binary=binary
-    )
-    return (folder / "own.vtu").read_bytes()
-
-
 FILES: dict[str, tuple[str, Callable[[Path], bytes]]] = {
     "text 2.2": ("chamber.msh", lambda _: msh_2(drawn())),
     "text 4.1": ("chamber.msh", lambda _: msh_4(drawn("tetra10"))),
     "binary 2.2": ("chamber.msh", lambda folder: _binary(folder, "gmsh22")),
     "binary 4.1": ("chamber.msh", lambda folder: _binary(folder, "gmsh")),
     "abaqus": ("chamber.inp", lambda _: inp(drawn("hexahedron20"))),
-    "vtu text": ("chamber.vtu", lambda folder: _vtu(folder, binary=False)),
-    "vtu binary": ("chamber.vtu", lambda folder: _vtu(folder, binary=True)),
+    "vtu text": ("chamber.vtu", lambda folder: vtu(drawn(), folder, binary=False)),
+    "vtu binary": ("chamber.vtu", lambda folder: vtu(drawn(), folder, binary=True)),
 }
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from drawn_chamber import NAMES, Drawing, drawn, inp, loaded, msh_2, msh_4
+from drawn_chamber import NAMES, Drawing, drawn, inp, loaded, msh_2, msh_4, vtu
 from vtkmodules import vtkCommonDataModel
 
 from ringbalance.scene import Scene
@@ -115,13 +115,8 @@ def test_as_meshio_writes_it(kind: str, version: str, binary: bool, tmp_path: Pa
 @pytest.mark.parametrize("binary", [False, True])
 @pytest.mark.parametrize("kind", CELL_KINDS)
 def test_vtu_as_meshio_writes_it(kind: str, binary: bool, compression: str | None, tmp_path: Path) -> None:
-    (tmp_path / "own.msh").write_bytes(msh_2(drawn(kind)))
-    there = meshio.read(tmp_path / "own.msh")
-    groups = there.cell_data["gmsh:physical"]
-    data = {name: [(each == number + 1) * 1 for each in groups] for number, name in enumerate(NAMES)}
-    mesh = meshio.Mesh(there.points, there.cells, cell_data=data)
-    meshio.vtu.write(tmp_path / "chamber.vtu", mesh, binary=binary, compression=compression)
-    found = geometry_of(loaded(tmp_path, (tmp_path / "chamber.vtu").read_bytes(), "chamber.vtu"))
+    content = vtu(drawn(kind), tmp_path, binary=binary, compression=compression)
+    found = geometry_of(loaded(tmp_path, content, "chamber.vtu"))
     own = geometry_of(loaded(tmp_path, msh_2(drawn(kind))))
     assert found.points == pytest.approx(own.points, abs=1e-12)
     assert set(found.boundaries) == set(NAMES)

@@ -5,15 +5,18 @@ keeps to numbers, rows of numbers, `if`, `while` and functions.  `c` holds the l
 `w` a query with its answer and all between; the names below are places in them.  A piece is a polynomial of
 degree five in the distance from its end; cells of equal length say at which piece to begin looking.  Gauge
 pressures in Pa, velocities in m/s, half-widths at 95 %; upstream is the chamber that gives liquid.  Source:
-`tube.regime` and `tube.directed_flow`, whose conditions and half-widths these are.
+`tube.regime`, whose conditions these are; half-widths by linear propagation.
 """
 
 from collections.abc import Sequence
 from math import sqrt
 
-Law = Sequence[float]
-Pieces = Sequence[Sequence[float]]
-Query = list[float]
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.both_ways import both_ways
+
+Law = Sequence[float] | FloatArray
+Pieces = Sequence[Sequence[float]] | FloatArray
+Query = list[float] | FloatArray
 
 # fmt: off
 # Of the law; OF_...: squared half-widths, relative but for that of the crest.
@@ -47,7 +50,9 @@ FULL, FULL_ROOT, FULL_ROW, FULL_TO_END, FULL_VALUE = 28, 29, 30, 31, 32
 # Of the column up to the crest: pressure that holds it, at first before gas is carried out, and velocity.
 HOLDS, AT_FIRST, BROKEN, SLOWER, SWEPT = 33, 34, 35, 36, 37
 # Of the driven chamber, where these are asked for too.
-RADIUS, MOMENT, PLACES_OF_QUERY = 38, 39, 40
+RADIUS, MOMENT = 38, 39
+# Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
+MARGIN, MARGIN_SQUARE, PLACES_OF_QUERY = 40, 41, 42
 
 BLOCKED, SIPHONING, SEPARATED, REVERSE, UNDECIDED = 0.0, 1.0, 2.0, 3.0, 4.0
 OK, EXTRAPOLATED, STANDS, UNSURE, INVALID = 0.0, 1.0, 2.0, 3.0, 4.0
@@ -56,6 +61,7 @@ GREATEST_PRESSURE, FILL_SLACK, NO_PRESSURE = 1e12, 1e-9, 1e-100
 # fmt: on
 
 
+@both_ways
 def larger(a: float, b: float) -> float:
     """Of two numbers."""
     if a > b:
@@ -63,6 +69,7 @@ def larger(a: float, b: float) -> float:
     return b
 
 
+@both_ways
 def smaller(a: float, b: float) -> float:
     """Of two numbers."""
     if a < b:
@@ -70,11 +77,13 @@ def smaller(a: float, b: float) -> float:
     return b
 
 
+@both_ways
 def within(c: Law, fill: float) -> float:
     """A fill ratio within the law's range; its end for what is not a number."""
     return larger(0.0, smaller(fill, c[LARGEST_FILL]))
 
 
+@both_ways
 def piece(p: Pieces, first: float, x: float) -> int:
     """Row of the piece that holds x, from that of the cell on."""
     row = int(first)
@@ -83,6 +92,7 @@ def piece(p: Pieces, first: float, x: float) -> int:
     return row
 
 
+@both_ways
 def quintic(p: Pieces, row: int, t: float) -> float:
     """Value of a piece."""
     return p[row][C0] + t * (
@@ -90,39 +100,13 @@ def quintic(p: Pieces, row: int, t: float) -> float:
     )
 
 
+@both_ways
 def width(p: Pieces, row: int, t: float) -> float:
     """Half-width of a piece, or its square."""
     return p[row][WIDTH] + t * p[row][WIDTH_SLOPE]
 
 
-def chamber_piece(c: Law, p: Pieces, fill: float) -> int:
-    """Row of a chamber's surface and moment that holds a fill within the range."""
-    return piece(p, c[int(fill * c[CHAMBER_SCALE] + c[CHAMBER_CELLS])], fill)
-
-
-def surface_radius(c: Law, p: Pieces, fill: float) -> float:
-    """Radius of a chamber's concentric free surface, m."""
-    x = within(c, fill)
-    row = chamber_piece(c, p, x)
-    t = x - p[row][END]
-    return sqrt(larger(p[row][SQUARE_0] + t * (p[row][SQUARE_1] + t * p[row][SQUARE_2]), 0.0))
-
-
-def moment(c: Law, p: Pieces, fill: float) -> float:
-    """Balancing moment of one chamber, kg m; a pair's is the difference of two."""
-    x = within(c, fill)
-    row = chamber_piece(c, p, x)
-    t = x - p[row][END]
-    return p[row][MOMENT_0] + t * (p[row][MOMENT_1] + t * p[row][MOMENT_2])
-
-
-def moment_uncertainty(c: Law, p: Pieces, fill: float) -> float:
-    """Expanded uncertainty (95 %) of `moment`, kg m."""
-    x = within(c, fill)
-    row = chamber_piece(c, p, x)
-    return width(p, row, x - p[row][END])
-
-
+@both_ways
 def level(c: Law, p: Pieces, w: Query, fill: float) -> float:
     """Hydrostatic pressure of a chamber's liquid, with its half-width; a fill within the range."""
     row = piece(p, c[int(fill * c[LEVEL_SCALE] + c[LEVEL_CELLS])], fill)
@@ -131,6 +115,7 @@ def level(c: Law, p: Pieces, w: Query, fill: float) -> float:
     return larger(quintic(p, row, t), 0.0)
 
 
+@both_ways
 def set_levels(c: Law, p: Pieces, w: Query, up: float, down: float) -> None:
     """Levels of both chambers; fills within the range."""
     w[UP_LEVEL] = level(c, p, w, up)
@@ -139,6 +124,7 @@ def set_levels(c: Law, p: Pieces, w: Query, up: float, down: float) -> None:
     w[DOWN_WIDTH] = w[LEVEL_WIDTH]
 
 
+@both_ways
 def ratio(c: Law, p: Pieces, w: Query, way: int, s: float) -> float:
     """Velocity over the root of the pressure whose eighth root is s."""
     row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
@@ -148,6 +134,7 @@ def ratio(c: Law, p: Pieces, w: Query, way: int, s: float) -> float:
     return quintic(p, row, w[TO_END])
 
 
+@both_ways
 def velocity(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
     """Velocity that a pressure drives: its root times a tabulated ratio; creeping below the table."""
     if pressure < p[way][SLOWEST]:
@@ -159,6 +146,7 @@ def velocity(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
     return root * root * w[VALUE]
 
 
+@both_ways
 def relative_square(p: Pieces, w: Query, driven: float, square: float) -> float:
     """Squared half-width of the last velocity over its square, by its loss and by what drives it.
 
@@ -176,12 +164,14 @@ def relative_square(p: Pieces, w: Query, driven: float, square: float) -> float:
     return exponent * exponent * (width(p, row, t) + square / (driven * driven))
 
 
+@both_ways
 def set_drive(c: Law, w: Query) -> None:
     """What drives the tube."""
     w[DISCHARGE] = larger(w[DOWN_LEVEL], c[PORT])
     w[DRIVING] = w[UP_GAS] - w[DOWN_GAS] + w[UP_LEVEL] - w[DISCHARGE]
 
 
+@both_ways
 def set_crest(c: Law, w: Query) -> None:
     """The crest's pressure at rest, and what it stands against."""
     w[ABOVE] = w[UP_LEVEL] - c[COLUMN]
@@ -203,6 +193,7 @@ def set_crest(c: Law, w: Query) -> None:
         w[GAS_THERE] = w[DOWN_GAS] + larger(w[DOWN_LEVEL] - c[PORT], 0.0)
 
 
+@both_ways
 def crest_margin(w: Query) -> float:
     """Crest pressure at rest less that of a primed tube's cavity, or of gas there."""
     if w[PRIMED] != 0.0:
@@ -210,6 +201,7 @@ def crest_margin(w: Query) -> float:
     return w[RESTING] - larger(w[GAS_THERE], w[CAVITY])
 
 
+@both_ways
 def full_square(c: Law, p: Pieces, w: Query) -> float:
     """`relative_square` of the last velocity, that of the whole tube."""
     gas = w[UP_GAS] - w[DOWN_GAS]
@@ -218,6 +210,7 @@ def full_square(c: Law, p: Pieces, w: Query) -> float:
     return relative_square(p, w, w[DRIVING], square + c[OF_BLOWN] * gas * gas + c[OF_SPEED] * fall * fall)
 
 
+@both_ways
 def set_full(c: Law, p: Pieces, w: Query, widths: bool) -> None:
     """The answer of a tube without a crest in which liquid flows."""
     w[VELOCITY] = velocity(c, p, w, SIPHON, w[DRIVING])
@@ -227,11 +220,13 @@ def set_full(c: Law, p: Pieces, w: Query, widths: bool) -> None:
         w[UNCERTAINTY] = w[VELOCITY] * sqrt(full_square(c, p, w) + c[TABULATION])
 
 
+@both_ways
 def carried(p: Pieces, way: int, speed: float) -> float:
     """How far a flow is from leaving gas over the crest, 0, to carrying it out, 1, and beyond."""
     return speed * p[way][CARRY] - p[way][CARRY_FROM]
 
 
+@both_ways
 def set_swept(c: Law, p: Pieces, w: Query, way: int) -> None:
     """The column up to the crest, out of which the flow carries gas."""
     gas = larger(w[GAS_THERE], w[MOST])
@@ -249,6 +244,7 @@ def set_swept(c: Law, p: Pieces, w: Query, way: int) -> None:
             w[BROKEN] = velocity(c, p, w, way, w[HOLDS])
 
 
+@both_ways
 def set_slower(c: Law, w: Query) -> None:
     """The slower of the whole tube and the column up to the crest."""
     w[REGIME] = SIPHONING
@@ -261,6 +257,7 @@ def set_slower(c: Law, w: Query) -> None:
             w[PRIMED_AFTER] = 0.0
 
 
+@both_ways
 def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
     """Part of the driving pressure that is lost up to the crest; `row`: beside a piece of the whole tube."""
     if way == THERE:
@@ -268,6 +265,7 @@ def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
     return p[row][BACK_0] + t * (p[row][BACK_1] + t * p[row][BACK_2])
 
 
+@both_ways
 def velocity_held(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> float:
     """Velocity of the column up to the crest, which is known at the first pressure that holds it."""
     if pressure == w[AT_FIRST]:
@@ -275,23 +273,40 @@ def velocity_held(c: Law, p: Pieces, w: Query, way: int, pressure: float) -> flo
     return velocity(c, p, w, way, pressure)
 
 
-def undecided(c: Law, p: Pieces, w: Query, row: int, lost: float, known: float) -> bool:
-    """Whether what is known of the crest's pressure allows both a siphon and a separated column.
+@both_ways
+def lost_width(p: Pieces, row: int, t: float) -> float:
+    """Half-width of `lost_part`."""
+    return p[row][OFF] + t * p[row][OFF_SLOPE]
 
-    Args: `lost`: part of the driving pressure that is lost up to the crest. `known`: squared half-width of
-        the pressure there by the gas and the levels.
+
+@both_ways
+def known_of(c: Law, w: Query, lost: float, spread: float) -> float:
+    """Squared half-width of a full siphon's crest pressure by gas, levels and what else it may be off by."""
+    up = w[UP_WIDTH] * w[UP_WIDTH] + c[OF_GAS] * w[UP_GAS] * w[UP_GAS]
+    down = w[DOWN_WIDTH] * w[DOWN_WIDTH]
+    kept = 1.0 - lost
+    return spread * spread + kept * kept * up + lost * lost * down
+
+
+@both_ways
+def set_margin(c: Law, w: Query, lost: float, width: float, known: float) -> None:
+    """Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
+
+    p_m - p_c = p_A - p_c + P_A - D_m - R p_d,  R = (alpha + k_up)/(k + 1), p_d the driving pressure.
+    Args: `lost`: R. `width`: by how much that may be off (95 %). `known`: as `known_of`, Pa^2.
+    Source: energy balance from the upstream chamber to the crest; inputs by sensitivity, ASME V&V 20.
     """
     liquid = w[ABOVE] - lost * (w[UP_LEVEL] - w[DISCHARGE])
-    part = (p[row][OFF] + w[FULL_TO_END] * p[row][OFF_SLOPE]) * w[DRIVING]
-    margin = w[HOLDS] - lost * w[DRIVING]
-    return margin * margin < known + c[OF_CREST] + c[OF_LIQUID] * liquid * liquid + part * part
+    part = width * w[DRIVING]
+    w[MARGIN] = w[HOLDS] - lost * w[DRIVING]
+    w[MARGIN_SQUARE] = known + c[OF_CREST] + c[OF_LIQUID] * liquid * liquid + part * part
 
 
+@both_ways
 def set_widths(c: Law, p: Pieces, w: Query, way: int) -> None:
     """Half-width of the answer over a crest, and whether it allows another regime."""
     row = int(w[FULL_ROW] + p[SIPHON][SHARES])
     lost = lost_part(p, row, w[FULL_TO_END], way)
-    kept = 1.0 - lost
     up = w[UP_WIDTH] * w[UP_WIDTH] + c[OF_GAS] * w[UP_GAS] * w[UP_GAS]
     down = w[DOWN_WIDTH] * w[DOWN_WIDTH]
     lower = w[RESTING] - w[MOST]
@@ -315,11 +330,13 @@ def set_widths(c: Law, p: Pieces, w: Query, way: int) -> None:
             part = larger(w[VELOCITY] - velocity_held(c, p, w, way, lower), 0.0)
     w[UNCERTAINTY] = sqrt(w[VELOCITY] * w[VELOCITY] * (square + c[TABULATION]) + part * part)
     part = larger(w[HOLDS] - lower, upper - w[HOLDS])
-    if undecided(c, p, w, row, lost, part * part + kept * kept * up + lost * lost * down):
+    set_margin(c, w, lost, lost_width(p, row, w[FULL_TO_END]), known_of(c, w, lost, part))
+    if w[MARGIN] * w[MARGIN] < w[MARGIN_SQUARE]:
         w[REGIME] = UNDECIDED
         w[STATUS] = UNSURE
 
 
+@both_ways
 def over_crest(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
     """The answer of a tube with a crest, if liquid flows; `way`: row of the column up to the crest."""
     set_crest(c, w)
@@ -342,6 +359,7 @@ def over_crest(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
         set_widths(c, p, w, way)
 
 
+@both_ways
 def turn(w: Query) -> None:
     """Look from the other chamber."""
     kept = w[UP_LEVEL]
@@ -355,6 +373,7 @@ def turn(w: Query) -> None:
     w[DOWN_GAS] = kept
 
 
+@both_ways
 def set_flow(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
     """The answer where something drives liquid out of the upstream chamber, whose port must be covered."""
     if w[UP_LEVEL] >= c[PORT]:
@@ -364,6 +383,7 @@ def set_flow(c: Law, p: Pieces, w: Query, way: int, widths: bool) -> None:
             over_crest(c, p, w, way, widths)
 
 
+@both_ways
 def stays_full(c: Law, w: Query) -> bool:
     """Whether a primed column that nothing drives is still there: below a level, or in exact balance."""
     if w[PRIMED] == 0.0 or w[UP_LEVEL] < c[PORT]:
@@ -374,6 +394,7 @@ def stays_full(c: Law, w: Query) -> bool:
     return w[DRIVING] == 0.0 and w[RESTING] > w[CAVITY]
 
 
+@both_ways
 def set_answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
     """Velocity, positive, regime and primed afterwards; with `widths` half-width and whether it is undecided.
 
@@ -396,6 +417,7 @@ def set_answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
             w[REGIME] = REVERSE
 
 
+@both_ways
 def fill_status(c: Law, fill: float) -> float:
     """What a fill is worth for which the nearest within the range is taken."""
     if fill != fill:
@@ -405,6 +427,7 @@ def fill_status(c: Law, fill: float) -> float:
     return OK
 
 
+@both_ways
 def answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
     """Velocity out of the driven chamber, m/s, regime, status, primed afterwards.
 
@@ -414,6 +437,8 @@ def answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
     down = within(c, w[OPPOSITE_FILL])
     w[VELOCITY] = 0.0
     w[UNCERTAINTY] = 0.0
+    w[MARGIN] = 0.0
+    w[MARGIN_SQUARE] = 0.0
     w[REGIME] = BLOCKED
     w[PRIMED_AFTER] = 0.0
     w[STATUS] = OK
@@ -438,10 +463,3 @@ def answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
         w[STATUS] = EXTRAPOLATED
     if w[REGIME] == REVERSE:
         w[VELOCITY] = -w[VELOCITY]
-
-
-def answer_all(c: Law, p: Pieces, w: Query) -> None:
-    """The answer, and surface radius, m, and moment, kg m, of the driven chamber."""
-    answer(c, p, w, True)
-    w[RADIUS] = surface_radius(c, p, w[FILL])
-    w[MOMENT] = moment(c, p, w[FILL])

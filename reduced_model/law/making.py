@@ -1,0 +1,193 @@
+"""The calibrated law made: of a chamber and a tube with uncertainties, or of many scenes without."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
+from ringbalance.physics.gas import pressure_factor
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
+from ringbalance.reduced_model.chamber.contributions import gravity_shares
+from ringbalance.reduced_model.chamber.values import RingValues, share_across
+from ringbalance.reduced_model.law.calibrated_law import (
+    WIDTH,
+    CalibratedLaw,
+    CalibratedMoment,
+    DriveUncertainty,
+)
+from ringbalance.reduced_model.law.flow_law import (
+    CALIBRATED,
+)
+from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables
+from ringbalance.reduced_model.tube.flow import tube_path
+from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, alike
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
+
+# Density and speed act on both chambers and on the tube at once, so the law handles them separately.
+_SHARED: Final = ("density", "speed")
+_VARIED_FILLS: Final = np.array([0.2, 0.5, 0.8])
+"""Of the greatest fill ratio: where the velocity's dependence on fitted inputs is looked at."""
+_VARIED_PRESSURES: Final = np.array([0.7, 1.0, 1.4])
+"""Of the scene's gas pressure."""
+_LITTLE: Final = 1e-2
+"""Of the largest effect of a direction, below which it is left out: its square counts."""
+_NEXT_TO_NOTHING: Final = 1e-4
+"""Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
+
+
+def calibrated_law(
+    *, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads, varied: bool = True
+) -> CalibratedLaw:
+    """Put the flow law together.
+
+    Args: `varied`: whether inputs that were fitted together are varied for the law's uncertainty.
+
+    Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
+    """
+    own = [
+        e.hydrostatic_pressure
+        for name, e in chamber.input_effects.items()
+        if name not in _SHARED and name != FITTED
+    ]
+    inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
+    no_inputs = np.zeros_like(chamber.fill_ratio)
+    level, along = chamber.hydrostatic_pressure, chamber.moment
+    law = _put_together(
+        scene,
+        heads=heads,
+        levels=level.table.with_column(WIDTH, level.half_widths(inputs=inputs)),
+        inputs=_drive_uncertainty(scene),
+        moment=CalibratedMoment(
+            along=along.table.with_column(WIDTH, along.half_widths(inputs=no_inputs)),
+            across=_across_table(scene, along.table.knots),
+        ),
+    )
+    return replace(law, variants=_variants(scene)) if varied and scene.fitted.quantities else law
+
+
+def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
+    """Nominal laws along the directions of the fitted inputs that the velocity depends on, low and high.
+
+    The directions are turned to the singular vectors of the velocity's changes over fills and pressures.
+    """
+    gravity = gravity_shares(scene).mean > scene.tolerance
+
+    def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
+        sides = [side for both in direction_sides(scene, turned=turned).values() for side in both]
+        made = zip(nominal_laws(sides, gravity=gravity), sides, strict=True)
+        return tuple(_variant(scene, law, side) for law, side in made)
+
+    pressure = _VARIED_PRESSURES * scene.gas.pressure
+    fill = _VARIED_FILLS[:, None] * scene.disc.max_fill_ratio
+    velocities = np.array(
+        [law.evaluate(fill_ratio=fill, gas_pressure=pressure, primed=True).velocity.ravel() for law in laws()]
+    )
+    changes = (velocities[1::2] - velocities[::2]).T
+    _, size, turned = np.linalg.svd(changes, full_matrices=False)
+    return laws(turned[size > _LITTLE * size[0]].T) if size[0] > 0 else ()
+
+
+def _variant(scene: Scene, law: CalibratedLaw, side: Scene) -> CalibratedLaw:
+    """Law of a scene beside another one; gas pressures are asked for as that has them."""
+    asked = scene.gas.pressure
+    return replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) if asked else law
+
+
+def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
+    """The calibrated law without finite elements and without uncertainties, in a few milliseconds.
+
+    Its velocities are within 1e-4 of those of `calibrated_law`, by fewer nodes of the heads; half-widths are
+    zero.  For the many scenes that differ from a calibrated one in their values, such as those of a fit.
+    Args: `gravity`: whether the chamber's values hold gravity, as `calibrate` decides for the scene.
+    Raises: ValueError: bends that do not fit into the tube.
+    Source: Eqs. 13 to 18 of the liquid-ring paper; `RingValues.of`, `TubeHeads.nominal`.
+    """
+    return nominal_laws([scene], gravity=gravity)[0]
+
+
+def nominal_laws(scenes: Sequence[Scene], *, gravity: bool) -> tuple[CalibratedLaw, ...]:
+    """The same of many scenes; those that differ in numbers alone, and not in their fills, at once."""
+    laws: dict[int, CalibratedLaw] = {}
+    for places in alike(scenes):
+        some = [scenes[place] for place in places]
+        laws |= zip(places, _nominal(some, gravity=gravity), strict=True)
+    return tuple(laws[place] for place in range(len(scenes)))
+
+
+def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLaw]:
+    """Of scenes that are alike."""
+    fills = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0]
+    heads = TubeHeads.nominal(Designs.stacked(scenes))
+    rings = [RingValues.of(scene, fill_ratio=fills, gravity=gravity) for scene in scenes]
+    moments = [
+        scene.disc.moment_factor * ring.moment.value for scene, ring in zip(scenes, rings, strict=True)
+    ]
+    levels = pressure_tables(scenes, fills, [ring.hydrostatic_pressure.value for ring in rings])
+    curves = smooth_tables(fills, np.stack(moments, axis=1))
+    for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):
+        yield _put_together(
+            scene,
+            heads=head,
+            levels=level.with_column(WIDTH, 0.0),
+            inputs=DriveUncertainty(),
+            moment=CalibratedMoment(along=moment.with_column(WIDTH, 0.0), across=_across_table(scene, fills)),
+        )
+
+
+def _put_together(
+    scene: Scene,
+    *,
+    heads: TubeHeads,
+    levels: Table,
+    inputs: DriveUncertainty,
+    moment: CalibratedMoment,
+) -> CalibratedLaw:
+    return CalibratedLaw(
+        name=CALIBRATED,
+        max_fill_ratio=scene.disc.max_fill_ratio,
+        ambient_pressure=scene.gas.ambient_pressure,
+        chamber_volume=chamber_volume(disc=scene.disc),
+        tube_area=scene.tube.area,
+        levels=levels,
+        path=tube_path(scene),
+        heads=heads,
+        inputs=inputs,
+        gas_factor=pressure_factor(scene),
+        moment=moment,
+    )
+
+
+def _drive_uncertainty(scene: Scene) -> DriveUncertainty:
+    width = independent_half_widths(scene)
+    hump = scene.tube.hump_radius or 0.0
+    moved = scene.liquid.density * scene.rotor.speed**2 * hump * width.get("hump_radius", 0.0)
+    return DriveUncertainty(
+        relative_density=width.get("density", 0.0) / scene.liquid.density,
+        relative_speed=width.get("speed", 0.0) / abs(scene.rotor.speed),
+        relative_gas_pressure=width.get("pressure", 0.0) / scene.gas.pressure if scene.gas.pressure else 0.0,
+        hump_pressure=moved,
+        vapour_pressure=math.hypot(width.get("vapour_pressure", 0.0), width.get("ambient_pressure", 0.0)),
+    )
+
+
+def _across_table(scene: Scene, fills: FloatArray) -> Table | None:
+    """W(x), the moment across a chamber's middle, kg m; None where it turns moments by next to nothing.
+
+    Gravity is left out, whose mean changes U and W alike in the first place.
+    Args: `fills`: nodes, equally spaced from zero.
+    Source: rho int y dV over the liquid, times the scene's factor on moments.
+    """
+    disc = scene.disc
+    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING:
+        return None
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    value = scene.liquid.density * disc.axial_width * moment_across(disc=disc, surface_radius=a)
+    return smooth_table(fills, disc.moment_factor * value)

@@ -1,0 +1,150 @@
+"""What a column that is accelerated asks of the law beyond a query: pressure from velocity, and slopes.
+
+Plain numbers, interpreted and compiled from one source, of the numbers `c` and pieces `p` of `point`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from ringbalance.reduced_model.pieces.point import (
+    C0,
+    C1,
+    C2,
+    C3,
+    C4,
+    C5,
+    CELLS,
+    CREEP,
+    END,
+    LARGEST_FILL,
+    LAST,
+    LEVEL_CELLS,
+    LEVEL_SCALE,
+    SCALE,
+    SLOWEST,
+    Law,
+    Pieces,
+    piece,
+    quintic,
+)
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.both_ways import both_ways
+
+_NEWTON_STEPS: Final = 60
+"""At the most; each that leaves the interval known to hold the root is replaced by half of that."""
+_CONVERGED: Final = 1e-6
+"""Of a piece: Newton's next change would be next to round-off."""
+ROOT_CELLS: Final = 512
+ROOT_HEAD: Final = 4
+"""What stands before the cells."""
+ROOT_PLACES: Final = ROOT_HEAD + ROOT_CELLS + 1
+_EDGE: Final = 1e-12
+Row = Sequence[float] | FloatArray
+
+
+@both_ways
+def growth(p: Pieces, row: int, t: float) -> float:
+    """Slope of `point.quintic`."""
+    return p[row][C1] + t * (
+        2.0 * p[row][C2] + t * (3.0 * p[row][C3] + t * (4.0 * p[row][C4] + t * (5.0 * p[row][C5])))
+    )
+
+
+@both_ways
+def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
+    """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; it goes on straight beyond the fills."""
+    x = max(0.0, min(fill, c[LARGEST_FILL]))
+    row = piece(p, c[int(x * c[LEVEL_SCALE] + c[LEVEL_CELLS])], x)
+    t = x - p[row][END]
+    slope = growth(p, row, t)
+    return quintic(p, row, t) + (fill - x) * slope, slope
+
+
+@both_ways
+def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
+    """As `point.velocity`, m/s; a pressure above zero, Pa."""
+    if pressure < p[way][SLOWEST]:
+        return pressure * p[way][CREEP]
+    root = sqrt(sqrt(pressure))
+    s = min(sqrt(root), p[way][LAST])
+    row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
+    return root * root * quintic(p, row, s - p[row][END])
+
+
+def root_cells(numbers: FloatArray, rows: FloatArray, way: int) -> FloatArray:
+    """Where `root_of_velocity` looks: cells of equal length in the fourth root of the velocity.
+
+    Returns: Cells per fourth root, the place of zero, the smallest and the largest velocity, then the piece
+        at the start of each cell; shape (`ROOT_PLACES`,).
+    """
+    scale, place = rows[way, SCALE], rows[way, CELLS]
+    start = rows[way, SLOWEST] ** 0.125
+    first, last = (int(numbers[int(s * scale + place)]) for s in (start, rows[way, LAST]))
+    inside = slice(first, last + 1)
+    slowest = rows[way, SLOWEST] * rows[way, CREEP]
+    ends = rows[inside, END] ** 4 * rows[inside, C0]
+    edges = np.linspace(slowest**0.25, ends[-1] ** 0.25, ROOT_CELLS + 1)
+    each = ROOT_CELLS / (edges[-1] - edges[0])
+    # The last edge, and what rounding brings before the first, belong to the piece beside them.
+    found = first + np.minimum(np.searchsorted(ends, edges**4 * (1.0 - _EDGE)), last - first)
+    return np.concatenate([[each, ROOT_HEAD - edges[0] * each, slowest, ends[-1]], found])
+
+
+@both_ways
+def root_of_velocity(cells: Row, p: Pieces, way: int, velocity: float) -> tuple[float, float]:
+    """Eighth root of the pressure that a velocity above zero, m/s, takes, and d(velocity)/d(root).
+
+    Below a table the pressure is proportional to the velocity, above it to its square.
+    Args: `cells`: `root_cells` of the way.
+    """
+    if velocity <= cells[2]:
+        s = sqrt(sqrt(sqrt(velocity / p[way][CREEP])))
+        return s, 8.0 * velocity / s
+    if velocity >= cells[3]:
+        s = p[way][LAST] * sqrt(sqrt(velocity / cells[3]))
+        return s, 4.0 * velocity / s
+    row = int(cells[int(sqrt(sqrt(velocity)) * cells[0] + cells[1])])
+    end = p[row][END]
+    slowest, fastest = cells[2], end * end * end * end * p[row][C0]
+    start = sqrt(sqrt(sqrt(p[way][SLOWEST])))
+    before = p[row - 1][END] if row > cells[ROOT_HEAD] else start
+    if row > cells[ROOT_HEAD]:
+        slowest = before * before * before * before * p[row - 1][C0]
+    while velocity > fastest:
+        row += 1
+        before, slowest, end = end, fastest, p[row][END]
+        fastest = end * end * end * end * p[row][C0]
+    return _within(p, row, velocity, before, slowest, fastest)
+
+
+@both_ways
+def _within(
+    p: Pieces, row: int, velocity: float, start: float, slowest: float, fastest: float
+) -> tuple[float, float]:
+    """The same on one piece, from its start and the velocities there and at its end."""
+    end = p[row][END]
+    low, high = start - end, 0.0
+    t = low * (fastest - velocity) / (fastest - slowest)
+    tiny, s, slope = _CONVERGED * (end - start), end, 1.0
+    for _ in range(_NEWTON_STEPS):
+        s = end + t
+        ratio = quintic(p, row, t)
+        cube = s * s * s
+        missing = velocity - cube * s * ratio
+        slope = cube * (4.0 * ratio + s * growth(p, row, t))
+        if missing > 0.0:
+            low = t
+        else:
+            high = t
+        change = missing / slope if slope > 0.0 else end
+        if abs(change) < tiny:
+            return s + change, slope
+        t = t + change
+        if not low <= t <= high:
+            t = (low + high) / 2.0
+    return s, slope

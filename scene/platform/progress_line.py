@@ -1,0 +1,60 @@
+"""A line that says how far a function of Python is: kept up to date in place where that can be done."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from time import monotonic
+from typing import Any, Final
+
+_IN_PLACE: Final = 0.05
+"""s from one text to the next where each takes the place of the last."""
+_LINES: Final = 30.0
+"""s from one line to the next in a file or a pipe; the first comes as late."""
+
+
+class ProgressLine:
+    """Shows how far a function is; give one to `progress` of any function.
+
+    A notebook and a terminal keep one line up to date; elsewhere a line is written every half minute, so that
+    a short call writes nothing. All of it goes to standard error, or into the cell's output.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> run = rb.simulate(scene, progress=rb.ProgressLine())
+    """
+
+    def __init__(self) -> None:
+        self._update = _notebook_line()
+        in_place = self._update is not None or sys.stderr.isatty()
+        self._wait = _IN_PLACE if in_place else _LINES
+        self._next = monotonic() + (0.0 if in_place else _LINES)
+        self._end = "" if in_place else "\n"
+
+    def __call__(self, *how_far: object) -> None:
+        """Take what a function says of itself: a text, amounts done and in all, or both."""
+        if monotonic() < self._next:
+            return
+        self._next = monotonic() + self._wait
+        text = _text(how_far)
+        if self._update is not None:
+            self._update({"text/plain": text}, raw=True)
+        else:
+            sys.stderr.write(f"{text}{self._end}" if self._end else f"\r\x1b[K{text}")
+            sys.stderr.flush()
+
+
+def _text(how_far: tuple[object, ...]) -> str:
+    """Words first; of an object its `text`, if it has one."""
+    words = [getattr(each, "text", str(each)) for each in how_far if not isinstance(each, int | float)]
+    amounts = [f"{each:.4g}" for each in how_far if isinstance(each, int | float)]
+    return ": ".join([*words, *([" of ".join(amounts)] if amounts else [])])
+
+
+def _notebook_line() -> Callable[..., Any] | None:
+    """What replaces a line in the output of a cell; None outside a notebook."""
+    ipython = sys.modules.get("IPython")
+    if ipython is None or not hasattr(ipython.get_ipython(), "kernel"):
+        return None
+    update: Callable[..., Any] = ipython.display.display({"text/plain": ""}, raw=True, display_id=True).update
+    return update

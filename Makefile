@@ -57,6 +57,7 @@ format: env ## let ruff write what `make lint` asks for
 bench: env ## timed comparisons, each a ratio within one run
 	$(PYTHON_IN_VENV) benchmarks/calibrate_command.py
 	$(PYTHON_IN_VENV) benchmarks/designs.py
+	$(PYTHON_IN_VENV) benchmarks/sweep.py
 	$(PYTHON_IN_VENV) benchmarks/closed_loop.py
 	$(PYTHON_IN_VENV) benchmarks/moving_injection.py
 	$(PYTHON_IN_VENV) benchmarks/eccentric_mass.py

@@ -9,7 +9,7 @@ import heapq
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import ringbalance as rb
 from ringbalance.design.work import CALL, bundle_size
+from ringbalance.scene import AnyScene
 
 KEPT: Final = Path(__file__).parent / "sweep.json"
 SHOWN: Final = ("wall_pressure", "velocity")
@@ -26,6 +27,8 @@ ON_PAPER: Final = (1000, 10_000, 100_000)
 CALIBRATED, CHECKED = 20, 12
 DRIVEN, RUNS = 20, 200
 """Designs that are run, and devices of each at most."""
+SIMULATED = 5
+"""Designs of which one run each is simulated by itself."""
 VARY = {"tube.bore": "0.7mm:2.5mm", "rotor.speed": "5000rpm:7000rpm", "gas.pressure": "0.5MPa:1MPa"}
 
 
@@ -49,6 +52,14 @@ def on_paper(workers: int, *, designs: int, each: float) -> float:
     return designs * each / (workers * max(free))
 
 
+def with_runs(scene: AnyScene, points: Sequence[Mapping[str, Any]]) -> tuple[float, int]:
+    """Processor time of designs with runs, s, and the number of devices that decided."""
+    start, devices = time.process_time(), 0
+    for point in points:
+        devices += rb.objective(scene, point, runs=RUNS)["devices"]
+    return time.process_time() - start, devices
+
+
 def measured(designs: int) -> dict[str, Any]:
     """Processor time a design of each level, s; what rows leave out; errors and rates of the models."""
     scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
@@ -59,19 +70,24 @@ def measured(designs: int) -> dict[str, Any]:
     for name, intervals in (("static", False), ("intervals", True)):
         run = partial(rb.sweep, scene, VARY, sample=f"latin:{designs}", intervals=intervals)
         spent[name] = seconds(run) / designs
-    ran = [seconds(partial(rb.objective, scene, point, runs=RUNS)) for point in small.points[:DRIVEN]]
+    rb.objective(scene, small.points[0], runs=1)
+    ran, devices = with_runs(scene, small.points[:DRIVEN])
+    rb.simulate(scenes[0])
+    alone = seconds(lambda: [rb.simulate(each) for each in scenes[:SIMULATED]]) / SIMULATED
     (velocity,) = (
         each
         for each in rb.sweep(scene, VARY, sample=f"latin:{designs}", check=CHECKED).to_dict()["left_out"]
         if each["quantity"] == "velocity"
     )
-    trade, each = rb.trade(scene).to_dict(), sum(ran) / DRIVEN
+    trade, each = rb.trade(scene).to_dict(), ran / DRIVEN
     return {
         "date": date.today().isoformat(),
         "designs": designs,
         "runs": RUNS,
         "checked": CHECKED,
-        "seconds": spent | {"runs": each, "call": CALL},
+        "seconds": spent | {"runs": each, "call": CALL, "simulate": alone},
+        "devices": devices / DRIVEN,
+        "loop_of_simulations": alone * devices / ran,
         "workers": [
             {"workers": workers, "used": [on_paper(workers, designs=count, each=each) for count in ON_PAPER]}
             for workers in (10, 100, 1000)

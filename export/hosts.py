@@ -131,9 +131,14 @@ def _pieces(block: Block, language: str) -> str:
     return whole.format(rows=rows, **sizes) if rows else ""
 
 
-def filled(template: str, block: Block, name: str, **parts: str) -> str:
+def template(name: str) -> str:
+    """Text of a template."""
+    return files("ringbalance.export").joinpath(f"templates/{name}.txt").read_text(encoding="utf-8")
+
+
+def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     """A template with a block in it. Args: `parts`: further words of that template."""
-    text = files("ringbalance.export").joinpath(f"templates/{template}.txt").read_text(encoding="utf-8")
+    text = template(frame)
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
         title=f"{block.title}, made by ringbalance from {_named(block)}.",
@@ -147,7 +152,7 @@ def filled(template: str, block: Block, name: str, **parts: str) -> str:
         row=len(block.start),
         last_of_row=len(block.start) - 1,
         constants=_lines(block.constants),
-        pieces=_pieces(block, next((each for each in _DECLARED if template.endswith(each)), "c")),
+        pieces=_pieces(block, next((each for each in _DECLARED if frame.endswith(each)), "c")),
         start=_lines(block.start),
         **parts,
     )

@@ -62,7 +62,13 @@ def levels_table(record: Mapping[str, Any]) -> str:
         f"Of {record['designs']} designs about the paper's disc, {record['checked']} of them calibrated, in "
         f"processor time (`python benchmarks/sweep.py --keep`, {record['date']}):"
     )
-    return f"{when}\n\n{markdown(heads, rows)}"
+    spent = record["seconds"]
+    loops = (
+        f"In the same run a loop over `calibrate` took {spent['calibrate'] / spent['static']:.0f} times as "
+        f"long as the array core, and one over `simulate`, {record['devices']:.2g} runs a design, "
+        f"{record['loop_of_simulations']:.2g} times as long as `--runs`, where each device has its own law."
+    )
+    return f"{when}\n\n{markdown(heads, rows)}\n\n{loops}"
 
 
 def workers_table(record: Mapping[str, Any]) -> str:

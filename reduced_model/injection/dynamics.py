@@ -55,7 +55,7 @@ FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
 """Whether gas is on and the tube primed, in the tables of a law that gives velocities alone."""
 PIECES: Final = 2048
 """Of each of these tables."""
-NUMBERS: Final = 2560
+NUMBERS: Final = 4352
 """Room for the numbers of a law, fixed, so that compiled code serves every law."""
 WAYS: Final = 3
 ROWS: Final = len(FLOWS) * PIECES

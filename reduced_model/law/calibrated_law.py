@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -29,10 +29,13 @@ from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 WIDTH: Final = 3
 """Column of a half-width over the fill ratio."""
+_Asked = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
+_Answers = tuple[FloatArray, FloatArray, IntArray, BoolArray]
+_NO_MARGINS: Final = np.empty((2, 0))
 _FEW: Final = 500
 """Points up to which compiled code would take longer to load than they take without."""
 
@@ -192,7 +195,21 @@ class CalibratedLaw:
             gas_pressure=gas_pressure,
             primed=primed,
         )
-        return self._flow(np.array([getattr(asked, each.name) for each in fields(asked)], dtype=np.float64))
+        shape = asked.fill_ratio.shape
+        # Copies: arrays that may not be written are another type to compile for.
+        flat = (
+            np.array(asked.fill_ratio).ravel(),
+            np.array(asked.opposite_fill_ratio).ravel(),
+            np.array(asked.gas_pressure).ravel(),
+            np.array(asked.primed).ravel(),
+        )
+        velocity, width, regime, after = self._widened(flat) if self.variants else self._answers(flat)
+        return Flow(
+            velocity=velocity.reshape(shape),
+            regime=regime.reshape(shape),
+            uncertainty=width.reshape(shape),
+            primed=after.reshape(shape),
+        )
 
     def _is_plain(self, x: Any, y: Any, p: Any, primed: Any) -> bool:
         """Whether these are four numbers that need no other check, of a law without variants."""
@@ -217,40 +234,31 @@ class CalibratedLaw:
         point.answer(*self._lists, query, True)
         return query
 
-    def _answers(self, asked: FloatArray) -> FloatArray:
-        """Answers to queries of shape (4, n): the places of `_ANSWER`, shape (6, n)."""
-        if asked.shape[1] <= _FEW:
-            each = [self._answer(*query) for query in asked.T.tolist()]
-            return np.reshape([[query[place] for query in each] for place in _ANSWER], (len(_ANSWER), -1))
-        answers = np.empty((len(_ANSWER), asked.shape[1]))
-        answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers)
+    def _answers(self, asked: _Asked, margins: FloatArray = _NO_MARGINS) -> _Answers:
+        """Velocity, half-width, regime and primed afterwards of n queries; `margins`: as `answer_each`."""
+        n = asked[0].size
+        answers = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
+        if n > _FEW:
+            answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers, margins)
+            return answers
+        each = [self._answer(*query) for query in zip(*(values.tolist() for values in asked), strict=True)]
+        for column, place in zip((*answers, *margins), _ANSWER, strict=True):
+            column[...] = [query[place] for query in each][: column.size]
         return answers
 
-    def _flow(self, asked: FloatArray) -> Flow:
-        """Args: `asked`: fill, opposite fill, pressure and primed, shape (4, ...)."""
-        shape, asked = asked.shape[1:], np.ascontiguousarray(asked.reshape(4, -1))
-        velocity, width, regime, primed, margin, square = self._answers(asked)
-        if self.variants:
-            speeds, margins = self._by_fitted(asked, np.sign(velocity))
-            width, square = np.hypot(width, np.abs(np.sign(velocity)) * speeds), square + margins
-            open_now = (velocity > 0) & (margin * margin < square)
-            regime = np.where(open_now, Regime.UNDECIDED, regime)
-        return Flow(
-            velocity=velocity.reshape(shape),
-            regime=regime.astype(np.int64).reshape(shape),
-            uncertainty=width.reshape(shape),
-            primed=(primed != 0).reshape(shape),
-        )
-
-    def _by_fitted(self, asked: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What the variants add to the half-width of the velocity, and to the margin's, squared."""
-        sides = [each._answers(asked) for each in self.variants]
-        speeds = [np.maximum(direction * side[0], 0.0) for side in sides]
-        squares = [
-            [((high - low) / 2) ** 2 for low, high in zip(each[::2], each[1::2], strict=True)]
-            for each in (speeds, [side[4] for side in sides])
-        ]
-        return np.sqrt(sum(squares[0])), np.asarray(sum(squares[1]))
+    def _widened(self, asked: _Asked) -> _Answers:
+        """The same with what the variants add to the half-widths of velocity and margin."""
+        margins = np.empty((1 + len(self.variants), 2, asked[0].size))
+        velocity, width, regime, after = self._answers(asked, margins[0])
+        sides = [each._answers(asked, more)[0] for each, more in zip(self.variants, margins[1:], strict=True)]
+        direction = np.sign(velocity)
+        speeds = np.maximum(direction * np.array(sides), 0.0)
+        spread = np.sqrt(np.sum(((speeds[1::2] - speeds[::2]) / 2) ** 2, axis=0))
+        margin, square = margins[0]
+        square = square + np.sum(((margins[2::2, 0] - margins[1::2, 0]) / 2) ** 2, axis=0)
+        opened = (velocity > 0) & (margin * margin < square)
+        width = np.hypot(width, np.abs(direction) * spread)
+        return velocity, width, np.where(opened, int(Regime.UNDECIDED), regime), after
 
     def hydrostatic_pressure(self, fill_ratio: npt.ArrayLike) -> FloatArray:
         """Of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa."""

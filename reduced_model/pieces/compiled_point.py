@@ -15,16 +15,31 @@ from ringbalance.reduced_model.pieces.point import (
     VELOCITY,
     answer,
 )
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place
 
 
 @in_place
-def answer_each(c: FloatArray, p: FloatArray, asked: FloatArray, w: FloatArray, answers: FloatArray) -> None:
-    """Answer the queries of `asked`, shape (4, n), into `answers`, shape (6, n), with `w` to work in."""
-    for i in range(asked.shape[1]):
-        w[FILL], w[OPPOSITE_FILL] = asked[0, i], asked[1, i]
-        w[PRESSURE], w[PRIMED] = asked[2, i], asked[3, i]
+def answer_each(
+    c: FloatArray,
+    p: FloatArray,
+    asked: tuple[FloatArray, FloatArray, FloatArray, BoolArray],
+    w: FloatArray,
+    answers: tuple[FloatArray, FloatArray, IntArray, BoolArray],
+    margins: FloatArray,
+) -> None:
+    """Answer n queries of fill, opposite fill, pressure and primed, with `w` to work in.
+
+    Args: `answers`: velocity, half-width, regime and primed afterwards. `margins`: with their squared
+        half-widths, shape (2, n), or (2, 0) where they are not asked for.
+    """
+    fill, opposite, pressure, primed = asked
+    velocity, uncertainty, regime, after = answers
+    for i in range(fill.size):
+        w[FILL], w[OPPOSITE_FILL], w[PRESSURE] = fill[i], opposite[i], pressure[i]
+        w[PRIMED] = 1.0 if primed[i] else 0.0
         answer(c, p, w, True)
-        answers[0, i], answers[1, i], answers[2, i] = w[VELOCITY], w[UNCERTAINTY], w[REGIME]
-        answers[3, i], answers[4, i], answers[5, i] = w[PRIMED_AFTER], w[MARGIN], w[MARGIN_SQUARE]
+        velocity[i], uncertainty[i] = w[VELOCITY], w[UNCERTAINTY]
+        regime[i], after[i] = int(w[REGIME]), w[PRIMED_AFTER] != 0.0
+        if margins.shape[1]:
+            margins[0, i], margins[1, i] = w[MARGIN], w[MARGIN_SQUARE]

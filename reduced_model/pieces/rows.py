@@ -18,7 +18,7 @@ _EDGE: Final = 1e-9
 """Of a cell, by which what lies next to the edge of a cell is taken to be in the next one."""
 
 
-CELLS: Final = 512
+CELLS: Final = 1024
 """Of a law inside the program."""
 
 

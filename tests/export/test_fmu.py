@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
@@ -145,3 +146,11 @@ def test_with_a_cross_compiler_it_has_libraries_for_all_systems(six: Both, versi
     begins = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}
     assert len(heads) == (3 if version == "fmi2" else 6)
     assert all(head.startswith(begins[Path(name).suffix]) for name, head in heads.items())
+    for name in heads:
+        if name.endswith(".dll"):
+            # No library but Windows' own.
+            assert re.findall(rb"[\w.-]+\.dll", unit.read(name), re.IGNORECASE) == [
+                b"disc.dll",
+                b"KERNEL32.dll",
+            ]
+        assert unit.getinfo(name).compress_size < 12000

@@ -13,7 +13,9 @@ from law_queries import queries
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
 
@@ -32,12 +34,21 @@ def test_numbers_few_and_many_points_give_the_same_bits(
     if not crest:
         law = dataclasses.replace(law, path=dataclasses.replace(law.path, hump_pressure=None))
     asked = queries(law, 4000)
-    whole = law._answers(asked)
-    few = np.concatenate([law._answers(part) for part in np.split(asked, 40, axis=1)], axis=1)
-    np.testing.assert_array_equal(whole, few)
-    assert set(whole[2].astype(int).tolist()) == regimes
-    x, y, p, primed = asked[:, :100]
-    many = law.evaluate(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=primed != 0)
+
+    def evaluated(part: FloatArray) -> Flow:
+        x, y, p, primed = part
+        return law.evaluate(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=primed != 0)
+
+    whole, parts = evaluated(asked), [evaluated(part) for part in np.split(asked, 40, axis=1)]
+    asked.flags.writeable = False
+    parts.append(evaluated(asked[:, :0]))
+    assert (evaluated(asked).velocity == whole.velocity).all()
+    for name in NAMES:
+        few = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(getattr(whole, name), few)
+        assert few.dtype == getattr(whole, name).dtype
+    assert set(whole.regime.tolist()) == regimes
+    (x, y, p, primed), many = asked[:, :100], parts[0]
     for at in range(100):
         one = law.evaluate(
             fill_ratio=float(x[at]),

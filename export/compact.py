@@ -47,7 +47,7 @@ _OF_MOMENT_WIDTH: Final = 0.1
 _SAMPLES: Final = 2001
 _SHARES: Final = ((SHARE, 3), (BACK_SHARE, 2))
 """Column of a share there and back, and the degree of its pieces."""
-_CELLS: Final = 8
+_CELLS: Final = 12
 """Of equal length, each of which knows at which piece to begin looking."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""

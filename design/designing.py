@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
+import numpy as np
+
 from ringbalance.controller.balancer import Draws, Settings, balancer_of
 from ringbalance.controller.judging.judge import FRESH, Judgement
 from ringbalance.controller.judging.ranking import Ranking, ranked
@@ -33,8 +35,6 @@ VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
 _MOST: Final = 10
 """Designs that are judged at the most, but for one."""
-_FEW: Final = 512
-"""Devices at the most that choose between them; the verdict takes as many as `tune` does."""
 _SLOPE: Final = 3
 """Designs to both sides over which the growth of the fraction is taken."""
 _MOVED: Final = 0.05
@@ -193,23 +193,37 @@ def _best(
     def met() -> list[int]:
         return [at for at, each in judged.items() if each.verdict == MET]
 
-    judge(found.start, found.start - 1)
-    while met() and (least := min(met())) > 0 and len(judged) < _MOST:
+    top = found.start
+    judge(top, top - 1)
+    while space.sized and met() and (least := min(met())) > 0 and len(judged) < _MOST:
         judge(least - 1, least - 2)
         if min(met()) == least:
             break
-    top = found.start
     while not met() and top + 1 < len(found.finalists) and len(judged) < _MOST:
         judge(top + 1, top + 2)
         top += 2
-    best = min(met(), default=None)
+    if not space.sized:
+        # The search knows the gas of few devices alone.
+        judge(top + 1, top + 2)
+
+    def order(at: int) -> float:
+        return at if space.sized else float(np.nanmedian(judged[at].outcomes.energy))
+
+    best = min(met(), key=order, default=None)
     return max(judged, key=lambda at: judged[at].fraction.value, default=-1) if best is None else best, judged
 
 
 def _judging(space: Space, found: Hunt, at: int) -> Callable[[], Judgement | None]:
     finalist = found.finalists[at]
     search = found.whole and not space.sets_controller
-    return partial(judged_design, space.hasty, finalist.point, place=finalist.place, search=search, most=_FEW)
+    return partial(
+        judged_design,
+        space.hasty,
+        finalist.point,
+        place=finalist.place,
+        settings=finalist.settings,
+        search=search,
+    )
 
 
 def _smaller(found: Hunt, place: int, judged: Mapping[int, Judgement]) -> tuple[float, Proportion] | None:

@@ -17,12 +17,13 @@ from itertools import product
 from typing import Any, Final
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
 from scipy.special import expit, logit
 
-from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.balancer import Settings, balancer_of
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Axis, Point, Range
-from ringbalance.design.racing import DEVICES, Place, Race, near, race
+from ringbalance.design.racing import DEVICES, Place, Race, near, race, tuned_settings
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, static_rows
 from ringbalance.design.surface import Surface
@@ -70,8 +71,14 @@ _SIZES_JUDGED: Final = (-8, 13)
 """Of these, from smaller ones than the surface promises to larger ones."""
 _CLOUD: Final = 48
 """Points of each such size of which the most promising is judged."""
-_SETTLED: Final = 3
-"""Blocks of devices on which the settings of the designs that are judged race."""
+_SMOOTHING: Final = 0.01
+"""Of the surface through the logarithms of the gas."""
+_NO_GAS: Final = 1e-6
+"""J, which counts as none."""
+_FIRST: Final = 1e3
+"""Above every logit and logarithm."""
+_NEARLY: Final = 0.03
+"""Below the fraction of devices that is looked for, from which on the surface may be wrong."""
 _REACH: Final = 0.9
 """Of the initial unbalance, that a design must be able to cancel before it runs: its devices differ."""
 _REACH_ONE_WAY: Final = 0.6
@@ -119,6 +126,8 @@ class Finalist:
     """m^3."""
     place: Place | None
     """Its settings; None: the scene's own."""
+    settings: Settings | None = None
+    """Others, that `tune` finds for a design near it."""
     promise: float
     """Fraction of the devices by the surface."""
 
@@ -139,10 +148,12 @@ class Hunt:
     @property
     def start(self) -> int:
         """Place of the first finalist that promises to meet what is required; else of the one that comes
-        nearest."""
+        nearest; where their sizes are alike that of the first."""
+        if not self.finalists or self.finalists[0].size == self.finalists[-1].size:
+            return 0
         promises = [each.promise for each in self.finalists]
         enough = (i for i, promise in enumerate(promises) if promise >= self.threshold)
-        return next(enough, int(np.argmax(promises)) if promises else 0)
+        return next(enough, int(np.argmax(promises)))
 
 
 def threshold(asked: float) -> float:
@@ -251,11 +262,15 @@ class _State:
         return [place, *(beside[at] for at in chosen)]
 
     def parents(self, surface: Surface, size: float) -> list[Candidate]:
-        """Those that would serve most devices if they had a size."""
-        shares = np.array([_sized(self.space, each.shares.copy(), size) for each in self.candidates])
-        order = np.argsort(-surface.logits(self.coordinates(shares))[0], kind="stable")
-        whole = [i for i in order.tolist() if self.candidates[i].race.meets.size == DEVICES]
-        return [self.candidates[i] for i in (whole or order.tolist())[:_PARENTS]]
+        """Those that would be best if they had a size."""
+        shares = np.array([each.shares for each in self.candidates])
+        if self.space.sized:
+            shares = np.array([_sized(self.space, each, size) for each in shares])
+        places = self.coordinates(shares)
+        value = surface.logits(places)[0] if self.space.sized else _worth(self, surface, places)
+        order = np.argsort(-value, kind="stable").tolist()
+        whole = [i for i in order if self.candidates[i].race.meets.size == DEVICES]
+        return [self.candidates[i] for i in (whole or order)[:_PARENTS]]
 
     def cloud(
         self, parents: Sequence[Candidate], step: float, sizes: FloatArray, *, anywhere: float = 0.0
@@ -346,9 +361,9 @@ def _round(state: _State, size: float, number: int) -> float:
     parents = state.parents(surface, size)
     shares, points = state.cloud(parents, _STEPS[number], sizes, anywhere=_ANYWHERE[number])
     if points:
-        logits, spread = surface.logits(state.coordinates(shares))
+        value = _worth(state, surface, state.coordinates(shares))
         slices = np.array_split(np.arange(len(points)), min(_CHILDREN, len(points)))
-        chosen = [int(each[np.argmax((logits + _BOLD * spread)[each])]) for each in slices]
+        chosen = [int(each[np.argmax(value[each])]) for each in slices]
         state.race(shares[chosen], [points[i] for i in chosen], state.places(shares[chosen]))
     surface = state.surface(size)
     shares = np.array([each.shares for each in state.candidates])
@@ -361,6 +376,19 @@ def _round(state: _State, size: float, number: int) -> float:
     if not able:
         return size * high
     return min(max(min(able), low * size), high * size)
+
+
+def _worth(state: _State, surface: Surface, places: FloatArray) -> FloatArray:
+    """What decides which points race: the fraction of devices, with some of its doubt; of one size, among
+    those that may serve enough, the gas."""
+    logits, spread = surface.logits(places)
+    hoped = np.asarray(logits + _BOLD * spread)
+    if state.space.sized:
+        return hoped
+    known = state.coordinates(np.array([each.shares for each in state.candidates]))
+    energy = np.log([max(each.race.gas, _NO_GAS) for each in state.candidates])
+    gas = RBFInterpolator(known, energy, kernel="linear", smoothing=_SMOOTHING)(places)
+    return np.where(hoped >= logit(state.threshold), _FIRST - gas, hoped)
 
 
 def _by_size(state: _State, size: float) -> list[Finalist]:
@@ -380,52 +408,50 @@ def _by_size(state: _State, size: float) -> list[Finalist]:
         for rows in [np.flatnonzero(steps_away == at)]
     ]
     enough = [i for i in best if logits[i] >= logit(state.threshold)]
-    place = _settled(state, points[enough[0] if enough else best[-1]], parents)
+    settings = _tuned(state, points[enough[0] if enough else best[-1]])
+    places = state.places(shares[best])
     return [
         Finalist(
-            point=points[i], size=state.space.size(points[i]), place=place, promise=float(expit(logits[i]))
+            point=points[i],
+            size=state.space.size(points[i]),
+            place=around[0] if around else None,
+            settings=settings,
+            promise=float(expit(logits[i])),
         )
-        for i in best
+        for i, around in zip(best, places, strict=True)
     ]
 
 
-def _settled(state: _State, point: Point, parents: Sequence[Candidate]) -> Place | None:
-    """The settings that serve most devices of a design, of those that serve best near it."""
-    places: list[Place] = []
-    for each in parents:
-        if each.race.place is not None:
-            beside = near(state.trials, each.race.place)
-            places += [place for place in (each.race.place, *beside) if place not in places]
-    if not places:
+def _tuned(state: _State, point: Point) -> Settings | None:
+    """As `tune` finds them; None where the scene sets them."""
+    if state.space.sets_controller:
         return None
-    calls = [
-        partial(
-            race, state.space.hasty, point, places=places, asked=state.threshold, settings=True, block=block
-        )
-        for block in range(_SETTLED)
-    ]
-    races = [each for each in deal(state.executor, calls) if each is not None]
-    return min(races, key=lambda each: each.order).place if races else places[0]
+    (settings,) = deal(state.executor, [partial(tuned_settings, state.space.hasty, point)])
+    found: Settings | None = settings
+    return found
 
 
 def _all(state: _State, size: float) -> list[Finalist]:
-    """What raced: of sizes that are nearly alike the one that promises most."""
-    logits, _ = state.surface(size).logits(
-        state.coordinates(np.array([each.shares for each in state.candidates]))
-    )
-    rows = sorted(range(len(logits)), key=lambda i: (state.candidates[i].size, state.candidates[i].race.gas))
-    finalists: list[Finalist] = []
-    for i in rows:
-        each = state.candidates[i]
-        one = Finalist(
-            point=each.point, size=each.size, place=each.race.place, promise=float(expit(logits[i]))
-        )
-        alike = bool(finalists) and state.space.sized and one.size <= (1 + AS_SMALL) * finalists[-1].size
-        if alike and one.promise > finalists[-1].promise:
-            finalists[-1] = one
-        elif not alike:
-            finalists.append(one)
-    return finalists
+    """What raced: of sizes that are nearly alike the one that promises most; of one size those that may serve
+    enough devices, by their gas."""
+    shares = np.array([each.shares for each in state.candidates])
+    promises = expit(state.surface(size).logits(state.coordinates(shares))[0]).tolist()
+    rows = [
+        (each, Finalist(point=each.point, size=each.size, place=each.race.place, promise=promise))
+        for each, promise in zip(state.candidates, promises, strict=True)
+    ]
+    rows.sort(key=lambda row: (row[1].size, row[0].race.gas))
+    finalists = [finalist for _, finalist in rows]
+    if not state.space.sized:
+        least = min(max(promises), state.threshold - _NEARLY)
+        return [each for each in finalists if each.promise >= least]
+    kept: list[Finalist] = []
+    for each in finalists:
+        if not kept or each.size > (1 + AS_SMALL) * kept[-1].size:
+            kept.append(each)
+        elif each.promise > kept[-1].promise:
+            kept[-1] = each
+    return kept
 
 
 def _sample(space: Space) -> tuple[FloatArray, bool]:

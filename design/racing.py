@@ -201,23 +201,31 @@ def judged_design(
     place: Place | None = None,
     settings: Settings | None = None,
     search: bool = False,
-    most: int | None = None,
 ) -> Judgement | None:
     """The settings that serve most devices of a design; None: it breaks down.
 
     Judged on devices on which nothing was chosen.
-    Args: `place`, `settings`: those that raced best; without either the scene's own. `search`: whether others
-        are looked for as `tune` does. `most`: devices; default as many as `tune` takes.
+    Args: `place`, `settings`: some to judge; without any the scene's own. `search`: whether others
+        are looked for as `tune` does.
     """
     try:
         balancer = quick_balancer(point_scene(scene, point))
-        raced = _field(balancer.trials(), [place]) if place is not None else [(None, settings or {})]
-        tried = [each for _, each in raced] + ([searched(balancer)] if search else [])
-        fresh = [each for i, each in enumerate(tried) if each not in tried[:i]]
-        judged = judged_all(balancer, fresh, most=most)
+        tried = [each for _, each in _field(balancer.trials(), [place])] if place is not None else []
+        tried += [] if settings is None else [settings]
+        tried += [searched(balancer)] if search else []
+        fresh = [each for i, each in enumerate(tried or [{}]) if each not in tried[:i]]
+        judged = judged_all(balancer, fresh)
     except (SceneError, *FAULTS):
         return None
     return max(judged, key=lambda each: each.fraction.value, default=None)
+
+
+def tuned_settings(scene: SceneFile, point: Point) -> Settings | None:
+    """Settings of a design as `tune` finds them; None: it breaks down."""
+    try:
+        return searched(quick_balancer(point_scene(scene, point)))
+    except (SceneError, *FAULTS):
+        return None
 
 
 def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> int | None:

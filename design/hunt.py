@@ -22,7 +22,7 @@ from scipy.special import expit, logit
 
 from ringbalance.controller.balancer import Settings, balancer_of
 from ringbalance.controller.trials import Trials
-from ringbalance.design.axes import Axis, Point, Range
+from ringbalance.design.axes import Point
 from ringbalance.design.racing import DEVICES, Place, Race, near, race, tuned_settings
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, static_rows
@@ -228,30 +228,18 @@ class _State:
         races = [each.race for each in self.candidates]
         apart = np.log([each.size / about for each in self.candidates]) / _NEAR
         return Surface.of(
-            self.coordinates(np.array([each.shares for each in self.candidates])),
+            self.space.coordinates(np.array([each.shares for each in self.candidates])),
             met=np.array([each.met for each in races]),
             devices=np.array([each.meets.size for each in races]),
             blocks=np.array([each.block for each in races]),
             weights=np.exp(-0.5 * apart**2) + 1e-6,
         )
 
-    def coordinates(self, shares: FloatArray) -> FloatArray:
-        """Of places, shape (n, axes): entries of a list are equally far from each other."""
-        return np.concatenate(
-            [
-                column[:, np.newaxis]
-                if axis.ranges
-                else 0.5 * np.eye(len(axis.choices))[[_entry(axis, share) for share in column]]
-                for axis, column in zip(self.space.axes, shares.T, strict=True)
-            ],
-            axis=1,
-        )
-
     def places(self, shares: FloatArray) -> list[list[Place] | None]:
         """By point the settings of the nearest design that served many devices, and others beside them."""
         whole = [each for each in self.candidates if each.race.meets.size == DEVICES] or self.candidates
-        known = self.coordinates(np.array([each.shares for each in whole]))
-        apart = np.linalg.norm(self.coordinates(shares)[:, np.newaxis] - known, axis=2)
+        known = self.space.coordinates(np.array([each.shares for each in whole]))
+        apart = np.linalg.norm(self.space.coordinates(shares)[:, np.newaxis] - known, axis=2)
         return [self._beside(whole[at].race.place) for at in np.argmin(apart, axis=1).tolist()]
 
     def _beside(self, place: Place | None) -> list[Place] | None:
@@ -265,8 +253,8 @@ class _State:
         """Those that would be best if they had a size."""
         shares = np.array([each.shares for each in self.candidates])
         if self.space.sized:
-            shares = np.array([_sized(self.space, each, size) for each in shares])
-        places = self.coordinates(shares)
+            shares = np.array([self.space.sized_at(each, size) for each in shares])
+        places = self.space.coordinates(shares)
         value = surface.logits(places)[0] if self.space.sized else _worth(self, surface, places)
         order = np.argsort(-value, kind="stable").tolist()
         whole = [i for i in order if self.candidates[i].race.meets.size == DEVICES]
@@ -285,7 +273,7 @@ class _State:
         shares[free] = self.random.random((int(np.count_nonzero(free)), shares.shape[1]))
         if self.space.sized:
             pairs = zip(shares, sizes, strict=True)
-            shares = np.array([_sized(self.space, each, size) for each, size in pairs])
+            shares = np.array([self.space.sized_at(each, size) for each, size in pairs])
         points = self.space.points(shares)
         able = np.flatnonzero(self.able(points)[1]).tolist()
         return shares[able], [points[i] for i in able]
@@ -361,13 +349,13 @@ def _round(state: _State, size: float, number: int) -> float:
     parents = state.parents(surface, size)
     shares, points = state.cloud(parents, _STEPS[number], sizes, anywhere=_ANYWHERE[number])
     if points:
-        value = _worth(state, surface, state.coordinates(shares))
+        value = _worth(state, surface, state.space.coordinates(shares))
         slices = np.array_split(np.arange(len(points)), min(_CHILDREN, len(points)))
         chosen = [int(each[np.argmax(value[each])]) for each in slices]
         state.race(shares[chosen], [points[i] for i in chosen], state.places(shares[chosen]))
     surface = state.surface(size)
     shares = np.array([each.shares for each in state.candidates])
-    logits, spread = surface.logits(state.coordinates(shares))
+    logits, spread = surface.logits(state.space.coordinates(shares))
     able = [
         each.size
         for each, value, doubt in zip(state.candidates, logits, spread, strict=True)
@@ -385,7 +373,7 @@ def _worth(state: _State, surface: Surface, places: FloatArray) -> FloatArray:
     hoped = np.asarray(logits + _BOLD * spread)
     if state.space.sized:
         return hoped
-    known = state.coordinates(np.array([each.shares for each in state.candidates]))
+    known = state.space.coordinates(np.array([each.shares for each in state.candidates]))
     energy = np.log([max(each.race.gas, _NO_GAS) for each in state.candidates])
     gas = RBFInterpolator(known, energy, kernel="linear", smoothing=_SMOOTHING)(places)
     return np.where(hoped >= logit(state.threshold), _FIRST - gas, hoped)
@@ -400,7 +388,7 @@ def _by_size(state: _State, size: float) -> list[Finalist]:
     shares, points = state.cloud(parents, _STEPS[-1], np.repeat(steps, _CLOUD))
     if not points:
         return _all(state, size)
-    logits, _ = surface.logits(state.coordinates(shares))
+    logits, _ = surface.logits(state.space.coordinates(shares))
     steps_away = np.rint(np.log([state.space.size(each) / size for each in points]) / math.log1p(_FINER))
     best = [
         int(rows[np.argmax(logits[rows])])
@@ -435,7 +423,7 @@ def _all(state: _State, size: float) -> list[Finalist]:
     """What raced: of sizes that are nearly alike the one that promises most; of one size those that may serve
     enough devices, by their gas."""
     shares = np.array([each.shares for each in state.candidates])
-    promises = expit(state.surface(size).logits(state.coordinates(shares))[0]).tolist()
+    promises = expit(state.surface(size).logits(state.space.coordinates(shares))[0]).tolist()
     rows = [
         (each, Finalist(point=each.point, size=each.size, place=each.race.place, promise=promise))
         for each, promise in zip(state.candidates, promises, strict=True)
@@ -485,23 +473,3 @@ def _stepped(state: _State, shares: FloatArray, step: float) -> FloatArray:
         if not axis.ranges:
             moved[place] = fresh[place] if switch[place] else shares[place]
     return np.clip(moved, 0.0, 1.0)
-
-
-def _sized(space: Space, shares: FloatArray, target: float) -> FloatArray:
-    """A place with a design of a size, by its width where that varies, else by its outer radius."""
-    for place, axis in enumerate(space.axes):
-        for path, power in (("disc.axial_width", 1.0), ("disc.outer_radius", 0.5)):
-            if path in axis.ranges and (power == 1.0 or "disc.axial_width" not in space.paths):
-                (point,) = space.points(shares[np.newaxis])
-                wanted = float(point[path]) * (target / space.size(point)) ** power
-                shares[place] = _share_of(axis.ranges[path], wanted)
-    return shares
-
-
-def _entry(axis: Axis, share: float) -> int:
-    return min(int(share * len(axis.choices)), len(axis.choices) - 1)
-
-
-def _share_of(wanted: Range, value: float) -> float:
-    low, high, value = (math.log(each) if wanted.log else each for each in (wanted.low, wanted.high, value))
-    return min(max((value - low) / (high - low), 0.0), 1.0)

@@ -9,6 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from ringbalance.controller.judging.tuning import setting_text
 from ringbalance.design.axes import Axis, Point, Range, plan_of, plan_of_texts
 from ringbalance.scene.arrays import FloatArray
@@ -110,6 +112,30 @@ class Space:
         outer = float(point.get("disc.outer_radius", disc.outer_radius))
         return math.pi * outer**2 * float(point.get("disc.axial_width", disc.axial_width))
 
+    def sized_at(self, shares: FloatArray, size: float) -> FloatArray:
+        """A place in the unit cube with another size, m^3, by its width where that varies, else by its outer
+        radius; as near to it as the range lets it come."""
+        moved = shares.copy()
+        for place, axis in enumerate(self.axes):
+            for path, power in (("disc.axial_width", 1.0), ("disc.outer_radius", 0.5)):
+                if path in axis.ranges and (power == 1.0 or "disc.axial_width" not in self.paths):
+                    (point,) = self.points(moved[np.newaxis])
+                    value = float(point[path]) * (size / self.size(point)) ** power
+                    moved[place] = _share_of(axis.ranges[path], value)
+        return moved
+
+    def coordinates(self, shares: FloatArray) -> FloatArray:
+        """Of places in the unit cube, shape (n, axes): entries of a list are equally far from each other."""
+        return np.concatenate(
+            [
+                column[:, np.newaxis]
+                if axis.ranges
+                else 0.5 * np.eye(len(axis.choices))[[_entry(axis, share) for share in column]]
+                for axis, column in zip(self.axes, shares.T, strict=True)
+            ],
+            axis=1,
+        )
+
     @property
     def valves(self) -> tuple[str, ...]:
         """Names of those at hand."""
@@ -135,6 +161,15 @@ class Space:
             ends = axis.ranges[path]
             return f"{setting_text(path, ends.low)} to {setting_text(path, ends.high)}"
         return ", ".join(dict.fromkeys(setting_text(path, each.get(path)) for each in axis.choices))
+
+
+def _entry(axis: Axis, share: float) -> int:
+    return min(int(share * len(axis.choices)), len(axis.choices) - 1)
+
+
+def _share_of(ends: Range, value: float) -> float:
+    low, high, value = (math.log(each) if ends.log else each for each in (ends.low, ends.high, value))
+    return min(max((value - low) / (high - low), 0.0), 1.0)
 
 
 def _path(port: float, crest: float | None) -> float:

@@ -18,7 +18,7 @@ PLUS_MINUS: Final = "\u00a0±\u00a0"
 MISSING: Final = "–"
 
 _SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_MOST_DIGITS: Final = 6
+_MOST_DIGITS: Final = 7
 _TABLE_DIGITS: Final = 9
 _UNSTATED_DIGITS: Final = 4
 _INPUT_ROUNDING: Final = 5e-4
@@ -155,7 +155,7 @@ def measured(value: float | None, width: Width, *, digits: int = 4) -> str:
     exact, place = _exact(value), last_place(widest)
     top = max(_leading_exponent(exact), place)
     if top - place + 1 > _MOST_DIGITS:
-        return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(widest, digits=1)}"
+        return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(widest, digits=2)}"
     plain_power = top < _LARGEST_PLAIN and (place > 0 or top > _SMALLEST_PLAIN)
     power, decimals = (0, -place) if plain_power else (top, top - place)
 

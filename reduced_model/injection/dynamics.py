@@ -53,7 +53,7 @@ Record = Any
 
 FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
 """Whether gas is on and the tube primed, in the tables of a law that gives velocities alone."""
-PIECES: Final = 2048
+PIECES: Final = 4096
 """Of each of these tables."""
 NUMBERS: Final = 4352
 """Room for the numbers of a law, fixed, so that compiled code serves every law."""

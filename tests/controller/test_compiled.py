@@ -66,7 +66,7 @@ def test_what_compiled_code_alone_calls_has_no_machine_code_of_its_own() -> None
 PROGRAM = """
 import numba
 from numba.core import config
-from ringbalance.scene.platform.compiled import compiled, compiled_sources
+from ringbalance.scene.platform.compiled import compiled, _compiled_sources
 from ringbalance.controller import compiled_loop
 before = config.CACHE_DIR
 def twice(x):

@@ -8,7 +8,7 @@ WORKERS ?= 2
 # What differs between Python versions shows here; a minute or so, for `make test-versions`.
 SHORT_TESTS := tests/scene tests/mesh tests/architecture tests/test_public_names.py tests/test_cli.py \
 	tests/physics/test_pressure.py tests/physics/test_tube_loss.py tests/reduced_model/test_paper_law.py \
-	tests/reduced_model/test_hermite.py tests/controller/test_loop.py tests/controller/test_compiled.py
+	tests/reduced_model/test_table.py tests/controller/test_loop.py tests/controller/test_compiled.py
 CODE := scene results mesh physics reduced_model controller identification export design verification reports tools benchmarks
 # One thread per process: the tests run side by side, and sums then come out the same on every machine.
 export OPENBLAS_NUM_THREADS ?= 1

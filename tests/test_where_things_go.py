@@ -33,3 +33,10 @@ def test_each_term_is_defined_once() -> None:
     terms = Counter(glossary_terms())
     assert len(terms) > 50
     assert [term for term, count in terms.items() if count > 1] == []
+
+
+def test_the_short_selection_names_tests_that_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    paths = re.findall(r"\btests/[\w./]+", makefile)
+    assert len(paths) > 5
+    assert [path for path in paths if not (ROOT / path).exists()] == []

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final
@@ -83,18 +83,18 @@ class Sweep(Result):
     resumed: Mapping[str, int]
     """Points whose answers an earlier run had kept, likewise."""
 
-    @property
+    @cached_property
     def verdicts(self) -> tuple[str, ...]:
         """Of each point: what its runs say, else the status of its static row."""
         pairs = zip(self.static, self.driven, strict=True)
         return tuple(run["verdict"] if self.runs and row["sha256"] else row["status"] for row, run in pairs)
 
-    @property
+    @cached_property
     def feasible(self) -> tuple[bool, ...]:
         """Whether each point meets what the scene requires or, without runs, has a flow."""
         return tuple(verdict == (MET if self.runs else "ok") for verdict in self.verdicts)
 
-    @property
+    @cached_property
     def best(self) -> int | None:
         """The feasible point that settles first or, without runs, reaches the largest unbalance."""
         if self.runs:

@@ -37,8 +37,8 @@ from ringbalance.scene.platform.both_ways import both_ways
 
 _NEWTON_STEPS: Final = 60
 """At the most; each that leaves the interval known to hold the root is replaced by half of that."""
-_CONVERGED: Final = 1e-5
-"""Of a piece: the next change would be about the square of that."""
+_CONVERGED: Final = 1e-6
+"""Of a piece: Newton's next change would be next to round-off."""
 ROOT_CELLS: Final = 512
 ROOT_HEAD: Final = 4
 """What stands before the cells."""

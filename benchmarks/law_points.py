@@ -16,6 +16,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tube.heads import velocities_of
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
@@ -40,7 +41,7 @@ def main() -> None:
     assert isinstance(law, CalibratedLaw)
     table = law.heads.siphon
     hermite = CubicHermiteSpline(table.knots, table.column(0), table.column(1))
-    pchip = PchipInterpolator(np.log(table.knots), np.log(table.knots**4 * table.column(0)))
+    pchip = PchipInterpolator(np.log(table.knots), np.log(velocities_of(table)))
     x = np.random.default_rng(1).uniform(0.0, law.max_fill_ratio, MANY)
     root = np.random.default_rng(2).uniform(table.knots[0], table.knots[-1], MANY)
     ways: dict[str, Callable[..., object]] = {

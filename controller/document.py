@@ -25,6 +25,7 @@ from ringbalance.results.numbers import given, plain
 from ringbalance.results.result import Rows, Table, models_table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
+from ringbalance.scene.keys.derivations import permissible_unbalance
 from ringbalance.scene.models import Scene
 
 
@@ -317,9 +318,7 @@ def _unbalances(run: Simulation) -> Iterator[Quantity]:
     influence, grade = scene.rotor.influence_coefficient, scene.requirement.grade
     yield _row("residual_unbalance", "residual unbalance at the end", after / influence, "kg m")
     if grade is not None and scene.rotor.mass is not None:
-        permissible = balancing.permissible_unbalance(
-            grade=grade, mass=scene.rotor.mass, speed=scene.rotor.speed
-        )
+        permissible = permissible_unbalance(grade=grade, mass=scene.rotor.mass, speed=scene.rotor.speed)
         name = "permissible residual unbalance (ISO 21940-11)"
         yield _row("permissible_unbalance", name, permissible, "kg m")
     yield _row(

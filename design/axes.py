@@ -359,7 +359,7 @@ def _table_axis(scene: SceneFile, table: str, file: Path) -> Axis:
 def unit_of_path(scene: SceneFile, path: str) -> str:
     """SI unit of a key; "1" for one without."""
     dimension = _reader(scene, path).dimension
-    return next(iter(DIMENSIONS[dimension].units)) if dimension else "1"
+    return DIMENSIONS[dimension].si_unit if dimension else "1"
 
 
 def _fault(value: str, problem: str, allowed: str) -> SceneError:

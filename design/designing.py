@@ -23,7 +23,7 @@ from ringbalance.design.axes import Axis, Point
 from ringbalance.design.hunt import Candidate, Finalist, Hunt, Static, deal, hunt
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import Space
-from ringbalance.design.static import point_scene, static_rows
+from ringbalance.design.static import point_scene, reach_of, static_rows
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
@@ -165,8 +165,7 @@ def run_design(
 
 def _reach(space: Space, point: Point) -> float | None:
     (row,) = static_rows(space.scene, [point], intervals=False)
-    reach: float | None = row["values"].get("reach", (None,))[0]
-    return reach
+    return reach_of(row)
 
 
 def _best(

@@ -25,7 +25,7 @@ from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
 from ringbalance.design.racing import DEVICES, Place, Race, near, race, tuned_settings
 from ringbalance.design.space import Space
-from ringbalance.design.static import Record, static_rows
+from ringbalance.design.static import Record, reach_of, static_rows
 from ringbalance.design.surface import Surface
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -192,7 +192,7 @@ class _State:
         batches = [points[start : start + _TOGETHER] for start in range(0, len(points), _TOGETHER)]
         calls = [partial(static_rows, self.space.scene, each, intervals=False) for each in batches]
         rows = [row for part in deal(self.executor, calls) for row in part or ()]
-        reach = [row["values"].get("reach", (None,))[0] for row in rows]
+        reach = [reach_of(row) for row in rows]
         enough = [
             row["status"] == "ok" and most is not None and most >= self.needed
             for row, most in zip(rows, reach, strict=True)
@@ -453,7 +453,7 @@ def _sample(space: Space) -> tuple[FloatArray, bool]:
 
 
 def _static(points: Sequence[Point], rows: Sequence[Record], able: int) -> Static:
-    reach = [(row["values"].get("reach", (None,))[0] or 0.0) * (row["status"] == "ok") for row in rows]
+    reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") for row in rows]
     best = int(np.argmax(reach))
     return Static(
         points=len(points),

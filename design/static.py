@@ -67,6 +67,12 @@ FAULTS: Final = (ValueError, ArithmeticError, RuntimeError)
 """Besides `SceneError`, how a point may break down."""
 
 
+def reach_of(row: Record) -> float | None:
+    """Unbalance that a design cancels in any direction, kg m, of its static row; None: not known."""
+    reach: float | None = row["values"].get("reach", (None,))[0]
+    return reach
+
+
 def point_scene(scene: SceneFile, point: Point) -> SceneFile:
     """The scene of a point. Raises: SceneError: the changed values are refused."""
     return scene.with_values(point)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.design.axes import Plan, Point, unit_of_path
 from ringbalance.design.sensitivity import first_order, total_order
-from ringbalance.design.static import EMPTY, Record, content_of, point_scene, static_rows
+from ringbalance.design.static import EMPTY, Record, content_of, point_scene, reach_of, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
 from ringbalance.results.numbers import given
@@ -33,8 +33,6 @@ bits may depend on it.
 """
 STORE: Final = "store"
 """Folder of kept answers in that of a sweep."""
-_BEST: Final = "reach"
-"""What static rows are ranked by: the largest."""
 _OF_RUNS: Final = {
     "devices": ("devices", ""),
     "fraction": ("fraction", "1"),
@@ -100,7 +98,7 @@ class Sweep(Result):
         if self.runs:
             ranked = [(each["settling_time"], i) for i, each in enumerate(self.driven)]
         else:
-            ranked = [(row["values"].get(_BEST, (None,))[0], i) for i, row in enumerate(self.static)]
+            ranked = [(reach_of(row), i) for i, row in enumerate(self.static)]
             ranked = [(None if value is None else -value, i) for value, i in ranked]
         return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
 

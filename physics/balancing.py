@@ -20,14 +20,6 @@ _ANGLES: Final[FloatArray] = np.concatenate(
 """Of z on the unit circle, rad."""
 
 
-def permissible_unbalance(*, grade: float, mass: float, speed: float) -> float:
-    """U_per = G M / W of a whole rigid rotor, kg m, with G in m/s; 9549 G M / n in g mm, mm/s and rpm.
-
-    Source: ISO 21940-11:2016.
-    """
-    return grade * mass / speed
-
-
 def unbalance_reduction_ratio(*, before: float, after: float) -> float:
     """URR = 1 - U1/U0 of one correction.
 

@@ -93,5 +93,9 @@ def closest(word: str, known: Iterable[str]) -> str:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """' (did you mean "x"?)' with the known word that is closest; empty when none is close."""
-    found = closest(word, known)
-    return f' (did you mean "{found}"?)' if found else ""
+    return meant_text(closest(word, known))
+
+
+def meant_text(name: str) -> str:
+    """The same of a word that is known to be meant; empty for none."""
+    return f' (did you mean "{name}"?)' if name else ""

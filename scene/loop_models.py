@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.keys.declaration import UNCERTAIN, Shown, derived, needed, standard, unused
-from ringbalance.scene.keys.derivations import trial_sequence
+from ringbalance.scene.keys.derivations import permissible_unbalance, trial_sequence
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -152,14 +152,14 @@ def required_amplitude(
 ) -> float | None:
     """Amplitude that may remain, m zero-to-peak: the smaller of the residual and of what the grade leaves.
 
-    kappa G m/w: the influence coefficient times the permissible unbalance.
+    The latter is the influence coefficient times the permissible unbalance.
     Args: `mass`: m, kg, without which a grade G, m/s, asks for no amplitude.
     Returns: None where nothing is asked.
-    Source: ISO 21940-11:2016, U = G m/w.
     """
     asked = [] if residual is None else [residual]
     if grade is not None and mass is not None:
-        asked.append(grade * mass / speed * influence_coefficient)
+        unbalance = permissible_unbalance(grade=grade, mass=mass, speed=speed)
+        asked.append(unbalance * influence_coefficient)
     return min(asked, default=None)
 
 

@@ -260,7 +260,7 @@ def searched_along(balancer: Balancer, best: Tried, *, progress: Progress) -> tu
     axis = best.candidate.trials.along
     if axis is None:
         return ()
-    own = float(value_at(balancer.scene, axis.name))
+    own = value_at(balancer.scene, axis.name)
     chosen_at: dict[int, Tried] = {}
     found: dict[int, Along] = {}
     places: Sequence[int] = axis.first

@@ -27,7 +27,7 @@ from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.pieces.compiled_point import answer_each
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
+from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of, velocities_of
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -147,7 +147,7 @@ class CalibratedLaw:
         """What is no table, at the places of `point`."""
         path, inputs, heads = self.path, self.inputs, self.heads
         by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
-        slowest, fastest = (heads.siphon.knots**4 * heads.siphon.column(0))[[0, -1]]
+        slowest, fastest = velocities_of(heads.siphon)[[0, -1]]
         return {
             point.LARGEST_FILL: self.max_fill_ratio,
             point.AMBIENT: self.ambient_pressure,
@@ -296,7 +296,7 @@ class CalibratedLaw:
 
     def table(self) -> Mapping[str, FloatArray]:
         siphon, path = self.heads.siphon, self.path
-        velocity = siphon.knots**4 * siphon.column(0)
+        velocity = velocities_of(siphon)
         ways = {"log_hump_head": self.heads.to_crest(reverse=False)}
         ways["log_return_hump_head"] = self.heads.to_crest(reverse=True)
         scalars = (

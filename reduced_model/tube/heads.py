@@ -138,14 +138,8 @@ class TubeHeads:
             knots = knots_of(each.root, some, shortest=shortest) if shortest else np.arange(each.root.size)
             made.append(table_at(each.root, knots, some))
             missed = max(missed, float(np.max(np.abs(made[-1].quintic(each.root) / each.over_root - 1.0))))
-        return cls.with_ways(*made), missed
-
-    @classmethod
-    def with_ways(
-        cls, siphon: Table, hump: Table | None = None, back: Table | None = None, *, error: float = 0.0
-    ) -> TubeHeads:
-        """The heads with what there is of ways to a crest."""
-        return cls(siphon=siphon, hump=hump, return_hump=back, interpolation_error=error)
+        hump, back = (*made[1:], None, None)[:2]
+        return cls(siphon=made[0], hump=hump, return_hump=back), missed
 
     @property
     def tables(self) -> tuple[Table, ...]:
@@ -171,7 +165,7 @@ class TubeHeads:
         place = crest_end_uncertainty(scene.tube, 0.0)
 
         def widths(table: Table) -> _Widths:
-            return _widths(scene, _velocities(table), place=place, by_inputs=False)
+            return _widths(scene, velocities_of(table), place=place, by_inputs=False)
 
         whole = widths(self.siphon)
         siphon = self.siphon.with_column(LOSS, whole.whole)
@@ -202,7 +196,7 @@ class TubeHeads:
         """Heads in proportion to a power of the velocity, those of the tube at one velocity, m/s."""
 
         def power(table: Table) -> Table:
-            u, at = _velocities(table), roots_of(table, velocity)
+            u, at = velocities_of(table), roots_of(table, velocity)
             root, n = float(at) * (u / velocity) ** (exponent / 8), 8 / exponent - 4
             ratio = u / root**4
             columns = [ratio, n * ratio / root, n * (n - 1) * ratio / root**2]
@@ -279,14 +273,14 @@ def _places(count: int) -> FloatArray:
     return np.linspace(start, stop, count)
 
 
-def _velocities(table: Table) -> FloatArray:
-    """At the knots, m/s."""
+def velocities_of(table: Table) -> FloatArray:
+    """At the knots of a table of heads, m/s."""
     return np.asarray(table.knots**4 * table.column(0))
 
 
 def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
     """Eighth roots of the heads that velocities above zero lose, m/s."""
-    u, at = np.asarray(velocity, dtype=np.float64), _velocities(table)
+    u, at = np.asarray(velocity, dtype=np.float64), velocities_of(table)
     inside, knots = clipped(u, at[0], at[-1]), table.knots
     piece = np.searchsorted(at[1:-1], inside)
     low, high = knots[piece], knots[piece + 1]

@@ -1,4 +1,4 @@
-"""Geometry from which defaults follow, and by which rules judge what is given."""
+"""Geometry and grades from which defaults follow, and by which rules judge what is given."""
 
 from __future__ import annotations
 
@@ -39,6 +39,14 @@ def even_number_of_chambers(central_angle: float) -> int | None:
 def angle_of_chambers(chambers: int) -> float:
     """Central angle of chambers that fill the circle, rad."""
     return 2 * math.pi / chambers
+
+
+def permissible_unbalance(*, grade: float, mass: float, speed: float) -> float:
+    """U_per = G M / W of a whole rigid rotor, kg m, with G in m/s; 9549 G M / n in g mm, mm/s and rpm.
+
+    Source: ISO 21940-11:2016.
+    """
+    return grade * mass / speed
 
 
 def trial_sequence(chambers: int) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any, Literal
 
-from ringbalance.scene.faults import MISSING, Fault, closest
+from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import Place, Schema
 from ringbalance.scene.toml import toml_key, toml_text
@@ -302,7 +302,7 @@ def _unknown(rejected: _Rejected, schema: Schema, meant: str) -> tuple[str, str]
     if meant and key == place[-1]:
         hint = f" (it belongs in [{table}])" if table else " (it belongs at the top, before the first table)"
     elif meant:
-        hint = f' (did you mean "{key}"?)'
+        hint = meant_text(key)
     return f"unknown {kind}{hint}", ", ".join(known)
 
 

@@ -7,11 +7,12 @@ import math
 import pytest
 
 from ringbalance.physics import balancing
+from ringbalance.scene.keys.derivations import permissible_unbalance
 
 
 def test_permissible_unbalance_is_the_standards_9549_g_m_over_n() -> None:
     rpm = 3000.0
-    permissible = balancing.permissible_unbalance(grade=2.5e-3, mass=40.0, speed=rpm * math.pi / 30)
+    permissible = permissible_unbalance(grade=2.5e-3, mass=40.0, speed=rpm * math.pi / 30)
     assert permissible == pytest.approx(1e-6 * 9549 * 2.5 * 40.0 / rpm, rel=1e-4)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -28,7 +29,7 @@ from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
-from ringbalance.scene.arrays import FloatArray, plain
+from ringbalance.scene.arrays import FloatArray, Records, plain
 from ringbalance.scene.models import Scene, Tube
 
 
@@ -114,6 +115,16 @@ PLANT: Final = np.dtype(
     ]
 )
 """Constants of a plant with moving liquid, filling gas and late valves."""
+
+
+def empty_plants(count: int) -> Records:
+    """Records of type `PLANT`, of zeros.
+
+    Few laws fill the room for their pieces.  What is not written to takes neither memory nor time here; arrays
+    of NumPy's own would lie on huge pages, which the system fills with zeros as a whole.
+    """
+    return np.frombuffer(mmap.mmap(-1, count * PLANT.itemsize), dtype=PLANT)
+
 
 X: Final = 0
 U: Final = 1
@@ -278,7 +289,7 @@ class Dynamics:
 
     def plant(self, *, total: float, relative_error: float | None = None) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
-        plant = np.zeros(1, dtype=PLANT)
+        plant = empty_plants(1)
         self.fill(plant, total=total, relative_error=relative_error)
         return plant
 

@@ -244,7 +244,8 @@ def _front_table(design: Design) -> Table:
         for each in design.front
     ]
     valve = (VALVE,) if design.space.valves else ()
-    heads = ("size", "90 % within", "gas, median", *valve, *paths)
+    columns = (path.rpartition(".")[2].replace("_", " ") for path in paths)
+    heads = ("size", "90 % within", "gas, median", *valve, *columns)
     return Table(
         caption="Others, none of which is better in everything; on the devices of the search",
         heads=heads,

@@ -204,7 +204,7 @@ def test_a_nameless_scene_has_the_values_and_the_hash_of_the_named_one(values: d
     ],
 )
 def test_a_changed_value_keeps_the_unit_of_its_file(path: str, value: object, text: object) -> None:
-    """Where the file has none, the unit in which it is usually written; in SI where either needs many digits."""
+    """Where the file has none, the usual unit; in SI where that saves many digits."""
     table, key = path.split(".")
     changed = bundled(PAPER).with_values({path: value})
     found = getattr(getattr(changed, table), key)

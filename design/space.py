@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.judging.tuning import setting_text
 from ringbalance.design.axes import Axis, Point, Range, plan_of, plan_of_texts
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Scene

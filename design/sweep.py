@@ -14,7 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.judging.tuning import setting_text
 from ringbalance.design.axes import Axis, Plan, Point, unit_of_path
 from ringbalance.design.sensitivity import first_order, total_order
 from ringbalance.design.static import EMPTY, Record, content_of, point_scene, reach_of, static_rows
@@ -25,6 +24,7 @@ from ringbalance.results.numbers import percent
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
 from ringbalance.results.rows import Finding, Quantity, around
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered

@@ -16,7 +16,6 @@ from ringbalance.controller.judging.tuning import (
     plain_settings,
     required_document,
     required_table,
-    setting_text,
     share_values,
     times_of,
 )
@@ -27,6 +26,7 @@ from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN, Paired
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.origins import raw_value_at
 
 _CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
@@ -251,7 +251,8 @@ def _front_table(design: Design) -> Table:
         for each in design.front
     ]
     valve = (VALVE,) if design.space.valves else ()
-    heads = ("size", "90 % within", "gas, median", *valve, *paths)
+    columns = (path.rpartition(".")[2].replace("_", " ") for path in paths)
+    heads = ("size", "90 % within", "gas, median", *valve, *columns)
     return Table(
         caption="Others, none of which is better in everything; on the devices of the search",
         heads=heads,

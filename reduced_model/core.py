@@ -28,7 +28,7 @@ from ringbalance.reduced_model.tube.regime import (
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
 
-_TOGETHER: Final = 4096
+_TOGETHER: Final = 8192
 """Designs whose arrays fit into a processor's cache."""
 
 

@@ -44,7 +44,10 @@ class Designs:
 
     @classmethod
     def stacked(cls, scenes: Sequence[Scene], *, each: int = 1) -> Designs:
-        """The designs of scenes that differ in numbers alone. Args: `each`: designs that every scene is."""
+        """The designs of scenes that differ in numbers alone.
+
+        Args: `each`: n of every scene whose own numbers are arrays of shape (n,), one behind the other.
+        """
         return cls(scene=_stacked(scenes, each), size=each * len(scenes))
 
     def take(self, rows: IntArray) -> Designs:
@@ -139,9 +142,9 @@ def in_batches(
 ) -> FloatArray:
     """Values of a function of designs for scenes that may differ in more than numbers, kind by kind.
 
-    Args: `function`: returns an array whose last axis runs over the designs. `each`: designs that every scene
-        is; None: one.
-    Returns: The same over the scenes, in their order, and then over the designs of each, if they are many.
+    Args: `function`: returns an array whose last axis runs over the designs. `each`: n where numbers of every
+        scene are arrays of shape (n,).
+    Returns: The same over the scenes, in their order; with n on a last axis of its own.
     """
     parts, batches = [], alike(scenes)
     for rows in batches:
@@ -167,8 +170,8 @@ def input_effects(
     Every input moves by its expanded uncertainty (95 %) to both sides, and the larger change counts, because
     a sensitivity at the value itself misses what bends within the interval.  All that follows from an input
     follows, such as the velocity at which k is asked for, unless the function holds it.
-    Args: `function`, `each`: as for `in_batches`. `among`: inputs that count. `errors`: whether fitted errors
-        of models count too.
+    Args: `function`: as for `in_batches`. `among`: inputs that count. `errors`: whether fitted errors of
+        models count too. `each`: as for `in_batches`.
     Returns: The scene's values, and expanded uncertainties (95 %) by input, "fitted" for all that were fitted
         together; NaN where neither side has the quantity.
     Source: ASME V&V 20-2009, one input at a time.

@@ -19,6 +19,7 @@ from ringbalance.design.axes import Point
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of, nameless
@@ -148,14 +149,15 @@ def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
     if not intervals:
         values = _values(designs)
         return np.concatenate([values, np.full(values[1:].shape, np.nan)])
-    values, effects = input_effects(designs.scene, _values, each=designs.size)
+    function = partial(_values, near=TubeFlow.of(designs))
+    values, effects = input_effects(designs.scene, function, each=designs.size)
     variance = sum((np.square(np.nan_to_num(each)) for each in effects.values()), np.zeros(values.shape))
     return np.concatenate([values, np.where(np.isnan(values), np.nan, np.sqrt(variance))[1:]])
 
 
-def _values(designs: Designs) -> FloatArray:
-    """Regime, and what `UNITS` names."""
-    answers = Answers.of(designs)
+def _values(designs: Designs, *, near: TubeFlow | None = None) -> FloatArray:
+    """Regime, and what `UNITS` names. Args: `near`: as for `Answers.of`."""
+    answers = Answers.of(designs, near=near)
     return np.array([answers.regime, *(getattr(answers, _FIELDS.get(name, name)) for name in UNITS)])
 
 

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
-from ringbalance.reduced_model.gas_line import LineAnswer
+from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.calibrated_law import WIDTH, CalibratedLaw, DriveUncertainty
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -353,8 +353,6 @@ class Calibration(PresentedResult):
     """Of a chamber emptied under the scene's gas pressure, and what a pair can use."""
     tube_liquid: TubeLiquid
     """In the tube of a pair around its first injection, and what it does to the vibration."""
-    gas_line: tuple[LineAnswer, ...]
-    """What the gas line can deliver, or both ends of a default range of lines."""
     instability: AsynchronousInstability | None
     """Whirl that surface waves lock to; None where there is no such wave."""
     models_used: tuple[ModelUsed, ...]
@@ -366,6 +364,11 @@ class Calibration(PresentedResult):
     def budgets(self) -> Mapping[str, Budget]:
         """Uncertainty budget of every main quantity, made when it is first asked for."""
         return _budgets(self)
+
+    @cached_property
+    def gas_line(self) -> tuple[LineAnswer, ...]:
+        """What the gas line can deliver, or both ends of a default range of lines; found when asked for."""
+        return line_answers(self.scene, self.model)
 
     @property
     def holding(self) -> Holding:

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
-from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
+from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.law.calibrated_law import WIDTH, CalibratedLaw, DriveUncertainty
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -30,6 +30,7 @@ from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import HumpGas, Scene
+from ringbalance.scene.registry import registered
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 UNITS: Final = {
@@ -368,7 +369,9 @@ class Calibration(PresentedResult):
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:
         """What the gas line can deliver, or both ends of a default range of lines; found when asked for."""
-        return line_answers(self.scene, self.model)
+        # The march is compiled: what needs no answer of it loads no compiler.
+        answers: tuple[LineAnswer, ...] = registered("function", "line_answers")(self.scene, self.model)
+        return answers
 
     @property
     def holding(self) -> Holding:

@@ -36,7 +36,7 @@ _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
 _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 16
+_MOST_LEVELS: Final = 10
 """Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
 _OF_SHARE: Final = 1e-3
 _OF_CHAMBER: Final = 2e-6
@@ -44,6 +44,12 @@ _OF_CHAMBER: Final = 2e-6
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
+_ANYTHING: Final = 1e100
+"""Times the error of half-widths that nobody asks for: they are rounded to zero."""
+_OF_ROUNDING: Final = 0.2
+"""Of a piece's error, to which its coefficients are rounded: numbers with few bits make small libraries."""
+_BITS: Final = 18
+"""Of a place at which pieces may meet, likewise."""
 _SAMPLES: Final = 2001
 _SHARES: Final = ((SHARE, 3), (BACK_SHARE, 2))
 """Column of a share there and back, and the degree of its pieces."""
@@ -122,10 +128,11 @@ class CompactLaw:
         )
 
 
-def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
+def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -> CompactLaw:
     """Tabulate a calibrated law again, on as few knots as `TOLERANCE` allows.
 
-    Args: `scene`: whose law it is; its chamber gives the free surface.
+    Args: `scene`: whose law it is; its chamber gives the free surface. `uncertainty`: False: for what asks
+        for velocities and moments alone; half-widths are then zero, which takes no room in a library.
     Raises: SceneError: a scene with inputs that were fitted together, whose effect such a law does not hold.
     """
     if law.variants:
@@ -136,9 +143,10 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
         )
     tables = law.heads.tables
     rows = LawRows.of(len(tables), cells=_CELLS)
-    missed = max(_add_way(rows, law, way, table) for way, table in enumerate(tables))
-    level_error = _add_levels(rows, law)
-    _add_chamber(rows, scene, law)
+    slack = 1.0 if uncertainty else _ANYTHING
+    missed = max(_add_way(rows, law, way, table, slack) for way, table in enumerate(tables))
+    level_error = _add_levels(rows, law, slack)
+    _add_chamber(rows, scene, law, slack)
     error = _AT_CREST * missed + law.heads.interpolation_error
     scalars = law.scalars() | {
         point.TABULATION: error**2,
@@ -179,21 +187,24 @@ class _Column:
     degree: int = point.C5 - point.C0
 
     def polynomial(self, x: FloatArray, first: int, last: int) -> FloatArray:
-        """Coefficients in (x - end)/length from the samples between two, both of which are met.
+        """Coefficients in powers of x - end from the samples between two, both of which are met.
 
-        The samples are those next to the extrema of a Chebyshev polynomial.
+        The samples are those next to the extrema of a Chebyshev polynomial.  Coefficients are rounded to
+        `_OF_ROUNDING` of the piece's error.
         """
         extrema = (1 - np.cos(np.pi * np.arange(self.degree + 1) / self.degree)) / 2
         at = np.unique(np.rint(first + (last - first) * extrema).astype(int))
+        powers = (x[last] - x[first]) ** np.arange(at.size)
         t = (x[at] - x[last]) / (x[last] - x[first])
-        found = np.linalg.solve(np.vander(t, increasing=True), self.value[at])
-        return np.pad(found, (0, self.degree + 1 - at.size))
+        exact = np.linalg.solve(np.vander(t, increasing=True), self.value[at]) / powers
+        step = 2.0 ** np.floor(np.log2(_OF_ROUNDING * self.allowed[first : last + 1].min() / powers))
+        return np.pad(np.rint(exact / step) * step + 0.0, (0, self.degree + 1 - at.size))
 
     def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
         """Of one piece, at the samples that it spans."""
         inside = slice(first, last + 1)
-        t = (x[inside] - x[last]) / (x[last] - x[first])
-        return np.asarray(polyval(t, self.polynomial(x, first, last)) - self.value[inside])
+        polynomial = self.polynomial(x, first, last)
+        return np.asarray(polyval(x[inside] - x[last], polynomial) - self.value[inside])
 
     def largest(self, x: FloatArray, ends: IntArray, of: FloatArray | float = 1.0) -> float:
         """Error of all pieces. Args: `of`: what it is relative to, at the samples."""
@@ -201,19 +212,18 @@ class _Column:
         return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
 
     def pieces(self, x: FloatArray, ends: IntArray) -> FloatArray:
-        """Coefficients in powers of x - end, shape (degree + 1, pieces)."""
-        found = [self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())]
-        return np.transpose(found) / np.diff(x[ends]) ** np.arange(self.degree + 1)[:, None]
+        """Coefficients of all, shape (degree + 1, pieces)."""
+        return np.transpose([self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())])
 
 
-def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
+def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float) -> float:
     """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
     # Every knot of the law's table is a sample, so that a table with few knots is met exactly.
     pieces = law.levels.knots.size - 1
     x = np.linspace(0.0, law.max_fill_ratio, max(1, round(_SAMPLES / pieces)) * pieces + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
     level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
-    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
+    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
     while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
     error = level.largest(x, ends)
@@ -223,27 +233,29 @@ def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
     return error
 
 
-def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
+def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
-    x = np.linspace(0.0, law.max_fill_ratio, _SAMPLES)
+    x = _rounded(np.linspace(0.0, law.max_fill_ratio, _SAMPLES))
     columns = []
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
         allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
         columns.append(_Column(value=value, allowed=allowed, degree=2))
-    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
+    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
     rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
-def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float:
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float) -> float:
     """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
     slowest, fastest = roots_of(table, VELOCITIES)
-    s, density = np.geomspace(slowest, fastest, _SAMPLES), law.density
-    x, value = density**0.125 * s, table.quintic(s) / density**0.5
+    root = law.density**0.125
+    x = _rounded(root * np.geomspace(slowest, fastest, _SAMPLES))
+    s = np.clip(x / root, slowest, fastest)
+    value = table.quintic(s) / law.density**0.5
     ratio = _Column(value=value, allowed=_OF_HEADS * value)
-    loss = _half_width(table.straight(s, LOSS) ** 2)
-    beside = _shares(table, s) if way == point.SIPHON else []
+    loss = _half_width(table.straight(s, LOSS) ** 2, slack * _OF_WIDTHS)
+    beside = _shares(table, s, slack) if way == point.SIPHON else []
     ends = _ends(x, [ratio, loss, *beside])
     more = (*law.path.clearing_velocities, *carried_by(law.path)) if way else (ends.size - 1,)
     rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
@@ -252,11 +264,12 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float
     return ratio.largest(x, ends, of=value)
 
 
-def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
+def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[_Column]:
     """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
     found = [_share(table.cubic(s, at), degree) for at, degree in _SHARES if at < table.count]
     if found:
-        found.insert(1, _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)))
+        width = np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)
+        found.insert(1, _half_width(width, slack * _OF_WIDTHS))
     return found
 
 
@@ -264,9 +277,15 @@ def _share(value: FloatArray, degree: int) -> _Column:
     return _Column(value=value, allowed=_OF_SHARE * value, degree=degree)
 
 
-def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
+def _half_width(value: FloatArray, of: float) -> _Column:
     allowed = of * (value + 0.1 * float(np.max(value))) + 1e-300
     return _Column(value=value, allowed=allowed, degree=1)
+
+
+def _rounded(x: FloatArray) -> FloatArray:
+    """To `_BITS` binary places of the largest; its ends stay as they are."""
+    step = 2.0 ** (np.ceil(np.log2(x[-1])) - _BITS)
+    return np.concatenate([x[:1], np.rint(x[1:-1] / step) * step, x[-1:]])
 
 
 def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:

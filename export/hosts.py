@@ -8,7 +8,14 @@ from string import Template
 from typing import Final
 
 from ringbalance.export.blocks import RANGE, Block, Variable
-from ringbalance.export.translate import PER_PIECE, c_functions, number_text, python_functions, st_functions
+from ringbalance.export.translate import (
+    PER_PIECE,
+    c_functions,
+    exact_text,
+    number_text,
+    python_functions,
+    st_functions,
+)
 
 _PER_LINE: Final = 4
 _OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
@@ -125,10 +132,14 @@ _DECLARED: Final = {
 
 def _pieces(block: Block, language: str) -> str:
     whole, one = _DECLARED[language]
-    rows = ",\n".join(one.format(", ".join(map(number_text, row))) for row in block.pieces)
+    rows = ",\n".join(one.format(", ".join(map(_TEXT[language], row))) for row in block.pieces)
     count = len(block.pieces)
     sizes = {"count": count, "last": count - 1, "width": PER_PIECE, "end": PER_PIECE - 1}
     return whole.format(rows=rows, **sizes) if rows else ""
+
+
+_TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
+"""How a language writes a number; C's hexadecimal ones are short and leave nothing to round."""
 
 
 def template(name: str) -> str:
@@ -139,6 +150,7 @@ def template(name: str) -> str:
 def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     """A template with a block in it. Args: `parts`: further words of that template."""
     text = template(frame)
+    language = next((each for each in _DECLARED if frame.endswith(each)), "c")
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
         title=f"{block.title}, made by ringbalance from {_named(block)}.",
@@ -151,9 +163,9 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
         last=len(block.constants) - 1,
         row=len(block.start),
         last_of_row=len(block.start) - 1,
-        constants=_lines(block.constants),
-        pieces=_pieces(block, next((each for each in _DECLARED if frame.endswith(each)), "c")),
-        start=_lines(block.start),
+        constants=_lines(block.constants, language),
+        pieces=_pieces(block, language),
+        start=_lines(block.start, language),
         **parts,
     )
 
@@ -163,7 +175,7 @@ def _named(block: Block) -> str:
     return re.sub(r"[^\w./ -]", "_", block.scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 
-def _lines(values: tuple[float, ...]) -> str:
-    texts = [number_text(value) for value in values]
+def _lines(values: tuple[float, ...], language: str) -> str:
+    texts = [_TEXT[language](value) for value in values]
     rows = [texts[at : at + _PER_LINE] for at in range(0, len(texts), _PER_LINE)]
     return ",\n".join("    " + ", ".join(row) for row in rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -134,6 +134,17 @@ def in_usual_unit(path: str, value: float) -> float:
     if not line.dimension:
         return value
     return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT).split(" ")[0])
+
+
+def setting_text(path: str, value: object) -> str:
+    """A value of a scene, SI, as a reader knows it."""
+    if value is None:
+        return "none"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ", ".join(setting_text(path, each) for each in value)
+    if isinstance(value, float | int):
+        return f"{in_usual_unit(path, float(value)):.4g} {usual_unit(path)}".rstrip()
+    return str(value)
 
 
 def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault:

@@ -396,9 +396,10 @@ def stays_full(c: Law, w: Query) -> bool:
 
 @both_ways
 def set_answer(c: Law, p: Pieces, w: Query, widths: bool) -> None:
-    """Velocity, positive, regime and primed afterwards; with `widths` half-width and whether it is undecided.
+    """Velocity, positive, regime and primed afterwards.
 
-    At most one direction flows: what drives one holds the other.
+    With `widths` half-width and whether it is undecided, too.  At most one direction flows: what drives one
+    holds the other.
     """
     w[VELOCITY] = 0.0
     w[REGIME] = BLOCKED

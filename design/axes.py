@@ -238,10 +238,17 @@ def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
 
 def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
     if isinstance(name, tuple):
+        if len(name) != len(values):
+            raise _fault(", ".join(map(str, name)), f"{len(values)} lists of values", "one for each key")
         return _linked([_values(scene, path, each) for path, each in zip(name, values, strict=True)], name[0])
     if name in scene_kind(scene.balancer).schema.tables:
         if isinstance(values, str | Path):
             return _table_axis(scene, name, Path(values))
+        # A table of pandas is taken by its rows, one mapping as the only one.
+        values = values.to_dict("records") if hasattr(values, "to_dict") else values
+        values = [values] if isinstance(values, Mapping) else values
+        if not all(isinstance(row, Mapping) for row in values):
+            raise _fault(name, "its rows are no mappings", "a list of mappings from keys, or a CSV file")
         named = NAME not in scene_kind(scene.balancer).schema.tables[name].keys
         names = [str(row[NAME]) for row in values if named and NAME in row]
         rows = [
@@ -262,7 +269,9 @@ def _linked(parts: Sequence[tuple[str, Range | list[Any]]], path: str) -> Axis:
     lists = {path: each for path, each in parts if isinstance(each, list)}
     if not lists:
         return Axis(ranges=ranges)
-    if ranges or len({len(each) for each in lists.values()}) != 1 or not next(iter(lists.values())):
+    if not all(lists.values()):
+        raise _fault(path, "no value stands there", "at least one")
+    if ranges or len({len(each) for each in lists.values()}) != 1:
         raise _fault(path, "keys of one axis differ in kind or number of values", "as many values of each")
     rows = zip(*lists.values(), strict=True)
     return Axis(ranges={}, choices=tuple(dict(zip(lists, row, strict=True)) for row in rows))
@@ -273,7 +282,8 @@ def _values(scene: SceneFile, path: str, given: Any) -> tuple[str, Range | list[
     reader = _reader(scene, path)
     if isinstance(given, str):
         given = given.split(",")
-    given = given.tolist() if hasattr(given, "tolist") else list(given)
+    given = given.tolist() if hasattr(given, "tolist") else given
+    given = list(given) if isinstance(given, Iterable) else [given]
     _check_scale(scene, path, given, reader)
     if len(given) == 1 and isinstance(given[0], str) and ":" in given[0]:
         return path, _range(path, given[0], reader)

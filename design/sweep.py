@@ -248,13 +248,16 @@ class Sweep(Result):
             for axis in self.plan.axes
         }
 
-    def plot(self, folder: str | PathLike[str]) -> tuple[Path, ...]:  # type: ignore[override]
-        """Draw the map or curves of the sweep into a folder: feasible points, their boundary, the best.
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Draw the map or curves of the sweep: feasible points, their boundary, the best.
 
-        Returns: The files. Raises: OSError: they cannot be written.
+        Args: `path`: a folder for an SVG file each; None: none.
+        Returns: The files, or without a folder figures that a notebook shows; `svg()` has them as text.
+        Raises: OSError: a file cannot be written.
         """
-        files: tuple[Path, ...] = registered("function", "sweep_figures")(self, Path(folder))
-        return files
+        if path is None:
+            return super().plot()
+        return registered("function", "sweep_figures")(self, Path(path))
 
     def to_dict(self) -> Record:
         """What `ringbalance sweep --json` prints: the summary; the table is `columns`."""

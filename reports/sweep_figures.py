@@ -40,21 +40,25 @@ class _View:
 
 
 def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
-    """Write a figure of each quantity over the keys that vary; none where a key takes texts.
+    """Write `sweep_drawings` into a folder. Returns: The files. Raises: OSError: they cannot be written."""
+    drawings = sweep_drawings(sweep)
+    return tuple(write_whole(folder / f"{each.name}.svg", each.standalone()) for each in drawings)
+
+
+def sweep_drawings(sweep: Sweep) -> list[Drawing]:
+    """A figure of each quantity over the keys that vary; none where a key takes texts.
 
     Over a grid of more than two axes the two with most values, and the others as in the best row.
-    Returns: The files. Raises: OSError: they cannot be written.
     """
     fields = {name: (unit, values) for name, unit, values in sweep.fields()}
     view = _view(sweep)
     if view is None:
-        return ()
-    drawings = [
+        return []
+    return [
         _drawing(view, name, *fields[name])
         for name in _SHOWN
         if name in fields and any(value is not None for value in np.array(fields[name][1])[view.shown])
     ]
-    return tuple(write_whole(folder / f"{each.name}.svg", each.standalone()) for each in drawings)
 
 
 def _view(sweep: Sweep) -> _View | None:

@@ -271,6 +271,49 @@ def test_rows_that_err_by_more_than_the_tolerance_are_named(paper_scene: Scene) 
         assert worst.values["error"] == max(each["error"] for each in found.errors)
 
 
+def test_arguments_that_make_no_sense_are_named(paper_scene: Scene) -> None:
+    bore: Any = {"tube.bore": [1e-3]}
+    for arguments in ({"runs": -1}, {"runs": 2.5}, {"check": -1}, {"workers": 0}):
+        (name,) = arguments
+        with pytest.raises(ValueError, match=f"`{name}` is a whole number of at least"):
+            rb.sweep(paper_scene, bore, **arguments)
+    with pytest.raises(TypeError, match="`vary` maps keys to values"):
+        rb.sweep(paper_scene, ["tube.bore=1mm:2mm:3"])  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="`executor` is none"):
+        rb.sweep(paper_scene, bore, executor=3)  # type: ignore[arg-type]
+    for vary, problem in (
+        ({"tube.bore": []}, "no value stands there"),
+        ({("tube.bore", "tube.length"): ([1e-3],)}, "one for each key"),
+        ({"gas": [1e-8]}, "its rows are no mappings"),
+    ):
+        with pytest.raises(rb.SceneError, match=problem):
+            rb.sweep(paper_scene, vary)
+
+
+def test_a_single_value_and_a_single_row_are_lists_of_one(paper_scene: Scene) -> None:
+    valve = {"conductance": "1 l/(s*bar)", "critical_ratio": 0.3, "valve_lag": "2 ms"}
+    found = rb.sweep(paper_scene, {"tube.bore": 1e-3, "gas": valve}, intervals=False)
+    assert [dict(point) for point in found.points] == [
+        {"tube.bore": 1e-3, "gas.conductance": 1e-8, "gas.critical_ratio": 0.3, "gas.valve_lag": 2e-3}
+    ]
+
+
+def test_an_objective_refuses_a_misspelt_key_and_answers_a_refused_value(paper_scene: Scene) -> None:
+    """Whose verdict is its status, as in a sweep's row, with runs too."""
+    with pytest.raises(rb.SceneError, match='did you mean "bore"'):
+        rb.objective(paper_scene, {"tube.bor": 1e-3})
+    for runs in (0, 4):
+        refused = rb.objective(paper_scene, {"tube.bore": -1.0}, runs=runs)
+        assert (refused["status"], refused["verdict"]) == ("point_refused", "point_refused")
+    with pytest.raises(ValueError, match="`runs`"):
+        rb.objective(paper_scene, {"tube.bore": 1e-3}, runs=-1)
+
+
+def test_figures_of_a_sweep_are_shown_without_a_folder(paper_scene: Scene) -> None:
+    found = rb.sweep(paper_scene, {"tube.bore": [1e-3, 1.5e-3, 2e-3]}, intervals=False)
+    assert found.plot().svg().count("tube.bore in mm") == 3
+
+
 VALVES = """# from their data sheets
 name;conductance [l/(s*bar)];critical_ratio;valve_lag
 slow;0.5;0.3;5 ms

@@ -210,3 +210,15 @@ def test_a_changed_value_keeps_the_unit_of_its_file(path: str, value: object, te
     found = getattr(getattr(changed, table), key)
     assert (list(found) if isinstance(value, list) else found) == value
     assert tomllib.loads(file_text(changed, to=Path()).decode())[table][key] == text
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_what_is_taken_away_is_gone(whole: bool) -> None:
+    """Alone, beside what stays, and as a whole table."""
+    scene = bundled("spindle_design")
+    changes = dict.fromkeys(["design"] if whole else ["design.pressure", "requirement.settling_time"])
+    without = scene.with_values(changes)
+    assert isinstance(without, Scene)
+    assert without.design.pressure is None
+    assert (without.requirement.settling_time is None) is not whole
+    assert (without.design.axial_width is None) is whole

@@ -153,7 +153,7 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     language = next((each for each in _DECLARED if frame.endswith(each)), "c")
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
-        title=f"{block.title}, made by ringbalance from {_named(block)}.",
+        title=f"{block.title}, made by ringbalance from {plain_name(block.scene)}.",
         facts=block.facts,
         name=name,
         upper=name.upper(),
@@ -170,9 +170,9 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     )
 
 
-def _named(block: Block) -> str:
-    """The scene's file without what could end a comment."""
-    return re.sub(r"[^\w./ -]", "_", block.scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
+def plain_name(scene: str) -> str:
+    """A scene's file without what could end a comment."""
+    return re.sub(r"[^\w./ -]", "_", scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 
 def _lines(values: tuple[float, ...], language: str) -> str:

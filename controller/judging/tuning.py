@@ -254,9 +254,6 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
     if tuning.longer is not None:
         values = {**share_values(tuning.longer), "time": LONGER, "first": FURTHER}
         yield Finding(code="tuned_longer", values=values)
-    others = {each.kind: each.judgement for each in tuning.tried}
-    if "target_vector" in others and tuning.scene.controller.kind == "law_based":
-        yield Finding(code="tuned_not_exported", values=share_values(others["target_vector"]))
     if best.verdict != MET and (causes := causes_of(best)):
         yield Finding(code="tuned_causes", values={"causes": causes})
     if not tuning.remedies and tuning.along and best.verdict != MET:

@@ -288,6 +288,34 @@ def test_rows_that_err_by_more_than_the_tolerance_are_named(paper_scene: Scene) 
         assert worst.values["error"] == max(each["error"] for each in found.errors)
 
 
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ('vary = ["tube.bor=1mm"]', ['vary = "tube.bor": a scene of this kind has no such key']),
+        (
+            'vary = ["gas=none.csv", "tube.bore=1:2:3"]',
+            ['vary = "gas=none.csv": there is no such file', 'vary = "tube.bore=1": the unit is missing'],
+        ),
+        ('vary = ["tube.bore=1mm"]\nruns = 4', ["runs: unknown key"]),
+        ('vary = "tube.bore=1mm"\nsample = 3', ["vary: it is no list of axes", "sample: it is no text"]),
+        ('vary = ["tube.bore=1mm:2mm"]\nsample = "halton:8"', ['sample = "halton:8": this is no sample']),
+        (None, ["there is no such file; allowed: a TOML file with vary and sample"]),
+    ],
+)
+def test_an_error_of_a_plan_names_its_file_and_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str | None, messages: list[str]
+) -> None:
+    plan, out = tmp_path / "plan.toml", tmp_path / "out"
+    if text is not None:
+        plan.write_text(text)
+    scene = str(rb.bundled_scene("liquid_ring_paper"))
+    assert main(["sweep", scene, "--plan", str(plan), "--out", str(out)]) == 2
+    lines = capsys.readouterr().err.replace(f"{tmp_path}/", "").splitlines()
+    assert len(lines) == len(messages)
+    for line, message in zip(lines, messages, strict=True):
+        assert line.startswith(f"plan.toml: {message}")
+
+
 def test_arguments_that_make_no_sense_are_named(paper_scene: Scene) -> None:
     bore: Any = {"tube.bore": [1e-3]}
     for arguments in ({"runs": -1}, {"runs": 2.5}, {"check": -1}, {"workers": 0}):

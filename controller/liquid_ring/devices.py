@@ -265,7 +265,7 @@ def _loss(scene: Scene, model: BalancerModel, *, remade: bool) -> float:
     )
     u = abs(float(flow.velocity)) or 1.0
     if remade and isinstance(law, CalibratedLaw):
-        return float(law.heads.without_inputs(scene=scene).uncertainty(u))
+        return law.heads.uncertainty_of_models(u, scene=scene)
     return float(flow.uncertainty) / u
 
 

@@ -226,7 +226,9 @@ def _effects_table(design: Design) -> Table:
         for each in design.effects
     ]
     heads = ("key", "instead", "devices that meet all", "change, 95 %")
-    return Table(caption="One key changed, the settings as they are, on the same devices", heads=heads, rows=rows)
+    return Table(
+        caption="One key changed, the settings as they are, on the same devices", heads=heads, rows=rows
+    )
 
 
 def _change_text(compared: Paired) -> str:

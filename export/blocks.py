@@ -18,7 +18,7 @@ from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.export import chamber, controller, disc
-from ringbalance.export.compact import VELOCITIES, CompactLaw
+from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -78,8 +78,8 @@ class Block:
     facts: str
     """What it holds and how exact it is."""
     constants: Numbers
-    pieces: tuple[Numbers, ...]
-    """Rows of polynomials, likewise; none for a block without a law."""
+    tables: Tables | None
+    """Of its law, if it has one."""
     start: Numbers
     """The row before the first step."""
     modules: tuple[ModuleType, ...]
@@ -93,11 +93,6 @@ class Block:
         """What some functions need; default the one that a host calls."""
         return Source.of_modules(self.modules, entries or (self.steps,))
 
-    @property
-    def size(self) -> int:
-        """Of the constants, bytes."""
-        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
-
     def outputs(self, row: list[float]) -> dict[str, float]:
         """By name, of a row that is up to date."""
         return {each.name: row[each.place] for each in self.variables if not each.input}
@@ -108,8 +103,7 @@ class Block:
         for name, value in inputs.items():
             row[places[name]] = float(value)
         step = getattr(self.modules[-1], self.steps)
-        rows = (self.constants, self.pieces) if self.pieces else (self.constants,)
-        step(*rows, row, *((time,) if self.timed else ()))
+        step(self.constants, *(self.tables or ()), row, *((time,) if self.timed else ()))
         return self.outputs(row)
 
 
@@ -123,7 +117,7 @@ def law_block(law: CompactLaw) -> Block:
         scene=law.scene,
         facts=law_facts(law),
         constants=law.constants,
-        pieces=law.pieces,
+        tables=law.tables,
         start=tuple(row),
         modules=(point, chamber),
         steps="answer_all",
@@ -135,7 +129,7 @@ def law_block(law: CompactLaw) -> Block:
 def law_facts(law: CompactLaw) -> str:
     """What a law holds and how exact it is, in sentences."""
     return (
-        f"{law.size // 8} constants, {law.size} bytes; velocities {RANGE}, beyond\n"
+        f"{law.count} constants, {law.size} bytes; velocities {RANGE}, beyond\n"
         f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
         f"   {law.level_error:.1e} Pa of a chamber's level; both are part of the uncertainty."
     )
@@ -158,7 +152,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
     for pair in range(half):
         at = disc.FIRST_PAIR + disc.PER_PAIR * pair
         row[at : at + disc.STATES] = [fill, ambient, ambient, content, content]
-    disc.show(constants, compact.pieces, row)
+    disc.show(constants, compact.tables.cells, compact.tables.pieces, row)
 
     def place(offset: str, chamber: int | None) -> int:
         value = int(getattr(disc, offset))
@@ -172,7 +166,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
         scene=scene.file,
         facts=law_facts(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
         constants=tuple(constants),
-        pieces=compact.pieces,
+        tables=compact.tables,
         start=tuple(row),
         modules=(point, chamber, disc),
         steps="step",
@@ -248,7 +242,7 @@ def controller_block(scene: Scene) -> Block:
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
         constants=_settings(scene),
-        pieces=(),
+        tables=None,
         start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
         modules=(point, controller),
         steps="step",

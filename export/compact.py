@@ -11,13 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, carried_by
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
@@ -38,17 +39,20 @@ _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
 _MOST_LEVELS: Final = 16
 """Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
-_OF_SHARE: Final = 1e-3
+_OF_SHARE: Final = 0.5 * TOLERANCE
+"""As a share decides whether a column separates, a velocity jumps by half of it."""
 _OF_CHAMBER: Final = 2e-6
 """Of the largest squared radius and moment."""
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
-_SAMPLES: Final = 2001
-_SHARES: Final = ((SHARE, 3), (BACK_SHARE, 2))
-"""Column of a share there and back, and the degree of its pieces."""
-_CELLS: Final = 12
-"""Of equal length, each of which knows at which piece to begin looking."""
+_CELLS: Final = 96
+_LEVEL_CELLS: Final = 100
+"""Of equal length, each of which knows at which piece to begin looking; pieces end where cells do."""
+_PER_CELL: Final = 20
+"""Samples."""
+_EDGE: Final = 1e-3
+"""Of a cell: more than single precision may move what lies next to its edge."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""
 
@@ -69,6 +73,17 @@ class Answer:
     """Whether the tube holds a continuous column afterwards."""
 
 
+class Tables(NamedTuple):
+    """What a law's polynomials are made of, as `point` reads it."""
+
+    cells: tuple[int, ...]
+    """Rows at which to begin looking, each of a byte."""
+    pieces: tuple[tuple[float, ...], ...]
+    """Rows of nine numbers of single precision."""
+    levels: tuple[tuple[float, ...], ...]
+    """Rows of nine numbers of double precision: near a stall two levels next to cancel."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class CompactLaw:
     """The law of one scene in numbers that `point` reads."""
@@ -77,8 +92,7 @@ class CompactLaw:
     """File that it was calibrated from."""
     constants: tuple[float, ...]
     """At the places that `point` names."""
-    pieces: tuple[tuple[float, ...], ...]
-    """Rows of nine numbers, likewise."""
+    tables: Tables
     head_error: float
     """Largest relative error of a velocity for a given head against the calibrated law."""
     level_error: float
@@ -87,9 +101,16 @@ class CompactLaw:
     """Largest relative difference of a velocity from the calibrated law's, in drawn conditions."""
 
     @property
+    def count(self) -> int:
+        """Of all numbers."""
+        cells, pieces, levels = self.tables
+        return len(self.constants) + len(cells) + sum(map(len, pieces)) + sum(map(len, levels))
+
+    @property
     def size(self) -> int:
         """Of all numbers, bytes."""
-        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
+        cells, pieces, levels = self.tables
+        return 8 * len(self.constants) + len(cells) + 4 * sum(map(len, pieces)) + 8 * sum(map(len, levels))
 
     @property
     def max_fill_ratio(self) -> float:
@@ -111,7 +132,7 @@ class CompactLaw:
         opposite = self.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         query = [0.0] * point.PLACES_OF_QUERY
         query[:4] = fill_ratio, opposite, gas_pressure, float(primed)
-        point.answer(self.constants, self.pieces, query, True)
+        point.answer(self.constants, *self.tables, query, True)
         velocity, width, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
         return Answer(
             velocity=velocity,
@@ -134,26 +155,33 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    tables = law.heads.tables
-    rows = LawRows.of(len(tables), cells=_CELLS)
-    missed = max(_add_way(rows, law, way, table) for way, table in enumerate(tables))
-    level_error = _add_levels(rows, law)
+    rows = LawRows.of(len(law.heads.tables), cells=_CELLS, edge=_EDGE)
+    missed = max(_add_way(rows, law, way, table) for way, table in enumerate(law.heads.tables))
     _add_chamber(rows, scene, law)
-    error = _AT_CREST * missed + law.heads.interpolation_error
-    scalars = law.scalars() | {
-        point.TABULATION: error**2,
-        point.LOWEST: VELOCITIES[0],
-        point.HIGHEST: VELOCITIES[1],
-    }
-    numbers, pieces = rows.arrays(scalars)
+    first_level = len(rows.arrays({})[1])
+    level_error = _add_levels(rows, law)
+    numbers, pieces = rows.arrays(law.scalars() | {point.LOWEST: VELOCITIES[0], point.HIGHEST: VELOCITIES[1]})
+    constants, cells = np.split(numbers, [point.PLACES])
+    pieces, levels = np.split(pieces, [first_level])
+    constants[[point.LEVEL_CELLS, point.CHAMBER_CELLS]] -= point.PLACES
+    pieces[: len(law.heads.tables), point.CELLS] -= point.PLACES
+    cells[-_LEVEL_CELLS - 1 :] -= first_level
     made = CompactLaw(
         scene=scene.file,
-        constants=tuple(numbers.tolist()),
-        pieces=tuple(map(tuple, pieces.tolist())),
+        constants=tuple(constants.tolist()),
+        tables=Tables(
+            cells=tuple(map(int, cells)),
+            pieces=_tuples(pieces.astype(np.float32)),
+            levels=_tuples(levels),
+        ),
         head_error=missed,
         level_error=level_error,
     )
     return replace(made, departure=_departure(made, law))
+
+
+def _tuples(rows: npt.NDArray[np.floating[Any]]) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, rows.tolist()))
 
 
 def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
@@ -208,16 +236,16 @@ class _Column:
 
 def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
     """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
-    # Every knot of the law's table is a sample, so that a table with few knots is met exactly.
-    pieces = law.levels.knots.size - 1
-    x = np.linspace(0.0, law.max_fill_ratio, max(1, round(_SAMPLES / pieces)) * pieces + 1)
+    x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
-    level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    value, allowed = law.hydrostatic_pressure(x), np.full_like(x, _OF_LEVELS * slowest)
+    level = _Column(value=value, allowed=allowed)
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
     while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
     error = level.largest(x, ends)
-    rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = rows.add_cells(x[ends])
+    scale, first = rows.add_cells(x[ends], cells=_LEVEL_CELLS)
+    rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = scale, first
     widened = replace(width, value=np.hypot(width.value, error))
     rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
     return error
@@ -225,7 +253,7 @@ def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
 
 def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
-    x = np.linspace(0.0, law.max_fill_ratio, _SAMPLES)
+    x = _single(np.linspace(0.0, law.max_fill_ratio, _CELLS * _PER_CELL + 1))
     columns = []
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
         allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
@@ -238,30 +266,42 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
 
 def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float:
     """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
+    root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
-    s, density = np.geomspace(slowest, fastest, _SAMPLES), law.density
-    x, value = density**0.125 * s, table.quintic(s) / density**0.5
+    x = _single(np.linspace(root * slowest, root * fastest, _CELLS * _PER_CELL + 1))
+    s = x / root
+    value = table.quintic(s) / law.density**0.5
     ratio = _Column(value=value, allowed=_OF_HEADS * value)
     loss = _half_width(table.straight(s, LOSS) ** 2)
     beside = _shares(table, s) if way == point.SIPHON else []
-    ends = _ends(x, [ratio, loss, *beside])
-    more = (*law.path.clearing_velocities, *carried_by(law.path)) if way else (ends.size - 1,)
+    ends = _ends(x, [ratio, loss, *(column for columns in beside for column in columns)])
+    missed = ratio.largest(x, ends, of=value)
+    error = _AT_CREST * missed + law.heads.interpolation_error
+    exponent = 0.5 + np.gradient(np.log(value), np.log(x)) / 8
+    loss = replace(loss, value=loss.value + (error / exponent) ** 2)
+    pieces = len(rows.pieces[0]) if rows.pieces else ends.size - 1
+    more = (way * pieces, *law.carrying_pressures(table))
     rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
-    if beside:
-        rows.add(*(each.pieces(x, ends) for each in beside))
-    return ratio.largest(x, ends, of=value)
+    for columns in beside:
+        rows.add(*(each.pieces(x, ends) for each in columns))
+    return missed
 
 
-def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
-    """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
-    found = [_share(table.cubic(s, at), degree) for at, degree in _SHARES if at < table.count]
-    if found:
-        found.insert(1, _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)))
-    return found
+def _shares(table: Table, s: FloatArray) -> Sequence[Sequence[_Column]]:
+    """Part of the pressure that is lost up to the crest and its half-width, there and back."""
+    ways = [table.cubic(s, at) for at in (SHARE, BACK_SHARE) if at < table.count]
+    return [
+        (
+            _Column(value=value, allowed=_OF_SHARE * value, degree=3),
+            _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)),
+        )
+        for value in ways
+    ]
 
 
-def _share(value: FloatArray, degree: int) -> _Column:
-    return _Column(value=value, allowed=_OF_SHARE * value, degree=degree)
+def _single(x: FloatArray) -> FloatArray:
+    """The nearest numbers of single precision."""
+    return x.astype(np.float32).astype(np.float64)
 
 
 def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
@@ -270,19 +310,19 @@ def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
 
 
 def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:
-    """Samples at which pieces meet, each piece as long as its errors allow, and those at both ends."""
+    """Samples at which pieces meet, each piece as many cells long as its errors allow, and both ends."""
 
     def fits(first: int, last: int) -> bool:
-        inside = slice(first, last + 1)
+        inside = slice(first * _PER_CELL, last * _PER_CELL + 1)
         return all(
-            bool(np.all(np.abs(column.errors(x, first, last)) <= column.allowed[inside]))
+            bool(np.all(np.abs(column.errors(x, inside.start, inside.stop - 1)) <= column.allowed[inside]))
             for column in columns
         )
 
-    ends = [0]
-    while ends[-1] < x.size - 1:
-        ends.append(_furthest(partial(fits, ends[-1]), ends[-1] + 1, x.size - 1))
-    return np.array(ends)
+    cells, last = [0], (x.size - 1) // _PER_CELL
+    while cells[-1] < last:
+        cells.append(_furthest(partial(fits, cells[-1]), cells[-1] + 1, last))
+    return np.array(cells) * _PER_CELL
 
 
 def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:

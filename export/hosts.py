@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from importlib.resources import files
 from string import Template
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from ringbalance.export.blocks import RANGE, Block, Variable
-from ringbalance.export.translate import PER_PIECE, c_functions, number_text, python_functions, st_functions
+from ringbalance.export.translate import (
+    PER_PIECE,
+    c_functions,
+    number_text,
+    python_functions,
+    st_functions,
+)
 
-_PER_LINE: Final = 4
+_LANGUAGES: Final = ("st", "python", "c")
 _OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
 """Functions of the law for one chamber, which a caller may ask for by themselves."""
 _ST_TYPES: Final = {"Real": "LREAL", "Integer": "DINT", "Boolean": "BOOL"}
@@ -38,7 +47,7 @@ def block_c_files(block: Block, name: str) -> dict[str, str]:
         f"    {upper}_{each.name.upper()} = {each.place}{',' * (each is not last)} /* {each.explained} */"
         for each in block.variables
     ]
-    run = f"{block.steps}({_rows(block)}, s->w{', time' if block.timed else ''});"
+    run = f"{block.steps}({_C_TABLES if block.tables else 'CONSTANTS'}, s->w{', time' * block.timed});"
     source = filled("block_c", block, name, head=_head(block, name), run=run)
     header = filled("block_h", block, name, places="\n".join(places))
     return {f"{name}.h": header, f"{name}.c": source}
@@ -51,10 +60,11 @@ def _head(block: Block, name: str, entries: tuple[str, ...] = ()) -> str:
 
 def st_files(block: Block, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
-    ends = {"Law": f"0..{len(block.constants) - 1}", "Query": f"0..{len(block.start) - 1}"}
-    sizes = {**ends, "Pieces": f"0..{len(block.pieces) - 1}, 0..{PER_PIECE - 1}"}
+    sizes = {"Law": len(block.constants), "Query": len(block.start)}
+    arrays = {kind: f"[0..{count - 1}] OF LREAL" for kind, count in sizes.items()}
+    arrays |= {kind: _st_array(kind, rows) for kind, rows in _named_tables(block)}
     entries = ("answer", *_OF_CHAMBER) if block.kind == "law" else ()
-    functions = st_functions(block.source(entries), prefix=name, sizes=sizes)
+    functions = st_functions(block.source(entries), prefix=name, sizes=arrays)
     if block.kind == "law":
         return {f"{name}.st": filled("st", block, name, functions=functions)}
     inputs, outputs = _sides(block)
@@ -67,13 +77,9 @@ def st_files(block: Block, name: str) -> dict[str, str]:
         outputs="\n".join(map(_st_declared, outputs)),
         set="\n".join(map(_st_set, inputs)),
         get="\n".join(map(_st_get, outputs)),
-        run=f"{block.steps}({'c, p' if block.pieces else 'c'}, w, elapsed)",
+        run=f"{block.steps}({'c, k, p, q' if block.tables else 'c'}, w, elapsed)",
     )
     return {f"{name}.st": text}
-
-
-def _rows(block: Block) -> str:
-    return "CONSTANTS, PIECES" if block.pieces else "CONSTANTS"
 
 
 def _sides(block: Block) -> tuple[list[Variable], list[Variable]]:
@@ -108,27 +114,59 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     inputs, outputs = (
         "\n".join(f'    "{v.name}": {v.place},  # {v.explained}' for v in side) for side in _sides(block)
     )
-    run = f"{block.steps}({_rows(block)}, self.w, time)"
+    run = f"{block.steps}({_C_TABLES if block.tables else 'CONSTANTS'}, self.w, time)"
     text = filled(
         "block_python", block, name, source=source, inputs=inputs, outputs=outputs, run=run, kind=block.kind
     )
     return {f"{name}.py": text}
 
 
-_DECLARED: Final = {
-    "c": ("static const double PIECES[{count}][{width}] = {{\n{rows}\n}};\n", "    {{{}}}"),
-    "st": ("    p : ARRAY[0..{last}, 0..{end}] OF LREAL := [\n{rows}\n    ];\n", "    {}"),
-    "python": ("PIECES = (\n{rows},\n)\n", "    ({})"),
+def _named_tables(block: Block) -> list[tuple[str, Sequence[Any]]]:
+    """Cells, pieces and levels with the names of their types."""
+    return list(zip(("Cells", "Pieces", "Levels"), block.tables or (), strict=False))
+
+
+_C_TABLES: Final = "CONSTANTS, CELLS, PIECES, LEVELS"
+_NUMBERS_OF: Final = {"Cells": "USINT", "Pieces": "REAL", "Levels": "LREAL"}
+_C_NUMBERS: Final = {
+    "Cells": "static const unsigned char CELLS[{count}]",
+    "Pieces": f"static const float PIECES[{{count}}][{PER_PIECE}]",
+    "Levels": f"static const double LEVELS[{{count}}][{PER_PIECE}]",
 }
-"""How a language declares rows of polynomials, and one of them."""
 
 
-def _pieces(block: Block, language: str) -> str:
-    whole, one = _DECLARED[language]
-    rows = ",\n".join(one.format(", ".join(map(number_text, row))) for row in block.pieces)
-    count = len(block.pieces)
-    sizes = {"count": count, "last": count - 1, "width": PER_PIECE, "end": PER_PIECE - 1}
-    return whole.format(rows=rows, **sizes) if rows else ""
+def _st_array(kind: str, rows: Sequence[Any]) -> str:
+    """What structured text declares them as, behind ARRAY."""
+    width = "" if kind == "Cells" else f", 0..{len(rows[0]) - 1}"
+    return f"[0..{len(rows) - 1}{width}] OF {_NUMBERS_OF[kind]}"
+
+
+def _declared(language: str, block: Block) -> str:
+    """The tables of a law in a language, by the name of a template."""
+    parts = []
+    for kind, rows in _named_tables(block):
+        if kind == "Cells":
+            text = _lines(tuple(map(str, rows)), per_line=20)
+        else:
+            written = _single if kind == "Pieces" and language != "python" else number_text
+            suffix = "F" if kind == "Pieces" and language == "c" else ""
+            brackets = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}[language]
+            text = ",\n".join(brackets.format(", ".join(written(v) + suffix for v in row)) for row in rows)
+        whole = {
+            "c": f"{_C_NUMBERS[kind].format(count=len(rows))} = {{\n{text}\n}};\n",
+            "st": f"    {_ST_NAMES[kind]} : ARRAY{_st_array(kind, rows)} := [\n{text}\n    ];\n",
+            "python": f"{kind.upper()} = (\n{text},\n)\n",
+        }
+        parts.append(whole[language])
+    return "".join(parts)
+
+
+_ST_NAMES: Final = {"Cells": "k", "Pieces": "p", "Levels": "q"}
+
+
+def _single(value: float) -> str:
+    """The shortest decimal that is this number in single precision."""
+    return number_text(float(str(np.float32(value))))
 
 
 def template(name: str) -> str:
@@ -151,9 +189,9 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
         last=len(block.constants) - 1,
         row=len(block.start),
         last_of_row=len(block.start) - 1,
-        constants=_lines(block.constants),
-        pieces=_pieces(block, next((each for each in _DECLARED if frame.endswith(each)), "c")),
-        start=_lines(block.start),
+        constants=_lines([number_text(value) for value in block.constants]),
+        tables=_declared(next((each for each in _LANGUAGES if frame.endswith(each)), "c"), block),
+        start=_lines([number_text(value) for value in block.start]),
         **parts,
     )
 
@@ -163,7 +201,6 @@ def _named(block: Block) -> str:
     return re.sub(r"[^\w./ -]", "_", block.scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 
-def _lines(values: tuple[float, ...]) -> str:
-    texts = [number_text(value) for value in values]
-    rows = [texts[at : at + _PER_LINE] for at in range(0, len(texts), _PER_LINE)]
+def _lines(texts: Sequence[str], per_line: int = 4) -> str:
+    rows = [texts[at : at + per_line] for at in range(0, len(texts), per_line)]
     return ",\n".join("    " + ", ".join(row) for row in rows)

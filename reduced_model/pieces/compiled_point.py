@@ -38,7 +38,7 @@ def answer_each(
     for i in range(fill.size):
         w[FILL], w[OPPOSITE_FILL], w[PRESSURE] = fill[i], opposite[i], pressure[i]
         w[PRIMED] = 1.0 if primed[i] else 0.0
-        answer(c, p, w, True)
+        answer(c, c, p, p, w, True)
         velocity[i], uncertainty[i] = w[VELOCITY], w[UNCERTAINTY]
         regime[i], after[i] = int(w[REGIME]), w[PRIMED_AFTER] != 0.0
         if margins.shape[1]:

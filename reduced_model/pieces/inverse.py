@@ -59,7 +59,7 @@ def growth(p: Pieces, row: int, t: float) -> float:
 def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
     """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; it goes on straight beyond the fills."""
     x = max(0.0, min(fill, c[LARGEST_FILL]))
-    row = piece(p, c[int(x * c[LEVEL_SCALE] + c[LEVEL_CELLS])], x)
+    row = int(c[int(x * c[LEVEL_SCALE] + c[LEVEL_CELLS])])
     t = x - p[row][END]
     slope = growth(p, row, t)
     return quintic(p, row, t) + (fill - x) * slope, slope
@@ -72,7 +72,7 @@ def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
         return pressure * p[way][CREEP]
     root = sqrt(sqrt(pressure))
     s = min(sqrt(root), p[way][LAST])
-    row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
+    row = piece(p, int(c[int(s * p[way][SCALE] + p[way][CELLS])]), s)
     return root * root * quintic(p, row, s - p[row][END])
 
 

@@ -15,7 +15,6 @@ from ringbalance.scene.arrays import FloatArray
 
 WIDTH_OF_ROW: Final = point.WIDTH_SLOPE + 1
 _EDGE: Final = 1e-9
-"""Of a cell, by which what lies next to the edge of a cell is taken to be in the next one."""
 
 
 CELLS: Final = 1024
@@ -30,13 +29,15 @@ class LawRows:
     """Rows that say where velocities are found, shape (ways, `WIDTH_OF_ROW`)."""
     cells: int = CELLS
     """Of equal length, that say at which piece to begin looking."""
+    edge: float = _EDGE
+    """Of a cell, by which what lies next to the edge of a cell is taken to be in the next one."""
     numbers: list[FloatArray] = field(default_factory=lambda: [np.zeros(point.PLACES)])
     pieces: list[FloatArray] = field(default_factory=list)
 
     @classmethod
-    def of(cls, ways: int, cells: int = CELLS) -> LawRows:
+    def of(cls, ways: int, cells: int = CELLS, edge: float = _EDGE) -> LawRows:
         """With nothing but room for the whole tube and the ways to a crest."""
-        return cls(ways=np.zeros((ways, WIDTH_OF_ROW)), cells=cells)
+        return cls(ways=np.zeros((ways, WIDTH_OF_ROW)), cells=cells, edge=edge)
 
     def add(self, *columns: npt.ArrayLike) -> None:
         """Pieces as columns of what stands in a row, each of shape (pieces,) or (powers, pieces)."""
@@ -45,15 +46,17 @@ class LawRows:
         rows[:, : len(whole)] = whole.T
         self.pieces.append(rows)
 
-    def add_cells(self, knots: FloatArray) -> tuple[float, float]:
+    def add_cells(self, knots: FloatArray, *, cells: int = 0) -> tuple[float, float]:
         """Cells for the pieces that are added next. Returns: cells for one of x, and the place of x = 0."""
+        cells = cells or self.cells
         start, place = float(knots[0]), sum(each.size for each in self.numbers)
         first = sum(map(len, (self.ways, *self.pieces)))
-        edges = np.linspace(start, float(knots[-1]), self.cells + 1)
-        edges[-1] = knots[-2]
-        self.numbers.append(first + np.searchsorted(knots[1:], edges, side="right").astype(np.float64))
-        scale = self.cells / (float(knots[-1]) - start)
-        return scale, place - start * scale + _EDGE
+        edges = np.linspace(start, float(knots[-1]), cells + 1)
+        scale = cells / (float(knots[-1]) - start)
+        # What is next to an edge counts as beyond it.
+        beyond = edges + 2.0 * self.edge / scale
+        self.numbers.append(first + np.searchsorted(knots[1:-1], beyond).astype(np.float64))
+        return scale, place - start * scale + self.edge
 
     def add_ratios(
         self, way: int, knots: FloatArray, ratios: FloatArray, squares: FloatArray, more: Sequence[float]
@@ -61,7 +64,7 @@ class LawRows:
         """Pieces of a way: velocity over the root of a pressure, along the eighth root of that.
 
         Args: `ratios`: shape (6, pieces). `squares`: of half-widths of the loss, shape (2, pieces). `more`:
-            behind the rest in the way's own row.
+            behind the cells in the way's own row.
         """
         first = float(knots[0])
         slowest = float(ratios[:, 0] @ (first - float(knots[1])) ** np.arange(6))
@@ -70,28 +73,29 @@ class LawRows:
         self.add(knots[1:], ratios, squares)
 
     def add_levels(self, levels: Table) -> None:
-        """Hydrostatic pressure over the fill, with its half-width in column 3."""
-        self.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = self.add_cells(levels.knots)
+        """Hydrostatic pressure over the fill, with its half-width in column 3.
+
+        Its knots are equally spaced, and cells end there.
+        """
+        cells = self.add_cells(levels.knots, cells=levels.knots.size - 1)
+        self.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = cells
         self.add(levels.knots[1:], levels.quintics, levels.lines(levels.column(3)))
 
-    def add_way(self, way: int, table: Table, density: float, *more: float) -> None:
-        """A table over the eighth root of a head, of a liquid's density, kg/m^3; its loss in column 3."""
+    def add_way(self, way: int, table: Table, density: float, *, error: float, more: Sequence[float]) -> None:
+        """A table over the eighth root of a head, of a liquid's density, kg/m^3; its loss in column 3.
+
+        Args: `error`: relative, of a velocity; part of the half-width.
+        """
         root = density**0.125
         ratios = table.quintics / density**0.5 / root ** np.arange(6)[:, None]
-        squares = table.lines(table.column(3) ** 2) / np.array([[1.0], [root]])
+        exponent = 0.5 + table.knots * table.column(1) / table.column(0) / 8
+        squares = table.lines(table.column(3) ** 2 + (error / exponent) ** 2) / np.array([[1.0], [root]])
         self.add_ratios(way, root * table.knots, ratios, squares, more)
 
-    def add_shares(self, table: Table, density: float) -> None:
-        """Beside the pieces of the whole tube: from column 4 on, see `TubeHeads`."""
+    def add_shares(self, table: Table, column: int, density: float) -> None:
+        """Beside the pieces of the whole tube: a share and its half-width, see `TubeHeads`."""
         powers = density ** (0.125 * np.arange(4))[:, None]
-        columns = [table.cubics(5) / powers, table.lines(table.column(4)) / powers[:2]]
-        if table.count > 7:
-            # A parabola through the middle of a cubic piece and both its ends.
-            value, slope, square, cube = table.cubics(7)
-            length = np.diff(table.knots)
-            parabola = np.array([value, slope - cube * length**2 / 2, square - cube * length * 1.5])
-            columns.append(parabola / powers[:3])
-        self.add(*columns)
+        self.add(table.cubics(column) / powers, table.lines(table.column(4)) / powers[:2])
 
     def arrays(self, scalars: Mapping[int, float]) -> tuple[FloatArray, FloatArray]:
         """Numbers, with those of the law at their places, and pieces, shape (rows, `WIDTH_OF_ROW`)."""

@@ -25,6 +25,9 @@ _BY_SETTINGS: Final = {
 }
 """Ends that other settings may change."""
 
+_TURNED: Final = math.sqrt(2.0)
+"""Limit of a loop factor whose lag angle is 45 degrees off; from 50 on, runs may grow whatever the gain."""
+
 
 def run_findings(run: Simulation) -> tuple[Finding, ...]:
     """The first says how the run ended, the others what stands behind it and what to change."""
@@ -99,8 +102,8 @@ def _causes(run: Simulation) -> Iterator[Finding]:
         yield from _noise(run)
     if outcome in {Outcome.TIME_LIMIT, Outcome.GAS_TIME_TOO_SHORT}:
         yield from _dead_time(run)
-    if outcome is Outcome.DIVERGING:
-        yield Finding(code="check_direction")
+    if outcome in {Outcome.DIVERGING, Outcome.UNSTABLE}:
+        yield from _growing(run)
     if outcome is Outcome.STALLED and run.unreachable_amplitude > run.scene.controller.limit:
         yield Finding(code="unbalance_beyond_gas", values=_moments(run))
     if outcome is Outcome.DRIFTING:
@@ -110,6 +113,17 @@ def _causes(run: Simulation) -> Iterator[Finding]:
     if outcome in _BY_SETTINGS:
         code = "own_overshoots" if _own(run) else "overshoots"
         yield Finding(code=code, values={"overshoots": run.overshoots})
+
+
+def _growing(run: Simulation) -> Iterator[Finding]:
+    """Why a residual grows: too much of it is removed at once, or in another direction."""
+    loop = run.loop
+    if loop.value is None or not loop.unstable or loop.limit < _TURNED:
+        yield Finding(code="check_direction")
+    else:
+        highest = run.scene.controller.proportional * loop.limit / loop.value
+        values: dict[str, Value] = {"loop_factor": loop.value, "loop_factor_limit": loop.limit}
+        yield Finding(code="gain_too_high", values={**values, "proportional": highest})
 
 
 def _noise(run: Simulation) -> Iterator[Finding]:

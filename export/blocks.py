@@ -18,7 +18,7 @@ from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.export import chamber, controller, disc
-from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables
+from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -90,8 +90,14 @@ class Block:
     variables: tuple[Variable, ...]
 
     def source(self, entries: Sequence[str] = ()) -> Source:
-        """What some functions need; default the one that a host calls."""
-        return Source.of_modules(self.modules, entries or (self.steps,))
+        """What some functions need; default the one that a host calls. The law alone gives half-widths."""
+        without = "" if self.kind == "law" else "widths"
+        return Source.of_modules(self.modules, entries or (self.steps,), without)
+
+    @property
+    def size(self) -> int:
+        """Of the constants, bytes."""
+        return 8 * len(self.constants) + (0 if self.tables is None else self.tables.size)
 
     def outputs(self, row: list[float]) -> dict[str, float]:
         """By name, of a row that is up to date."""
@@ -128,22 +134,28 @@ def law_block(law: CompactLaw) -> Block:
 
 def law_facts(law: CompactLaw) -> str:
     """What a law holds and how exact it is, in sentences."""
+    return f"{_tabulation(law)} Both are part of the uncertainty."
+
+
+def _tabulation(law: CompactLaw) -> str:
     return (
-        f"{law.count} constants, {law.size} bytes; velocities {RANGE}, beyond\n"
+        f"Constants of {law.size} bytes; velocities {RANGE}, beyond\n"
         f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
-        f"   {law.level_error:.1e} Pa of a chamber's level; both are part of the uncertainty."
+        f"   {law.level_error:.1e} Pa of a chamber's level."
     )
 
 
-def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
+def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
     """Fills and gas of all chambers in time, and the vibration of the scene's rotor.
 
-    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack.
+    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack, or
+        inputs that were fitted together.
     """
     if law.moment.across is not None:
         raise SceneError.of_file(
             scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
         )
+    compact = compact_law(scene=scene, law=law, uncertainty=False)
     constants = [*compact.constants, *_disc_numbers(scene, law)]
     constants[point.BLOCK] = float(len(compact.constants))
     half, fill, ambient = scene.disc.chambers // 2, scene.disc.initial_fill, scene.gas.ambient_pressure
@@ -164,7 +176,7 @@ def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
         kind="disc",
         title="Disc of a liquid-ring balancer on its rotor",
         scene=scene.file,
-        facts=law_facts(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
+        facts=_tabulation(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),

@@ -92,8 +92,10 @@ def _made(scene: Scene, block: Kind) -> tuple[Block, CompactLaw | None]:
         return controller_block(scene), None
     with activity("export", "calibrating ..."):
         law = chamber_and_law(scene)[1]
+        if block == "disc":
+            return disc_block(scene, law), None
         compact = compact_law(scene=scene, law=law)
-    return law_block(compact) if block == "law" else disc_block(scene, law, compact), compact
+        return law_block(compact), compact
 
 
 def _highest(scene: Scene) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -37,7 +37,7 @@ _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
 _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 16
+_MOST_LEVELS: Final = 10
 """Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
 _OF_SHARE: Final = 0.5 * TOLERANCE
 """As a share decides whether a column separates, a velocity jumps by half of it."""
@@ -46,13 +46,19 @@ _OF_CHAMBER: Final = 2e-6
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
+_ANYTHING: Final = 1e100
+"""Times the error of half-widths that nobody asks for: they are rounded to zero."""
+_OF_ROUNDING: Final = 0.2
+"""Of a piece's error, to which its coefficients are rounded: numbers with few bits make small libraries."""
+_BITS: Final = 18
+"""Of a place at which pieces may meet, likewise."""
 _CELLS: Final = 96
 _LEVEL_CELLS: Final = 100
 """Of equal length, each of which knows at which piece to begin looking; pieces end where cells do."""
 _PER_CELL: Final = 20
 """Samples."""
 _EDGE: Final = 1e-3
-"""Of a cell: more than single precision may move what lies next to its edge."""
+"""Of a cell: more than rounding moves what lies next to its edge."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""
 
@@ -83,6 +89,11 @@ class Tables(NamedTuple):
     levels: tuple[tuple[float, ...], ...]
     """Rows of nine numbers of double precision: near a stall two levels next to cancel."""
 
+    @property
+    def size(self) -> int:
+        """Of all numbers, bytes."""
+        return len(self.cells) + 4 * sum(map(len, self.pieces)) + 8 * sum(map(len, self.levels))
+
 
 @dataclass(frozen=True, kw_only=True)
 class CompactLaw:
@@ -101,16 +112,9 @@ class CompactLaw:
     """Largest relative difference of a velocity from the calibrated law's, in drawn conditions."""
 
     @property
-    def count(self) -> int:
-        """Of all numbers."""
-        cells, pieces, levels = self.tables
-        return len(self.constants) + len(cells) + sum(map(len, pieces)) + sum(map(len, levels))
-
-    @property
     def size(self) -> int:
         """Of all numbers, bytes."""
-        cells, pieces, levels = self.tables
-        return 8 * len(self.constants) + len(cells) + 4 * sum(map(len, pieces)) + 8 * sum(map(len, levels))
+        return 8 * len(self.constants) + self.tables.size
 
     @property
     def max_fill_ratio(self) -> float:
@@ -143,10 +147,11 @@ class CompactLaw:
         )
 
 
-def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
+def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -> CompactLaw:
     """Tabulate a calibrated law again, on as few knots as `TOLERANCE` allows.
 
-    Args: `scene`: whose law it is; its chamber gives the free surface.
+    Args: `scene`: whose law it is; its chamber gives the free surface. `uncertainty`: False: for what asks
+        for velocities and moments alone; half-widths are then zero, which takes no room in a library.
     Raises: SceneError: a scene with inputs that were fitted together, whose effect such a law does not hold.
     """
     if law.variants:
@@ -155,16 +160,17 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    rows = LawRows.of(len(law.heads.tables), cells=_CELLS, edge=_EDGE)
-    missed = max(_add_way(rows, law, way, table) for way, table in enumerate(law.heads.tables))
-    _add_chamber(rows, scene, law)
+    tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
+    rows = LawRows.of(len(tables), cells=_CELLS, edge=_EDGE)
+    missed = max(_add_way(rows, law, way, table, slack) for way, table in enumerate(tables))
+    _add_chamber(rows, scene, law, slack)
     first_level = len(rows.arrays({})[1])
-    level_error = _add_levels(rows, law)
+    level_error = _add_levels(rows, law, slack)
     numbers, pieces = rows.arrays(law.scalars() | {point.LOWEST: VELOCITIES[0], point.HIGHEST: VELOCITIES[1]})
     constants, cells = np.split(numbers, [point.PLACES])
     pieces, levels = np.split(pieces, [first_level])
     constants[[point.LEVEL_CELLS, point.CHAMBER_CELLS]] -= point.PLACES
-    pieces[: len(law.heads.tables), point.CELLS] -= point.PLACES
+    pieces[: len(tables), point.CELLS] -= point.PLACES
     cells[-_LEVEL_CELLS - 1 :] -= first_level
     made = CompactLaw(
         scene=scene.file,
@@ -207,21 +213,24 @@ class _Column:
     degree: int = point.C5 - point.C0
 
     def polynomial(self, x: FloatArray, first: int, last: int) -> FloatArray:
-        """Coefficients in (x - end)/length from the samples between two, both of which are met.
+        """Coefficients in powers of x - end from the samples between two, both of which are met.
 
-        The samples are those next to the extrema of a Chebyshev polynomial.
+        The samples are those next to the extrema of a Chebyshev polynomial.  Coefficients are rounded to
+        `_OF_ROUNDING` of the piece's error.
         """
         extrema = (1 - np.cos(np.pi * np.arange(self.degree + 1) / self.degree)) / 2
         at = np.unique(np.rint(first + (last - first) * extrema).astype(int))
+        powers = (x[last] - x[first]) ** np.arange(at.size)
         t = (x[at] - x[last]) / (x[last] - x[first])
-        found = np.linalg.solve(np.vander(t, increasing=True), self.value[at])
-        return np.pad(found, (0, self.degree + 1 - at.size))
+        exact = np.linalg.solve(np.vander(t, increasing=True), self.value[at]) / powers
+        step = 2.0 ** np.floor(np.log2(_OF_ROUNDING * self.allowed[first : last + 1].min() / powers))
+        return np.pad(np.rint(exact / step) * step + 0.0, (0, self.degree + 1 - at.size))
 
     def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
         """Of one piece, at the samples that it spans."""
         inside = slice(first, last + 1)
-        t = (x[inside] - x[last]) / (x[last] - x[first])
-        return np.asarray(polyval(t, self.polynomial(x, first, last)) - self.value[inside])
+        polynomial = self.polynomial(x, first, last)
+        return np.asarray(polyval(x[inside] - x[last], polynomial) - self.value[inside])
 
     def largest(self, x: FloatArray, ends: IntArray, of: FloatArray | float = 1.0) -> float:
         """Error of all pieces. Args: `of`: what it is relative to, at the samples."""
@@ -229,18 +238,17 @@ class _Column:
         return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
 
     def pieces(self, x: FloatArray, ends: IntArray) -> FloatArray:
-        """Coefficients in powers of x - end, shape (degree + 1, pieces)."""
-        found = [self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())]
-        return np.transpose(found) / np.diff(x[ends]) ** np.arange(self.degree + 1)[:, None]
+        """Coefficients of all, shape (degree + 1, pieces)."""
+        return np.transpose([self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())])
 
 
-def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
+def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float) -> float:
     """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
     x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
     value, allowed = law.hydrostatic_pressure(x), np.full_like(x, _OF_LEVELS * slowest)
     level = _Column(value=value, allowed=allowed)
-    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0))
+    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
     while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
     error = level.largest(x, ends)
@@ -251,34 +259,37 @@ def _add_levels(rows: LawRows, law: CalibratedLaw) -> float:
     return error
 
 
-def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw) -> None:
+def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
-    x = _single(np.linspace(0.0, law.max_fill_ratio, _CELLS * _PER_CELL + 1))
+    x = _rounded(np.linspace(0.0, law.max_fill_ratio, _CELLS * _PER_CELL + 1))
+    # The last piece holds the largest fill, whichever way that is rounded.
+    x[-1] = np.nextafter(np.float32(law.max_fill_ratio), np.float32(1.0))
     columns = []
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
         allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
         columns.append(_Column(value=value, allowed=allowed, degree=2))
-    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT_WIDTH))
+    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
     rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
-def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float:
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float) -> float:
     """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
-    x = _single(np.linspace(root * slowest, root * fastest, _CELLS * _PER_CELL + 1))
-    s = x / root
+    x = _rounded(np.linspace(root * slowest, root * fastest, _CELLS * _PER_CELL + 1))
+    s = np.clip(x / root, slowest, fastest)
     value = table.quintic(s) / law.density**0.5
     ratio = _Column(value=value, allowed=_OF_HEADS * value)
-    loss = _half_width(table.straight(s, LOSS) ** 2)
-    beside = _shares(table, s) if way == point.SIPHON else []
-    ends = _ends(x, [ratio, loss, *(column for columns in beside for column in columns)])
+    squared = table.straight(s, LOSS) ** 2
+    beside = _shares(table, s, slack) if way == point.SIPHON else []
+    ends = _ends(x, [ratio, _half_width(squared, slack * _OF_WIDTHS), *chain(*beside)])
     missed = ratio.largest(x, ends, of=value)
+    # The error of tabulation is part of the half-width, whatever is known of the loss.
     error = _AT_CREST * missed + law.heads.interpolation_error
     exponent = 0.5 + np.gradient(np.log(value), np.log(x)) / 8
-    loss = replace(loss, value=loss.value + (error / exponent) ** 2)
+    loss = _half_width(squared + (error / exponent) ** 2, slack * _OF_WIDTHS)
     pieces = len(rows.pieces[0]) if rows.pieces else ends.size - 1
     more = (way * pieces, *law.carrying_pressures(table))
     rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
@@ -287,26 +298,28 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table) -> float
     return missed
 
 
-def _shares(table: Table, s: FloatArray) -> Sequence[Sequence[_Column]]:
+def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[tuple[_Column, _Column]]:
     """Part of the pressure that is lost up to the crest and its half-width, there and back."""
-    ways = [table.cubic(s, at) for at in (SHARE, BACK_SHARE) if at < table.count]
+    width = slack * _OF_WIDTHS
     return [
         (
-            _Column(value=value, allowed=_OF_SHARE * value, degree=3),
-            _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)),
+            _Column(value=table.cubic(s, at), allowed=_OF_SHARE * table.cubic(s, at), degree=3),
+            _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE), width),
         )
-        for value in ways
+        for at in (SHARE, BACK_SHARE)
+        if at < table.count
     ]
 
 
-def _single(x: FloatArray) -> FloatArray:
-    """The nearest numbers of single precision."""
-    return x.astype(np.float32).astype(np.float64)
-
-
-def _half_width(value: FloatArray, of: float = _OF_WIDTHS) -> _Column:
+def _half_width(value: FloatArray, of: float) -> _Column:
     allowed = of * (value + 0.1 * float(np.max(value))) + 1e-300
     return _Column(value=value, allowed=allowed, degree=1)
+
+
+def _rounded(x: FloatArray) -> FloatArray:
+    """To `_BITS` binary places of the largest."""
+    step = 2.0 ** (np.ceil(np.log2(x[-1])) - _BITS)
+    return np.asarray(np.rint(x / step) * step)
 
 
 def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:

@@ -2,9 +2,9 @@
 
 Liquid moves as the law says (`point`), without mass of its own; gas fills and vents at once, or through the
 scene's valve and line.  `c`, `k`, `p` and `q` are the law with the disc behind its numbers, `w` the disc's
-state with its inputs and outputs; the names below are places in them.  A step is cut where a valve moves and where a
-driven chamber comes to its residual fill, and then into parts of at most c[LONGEST], each of the classical
-Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and names these are.
+state with its inputs and outputs; the names below are places in them.  A step is cut where a valve moves and
+where a driven chamber comes to its residual fill, and then into parts of at most c[LONGEST], each of the
+classical Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and names these are.
 """
 
 from math import sqrt

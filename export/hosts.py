@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from string import Template
 from typing import Any, Final
@@ -14,12 +14,12 @@ from ringbalance.export.blocks import RANGE, Block, Variable
 from ringbalance.export.translate import (
     PER_PIECE,
     c_functions,
+    exact_text,
     number_text,
     python_functions,
     st_functions,
 )
 
-_LANGUAGES: Final = ("st", "python", "c")
 _OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
 """Functions of the law for one chamber, which a caller may ask for by themselves."""
 _ST_TYPES: Final = {"Real": "LREAL", "Integer": "DINT", "Boolean": "BOOL"}
@@ -62,7 +62,7 @@ def st_files(block: Block, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
     sizes = {"Law": len(block.constants), "Query": len(block.start)}
     arrays = {kind: f"[0..{count - 1}] OF LREAL" for kind, count in sizes.items()}
-    arrays |= {kind: _st_array(kind, rows) for kind, rows in _named_tables(block)}
+    arrays |= {kind: _st_array(kind, rows) for kind, rows in _tables_of(block)}
     entries = ("answer", *_OF_CHAMBER) if block.kind == "law" else ()
     functions = st_functions(block.source(entries), prefix=name, sizes=arrays)
     if block.kind == "law":
@@ -121,47 +121,46 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     return {f"{name}.py": text}
 
 
-def _named_tables(block: Block) -> list[tuple[str, Sequence[Any]]]:
-    """Cells, pieces and levels with the names of their types."""
-    return list(zip(("Cells", "Pieces", "Levels"), block.tables or (), strict=False))
-
-
 _C_TABLES: Final = "CONSTANTS, CELLS, PIECES, LEVELS"
-_NUMBERS_OF: Final = {"Cells": "USINT", "Pieces": "REAL", "Levels": "LREAL"}
-_C_NUMBERS: Final = {
-    "Cells": "static const unsigned char CELLS[{count}]",
-    "Pieces": f"static const float PIECES[{{count}}][{PER_PIECE}]",
-    "Levels": f"static const double LEVELS[{{count}}][{PER_PIECE}]",
+_TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
+"""How a language writes a number; C's hexadecimal ones are short and leave nothing to round."""
+_NUMBERS: Final = {
+    "Cells": {"c": "unsigned char", "st": "USINT", "st_name": "k"},
+    "Pieces": {"c": "float", "st": "REAL", "st_name": "p"},
+    "Levels": {"c": "double", "st": "LREAL", "st_name": "q"},
 }
+"""What the tables of a law are made of, by their types in `translate`."""
+_ROW: Final = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}
+
+
+def _tables_of(block: Block) -> Iterator[tuple[str, Sequence[Any]]]:
+    """Tables of a block's law with their types; none without a law."""
+    return zip(_NUMBERS, block.tables or (), strict=False)
 
 
 def _st_array(kind: str, rows: Sequence[Any]) -> str:
-    """What structured text declares them as, behind ARRAY."""
-    width = "" if kind == "Cells" else f", 0..{len(rows[0]) - 1}"
-    return f"[0..{len(rows) - 1}{width}] OF {_NUMBERS_OF[kind]}"
+    """What structured text declares a table as, behind ARRAY."""
+    width = "" if kind == "Cells" else f", 0..{PER_PIECE - 1}"
+    return f"[0..{len(rows) - 1}{width}] OF {_NUMBERS[kind]['st']}"
 
 
-def _declared(language: str, block: Block) -> str:
-    """The tables of a law in a language, by the name of a template."""
-    parts = []
-    for kind, rows in _named_tables(block):
+def _declared(block: Block, language: str) -> Iterator[str]:
+    """Declarations of all tables."""
+    for kind, rows in _tables_of(block):
         if kind == "Cells":
-            text = _lines(tuple(map(str, rows)), per_line=20)
+            text, width = _lines([str(row) for row in rows], per_line=20), ""
         else:
-            written = _single if kind == "Pieces" and language != "python" else number_text
-            suffix = "F" if kind == "Pieces" and language == "c" else ""
-            brackets = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}[language]
-            text = ",\n".join(brackets.format(", ".join(written(v) + suffix for v in row)) for row in rows)
-        whole = {
-            "c": f"{_C_NUMBERS[kind].format(count=len(rows))} = {{\n{text}\n}};\n",
-            "st": f"    {_ST_NAMES[kind]} : ARRAY{_st_array(kind, rows)} := [\n{text}\n    ];\n",
-            "python": f"{kind.upper()} = (\n{text},\n)\n",
-        }
-        parts.append(whole[language])
-    return "".join(parts)
-
-
-_ST_NAMES: Final = {"Cells": "k", "Pieces": "p", "Levels": "q"}
+            written = _single if (kind, language) == ("Pieces", "st") else _TEXT[language]
+            text = ",\n".join(_ROW[language].format(", ".join(map(written, row))) for row in rows)
+            width = f"[{PER_PIECE}]"
+        name = kind.upper()
+        if language == "c":
+            yield f"static const {_NUMBERS[kind]['c']} {name}[{len(rows)}]{width} = {{\n{text}\n}};\n"
+        elif language == "st":
+            name = _NUMBERS[kind]["st_name"]
+            yield f"    {name} : ARRAY{_st_array(kind, rows)} := [\n{text}\n    ];\n"
+        else:
+            yield f"{name} = (\n{text},\n)\n"
 
 
 def _single(value: float) -> str:
@@ -177,6 +176,8 @@ def template(name: str) -> str:
 def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     """A template with a block in it. Args: `parts`: further words of that template."""
     text = template(frame)
+    language = next((each for each in ("st", "python") if frame.endswith(each)), "c")
+    written = _TEXT[language]
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
         title=f"{block.title}, made by ringbalance from {_named(block)}.",
@@ -189,9 +190,9 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
         last=len(block.constants) - 1,
         row=len(block.start),
         last_of_row=len(block.start) - 1,
-        constants=_lines([number_text(value) for value in block.constants]),
-        tables=_declared(next((each for each in _LANGUAGES if frame.endswith(each)), "c"), block),
-        start=_lines([number_text(value) for value in block.start]),
+        constants=_lines([written(value) for value in block.constants]),
+        tables="".join(_declared(block, language)),
+        start=_lines([written(value) for value in block.start]),
         **parts,
     )
 

@@ -24,6 +24,19 @@ _OPTIONS: Final = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-fPI
 _SUFFIXES: Final = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 _SYSTEMS: Final = {"linux": "linux-gnu.2.17", "darwin": "macos", "windows": "windows-gnu"}
 """As the cross-compiler calls them; the oldest C library that it links for is that of 2012."""
+_SMALL: Final = (
+    *("-s", "-Os", "-fomit-frame-pointer", "-fno-math-errno", "-fno-ident"),
+    *("-fno-vectorize", "-fno-slp-vectorize"),
+)
+"""Six libraries are most of a unit."""
+_OF_PROCESSOR: Final = {"x86_64": ("-Xclang", "-Oz"), "aarch64": ()}
+_PLAIN: Final = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+_OF_SYSTEM: Final = {
+    "linux": (*_PLAIN, "-fno-plt", "-flto", "-Wl,--hash-style=sysv", "-lm"),
+    "darwin": _PLAIN,
+    "windows": ("-nostdlib", "-I.", "-lkernel32"),
+}
+"""Without what exceptions of other languages would need on their way through; Windows asks for it always."""
 _HEADERS: Final = {
     "math.h": "double sqrt(double);\n",
     "stdlib.h": "#include <stddef.h>\nvoid *malloc(size_t);\nvoid free(void *);\n",
@@ -31,7 +44,6 @@ _HEADERS: Final = {
     "int strcmp(const char *, const char *);\n",
 }
 """For Windows, whose C library takes the cross-compiler minutes and a unit 30 kB."""
-_WITHOUT_LIBRARY: Final = ("-nostdlib", "-fno-math-errno", "-I.", "-lkernel32")
 _PROCESSORS: Final = ("x86_64", "aarch64")
 _PYTHON_NAMES: Final = {"AMD64": "x86_64", "arm64": "aarch64"}
 _FOLDERS_2: Final = {"linux": "linux64", "darwin": "darwin64", "windows": "win64"}
@@ -46,7 +58,7 @@ def local_library(sources: Mapping[str, str], name: str, version: Version) -> di
     if compiler is None or place is None:
         return {}
     try:
-        return {place: _compiled([compiler, "-O2"], sources, Path(place).name)}
+        return {place: _compiled([compiler, "-O2"], sources, Path(place).name, ["-lm"])}
     except OSError:
         return {}
 
@@ -64,23 +76,22 @@ def every_library(sources: Mapping[str, str], name: str, version: Version) -> di
     for done, ((system, processor), place) in enumerate(places.items(), start=1):
         with announced(f"compiling for {system} on {processor}, {done} of {len(places)} ..."):
             target = f"{processor}-{_SYSTEMS[system]}"
-            compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s", "-Os"]
-            files = sources
-            if system == "windows":
-                compiler += _WITHOUT_LIBRARY
-                files = {**sources, **_HEADERS, "windows.c": template("windows")}
-            made[place] = _compiled(compiler, files, Path(place).name)
+            compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_SMALL]
+            compiler += _OF_PROCESSOR[processor]
+            own = {**_HEADERS, "windows.c": template("windows")} if system == "windows" else {}
+            made[place] = _compiled(compiler, {**sources, **own}, Path(place).name, _OF_SYSTEM[system])
     return made
 
 
-def _compiled(compiler: Sequence[str], sources: Mapping[str, str], library: str) -> bytes:
-    """Raises: OSError: the compiler fails."""
+def _compiled(
+    compiler: Sequence[str], sources: Mapping[str, str], library: str, further: Sequence[str]
+) -> bytes:
+    """Args: `further`: options behind the sources. Raises: OSError: the compiler fails."""
     with tempfile.TemporaryDirectory() as folder:
         for file, text in sources.items():
             Path(folder, file).write_text(text, encoding="utf-8")
         compiled = [file for file in sources if file.endswith(".c")]
-        maths = () if "-nostdlib" in compiler else ("-lm",)
-        command = [*compiler, *_OPTIONS, *compiled, *maths, "-o", library]
+        command = [*compiler, *_OPTIONS, *compiled, *further, "-o", library]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
             told = (done.stderr.strip() or "no message").splitlines()[-1]

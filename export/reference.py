@@ -19,7 +19,7 @@ _STEP: Final = 0.01
 """s, between two rows."""
 _PRESSURES: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
 """Pa."""
-_OPENINGS: Final = (0.2, 0.05, 0.1)
+_OPENINGS: Final = (0.06, 0.02, 0.03)
 """s, asked of the disc's first chambers one after the other, five rows apart at least."""
 _TURN: Final = (3e-6, 0.0), (3e-6, 2e-6), (-1e-6, 1e-6), (-1e-9, 0.0)
 """m, vibrations that the controller sees, 100 rows each."""
@@ -63,7 +63,7 @@ def _stimuli(block: Block) -> Iterator[Mapping[str, float]]:
                     yield dict(zip(zeros, (*fills, pressure, primed), strict=True))
     elif block.kind == "disc":
         for name, opening in zip(zeros, _OPENINGS, strict=False):
-            for step in range(40):
+            for step in range(8):
                 yield {**zeros, name: max(opening - step * _STEP, 0.0)}
     else:
         for x, y in _TURN:

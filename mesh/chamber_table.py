@@ -19,7 +19,6 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from ringbalance.mesh.wall_integrals import (
     COLUMNS,
@@ -32,6 +31,7 @@ from ringbalance.mesh.wall_integrals import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
+from ringbalance.scene.splines import Pieces
 
 TOLERANCE: Final = 1e-9
 """Of a table between its nodes: of the whole volume and of the whole moment."""
@@ -80,15 +80,15 @@ class ChamberTable:
         """Columns and their derivatives by L, each of shape (4, ...); held beyond the ends."""
         level = np.asarray(levels, dtype=np.float64)
         held = np.clip(level, self.nodes[0], self.nodes[-1])
-        values, slopes = self._pieces(held), self._slopes(held)
+        values, slopes = (np.moveaxis(each(held), -1, 0) for each in (self._pieces, self._slopes))
         return np.where(held >= self.nodes[-1] * _EMPTY, 0.0, values), np.asarray(slopes)
 
     @cached_property
-    def _pieces(self) -> CubicHermiteSpline:
+    def _pieces(self) -> Pieces:
         return _hermite(self.nodes, self.columns)
 
     @cached_property
-    def _slopes(self) -> PPoly:
+    def _slopes(self) -> Pieces:
         return self._pieces.derivative()
 
     def at_radius(self, radius: npt.ArrayLike, column: int) -> FloatArray:
@@ -135,9 +135,9 @@ _SETTLED: Final = 1e-15
 """Of the largest level: a few times the round-off, below which a step changes nothing."""
 
 
-def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:
+def _hermite(nodes: FloatArray, columns: FloatArray) -> Pieces:
     """Args: `columns`: values and, behind them, slopes at the nodes."""
-    return CubicHermiteSpline(nodes, *np.split(columns, 2), axis=1)
+    return Pieces.hermite(nodes, *np.split(columns.T, 2, axis=1))
 
 
 @lru_cache(maxsize=32)
@@ -193,7 +193,7 @@ def _refined(
         middle = (nodes[cell] + nodes[cell + 1]) / 2
         result = exact(middle)
         pieces = _hermite(nodes, columns)
-        guess = np.concatenate([pieces(middle), pieces(middle, 1)])
+        guess = np.concatenate([pieces(middle), pieces.derivative()(middle)], axis=1).T
         error[:, cell] = np.abs(result - guess)
         nodes = np.insert(nodes, cell + 1, middle)
         columns = np.insert(columns, cell + 1, result, axis=1)

@@ -42,8 +42,7 @@ from ringbalance.reduced_model.chamber.values import chamber_closed_forms, chamb
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.flow import TubeFlow
-from ringbalance.reduced_model.tube.heads import crest_head
-from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
+from ringbalance.reduced_model.tube.path import crest_head, crest_middle, share_at_radius
 from ringbalance.reduced_model.tube.regime import can_flow, driving_pressure, gas_over_crest, resting_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from ringbalance.controller.stepped import scene_controller as scene_controller
     from ringbalance.design.designing import Design as Design
     from ringbalance.design.sweep import Sweep as Sweep
-    from ringbalance.designs import find_design as find_design
     from ringbalance.designs import objective as objective
     from ringbalance.designs import sweep as sweep
     from ringbalance.face import compare as compare
@@ -51,6 +50,7 @@ if TYPE_CHECKING:
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
     from ringbalance.scene.platform.progress_line import ProgressLine as ProgressLine
+    from ringbalance.search import find_design as find_design
     from ringbalance.studies import Fit as Fit
     from ringbalance.studies import extremes as extremes
     from ringbalance.studies import fit as fit
@@ -108,7 +108,7 @@ _NAMES = {
     "controller.judging.tuning": ("Tuning",),
     "design.designing": ("Design",),
     "design.sweep": ("Sweep",),
-    "designs": ("find_design", "objective", "sweep"),
+    "designs": ("objective", "sweep"),
     "face": (
         "compare",
         "simulate",
@@ -131,6 +131,7 @@ _NAMES = {
         "bundled_scene",
         "load_scene",
     ),
+    "search": ("find_design",),
     "studies": (
         "Fit",
         "extremes",

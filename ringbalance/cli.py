@@ -107,7 +107,7 @@ COMMANDS = {
         "",
     ),
     "design": (
-        "ringbalance.design.cli:design",
+        "ringbalance.design.design_cli:design",
         "The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.",
         "SCENE --save designed.toml",
         "no design meets what the scene requires, or it is undecided",

@@ -1,20 +1,17 @@
-"""Many designs as a Python user calls them: a sweep, the best one, and one as a function to optimise."""
+"""Many designs as a Python user calls them: a sweep, and one as a function to optimise."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from ringbalance.design.axes import plan_of
-from ringbalance.design.design_rows import design_document, design_rows
-from ringbalance.design.designing import Design, run_design
 from ringbalance.design.static import EMPTY, static_rows
 from ringbalance.design.sweep import Sweep, run_sweep
 from ringbalance.design.work import Progress
-from ringbalance.results.result import Presentation
 from ringbalance.scene import AnyScene
 from ringbalance.scene.changes import checked_scene
 from ringbalance.scene.registry import registered
@@ -62,36 +59,6 @@ def sweep(
         intervals=intervals,
         check=check,
         store=None if store is None else Path(store),
-        executor=executor,
-        workers=workers,
-        progress=progress,
-    )
-
-
-def find_design(
-    scene: AnyScene,
-    *,
-    executor: Executor | None = None,
-    workers: int = 1,
-    progress: Callable[[str], None] | None = None,
-) -> Design:
-    """Design what a scene's table [design] leaves open: the smallest disc that meets [requirement].
-
-    Args: `executor`: any `concurrent.futures.Executor`; default `workers` processes of its own. `progress`:
-        told what is done.
-    Returns: The design, judged on drawn devices as `tune` judges; where none meets what is required, that
-        which comes nearest, and what stands against it.
-    Raises: SceneError: a scene that cannot be used, or that leaves nothing to choose.
-
-    Example:
-        >>> scene = rb.load_scene(rb.bundled_scene("spindle_design"))
-        >>> design = rb.find_design(scene, workers=2)
-        >>> design.judgement.verdict
-        'met'
-    """
-    return run_design(
-        checked_scene(scene),
-        presentation=Presentation(document=design_document, rows=design_rows),
         executor=executor,
         workers=workers,
         progress=progress,

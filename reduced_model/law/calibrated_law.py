@@ -146,7 +146,7 @@ class CalibratedLaw:
         return rows.arrays(self.scalars())
 
     def carrying_pressures(self, table: Table) -> FloatArray:
-        """Under which the flow through a table carries half of the gas over the crest out, none and all, Pa."""
+        """Under which a flow carries half of the gas over the crest out, none and all, Pa."""
         low, high = CLEARING
         velocities = self.path.froude_velocity * np.array([(low + high) / 2, low, high])
         return self.density * roots_of(table, velocities) ** 8 if self.path.froude_velocity else velocities
@@ -348,7 +348,7 @@ class CalibratedLaw:
             lost, row = w[point.PART_LOST], int(w[point.ROW] + p[way][point.SHARES])
             off = point.lost_width(p, row, w[point.TO_END])
         spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
-        point.set_margin(c, w, lost, off, point.known_of(c, w, lost, spread))
+        point.set_margin(c, w, lost, off, point.known_of(w, lost, spread))
         sides = [
             each.cavity_margin(fills=fills, gas_pressure=gas_pressure, reverse=reverse)[0] or 0.0
             for each in self.variants

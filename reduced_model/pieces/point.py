@@ -297,7 +297,7 @@ def up_square(c: Law, w: Query) -> float:
 
 
 @both_ways
-def known_of(c: Law, w: Query, lost: float, spread: float) -> float:
+def known_of(w: Query, lost: float, spread: float) -> float:
     """Squared half-width of a full siphon's crest pressure by gas, levels and what else it may be off by."""
     kept = 1.0 - lost
     down = lost * w[DOWN_WIDTH]
@@ -358,7 +358,7 @@ def set_widths(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
             part = larger(w[VELOCITY] - held(k, p, w, way, lower), 0.0)
         w[UNCERTAINTY] = half_width(w, w[DRIVING], full_square(c, w), part)
     off = lost_width(p, int(w[FULL_ROW] + p[way][SHARES]), w[FULL_TO_END])
-    set_margin(c, w, w[PART_LOST], off, known_of(c, w, w[PART_LOST], larger(below, above)))
+    set_margin(c, w, w[PART_LOST], off, known_of(w, w[PART_LOST], larger(below, above)))
     if w[MARGIN] * w[MARGIN] < w[MARGIN_SQUARE]:
         w[REGIME] = UNDECIDED
         w[STATUS] = UNSURE
@@ -445,10 +445,10 @@ def stays_full(c: Law, w: Query) -> bool:
 
 @both_ways
 def set_answer(c: Law, k: Cells, p: Pieces, w: Query, widths: bool) -> bool:
-    """Velocity, regime and primed afterwards; with `widths` half-width and whether it is undecided.
+    """Velocity, regime and primed afterwards.
 
-    At most one direction flows: what drives one holds the other.  Returns: whether it is the reverse one, of
-    which the velocity is positive too.
+    With `widths` half-width and whether it is undecided, too.  At most one direction flows: what drives one
+    holds the other.  Returns: whether it is the reverse one, of which the velocity is positive too.
     """
     w[VELOCITY] = 0.0
     w[REGIME] = BLOCKED

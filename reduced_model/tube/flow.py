@@ -13,7 +13,7 @@ import numpy as np
 from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.chamber.values import chamber_pressure
-from ringbalance.reduced_model.tube.heads import crest_head
+from ringbalance.reduced_model.tube.path import crest_head
 from ringbalance.reduced_model.tube.regime import (
     CLEARING_UNCERTAINTY,
     RELEASED,

@@ -20,8 +20,8 @@ from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, spline, table_at
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
+    crest_head,
     crest_span,
-    head_behind_crest,
     reversed_tube,
 )
 from ringbalance.scene.arrays import FloatArray, clipped, plain
@@ -417,18 +417,6 @@ def log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
         crest_head(scene=scene, tube=seen, state=there, velocity=u) for seen, there in ((tube, state), back)
     )
     return [between, *map(np.log, to_crest)]
-
-
-def crest_head(
-    *, scene: Scene, tube: Tube, state: TubeState, velocity: FloatArray, lowest: bool = True
-) -> FloatArray:
-    """Head from the giving chamber to the lowest pressure at the crest, or to its arc's end, m^2/s^2."""
-    kinetic = velocity**2 / 2
-    fall = (state.kinetic_factor + state.upstream_loss(crest_span(tube)[1])) * kinetic
-    if not lowest:
-        return np.asarray(fall)
-    behind = head_behind_crest(tube=tube, along=state.along * kinetic, square=scene.rotor.speed**2)
-    return np.asarray(fall + behind)
 
 
 def entrance_fraction(scene: Scene, u: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.models import Tube
+from ringbalance.scene.models import Scene, Tube
 
 _SAME = 1e-9
 
@@ -113,6 +113,18 @@ def crest_end_uncertainty(tube: Tube, position: float) -> float:
     slack = np.maximum(1 - _shortest(tube) / tube.length, 0.0)
     width: float = plain(np.hypot((1 - arc) * position, slack * np.maximum(end, 1 - end)))
     return width
+
+
+def crest_head(
+    *, scene: Scene, tube: Tube, state: TubeState, velocity: FloatArray, lowest: bool = True
+) -> FloatArray:
+    """Head from the giving chamber to the lowest pressure at the crest, or to its arc's end, m^2/s^2."""
+    kinetic = velocity**2 / 2
+    fall = (state.kinetic_factor + state.upstream_loss(crest_span(tube)[1])) * kinetic
+    if not lowest:
+        return np.asarray(fall)
+    behind = head_behind_crest(tube=tube, along=state.along * kinetic, square=scene.rotor.speed**2)
+    return np.asarray(fall + behind)
 
 
 def head_behind_crest(*, tube: Tube, along: FloatArray, square: float | FloatArray) -> FloatArray:

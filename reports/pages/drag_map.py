@@ -26,8 +26,8 @@ from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
-from ringbalance.reduced_model.tube.heads import crest_head, roots_of
-from ringbalance.reduced_model.tube.path import crest_span
+from ringbalance.reduced_model.tube.heads import roots_of
+from ringbalance.reduced_model.tube.path import crest_head, crest_span
 from ringbalance.reduced_model.tube.regime import (
     TubeEnds,
     can_flow,

@@ -16,7 +16,9 @@ from ringbalance.controller.algorithms.algorithm import Command, Measurement, Va
 from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.outcome import run_findings
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.controller.stepped import Stepped
 from ringbalance.reduced_model.injection.dynamics import Dynamics
@@ -167,6 +169,34 @@ def test_a_wrong_sense_of_rotation_is_found_out(scene: Scene, model: BalancerMod
     run = simulate(with_rotor(scene, initial_phase=math.radians(70)), model, controller=Mirrored())
     assert run.outcome is Outcome.DIVERGING
     assert "sense of rotation" in run.status
+
+
+@pytest.mark.parametrize(
+    ("factor", "degrees_off", "advice"),
+    [
+        (2.2, 0, ["gain_too_high"]),
+        (5.0, 0, ["gain_too_high"]),
+        (2.5, 30, ["gain_too_high"]),
+        (1.9, 40, ["gain_too_high"]),
+        (1.9, 55, ["check_direction"]),
+        (0.3, 95, ["check_direction"]),
+        (1.7, 100, ["check_direction"]),
+    ],
+)
+def test_a_growing_residual_is_laid_to_the_gain_or_to_the_direction(
+    scene: Scene, model: BalancerModel, factor: float, degrees_off: float, advice: list[str]
+) -> None:
+    rate = loop_factor(scene, model, controller_of(scene, model)).rate
+    lag = scene.rotor.lag_angle + math.radians(degrees_off)
+    turned = with_controller(scene, assumed_lag_angle=lag, proportional=factor / rate)
+    run = simulate(turned, model)
+    assert run.outcome in {Outcome.DIVERGING, Outcome.UNSTABLE}
+    findings = {each.code: each for each in run_findings(run)}
+    assert [code for code in findings if code in {"check_direction", "gain_too_high"}] == advice
+    if "gain_too_high" in advice:
+        highest = findings["gain_too_high"].values["proportional"]
+        assert isinstance(highest, float)
+        assert simulate(with_controller(turned, proportional=0.9 * highest), model).settled
 
 
 def test_far_too_high_a_gain_is_reported_by_its_overshoots(scene: Scene, model: BalancerModel) -> None:

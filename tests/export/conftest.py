@@ -39,7 +39,7 @@ def all_blocks(name: str, both: Both) -> dict[str, Block]:
     law, compact = both
     return {
         "law": law_block(compact),
-        "disc": disc_block(scene, law, compact),
+        "disc": disc_block(scene, law),
         "controller": controller_block(scene),
     }
 

@@ -14,7 +14,6 @@ from c_warnings import WARNINGS
 import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
 from ringbalance.export.blocks import Block, controller_block, disc_block
-from ringbalance.export.compact import compact_law
 from ringbalance.export.hosts import c_files, python_files, st_files
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
@@ -81,7 +80,7 @@ def test_in_c_they_run_as_the_programs_own_loop(
     )
     assert isinstance(own, Simulation)
     assert own.settled
-    controller, disc = controller_block(scene), disc_block(scene, law, compact_law(scene=scene, law=law))
+    controller, disc = controller_block(scene), disc_block(scene, law)
     rows = loop_in_c(tmp_path, disc, controller, samples=len(own.samples), longest=longest)
     right = np.array([vibration_of(each.measurement) for each in own.samples])
     assert rows[:, 0] == pytest.approx([each.time for each in own.samples], abs=late)

@@ -25,6 +25,8 @@ Both = tuple[CalibratedLaw, CompactLaw]
 STANDARD: Final[dict[str, Callable[[Any], Any]]] = {
     "SQRT": sqrt,
     "TRUNC": int,
+    "USINT_TO_DINT": int,
+    "REAL_TO_LREAL": float,
     "DINT_TO_LREAL": float,
 }
 OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
@@ -161,7 +163,7 @@ def test_structured_text_has_the_bits_of_python(six: Both) -> None:
         for widths in (True, False):
             row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
             before = machine.operations
-            machine.call("disc_answer", [constants, compact.pieces, row, widths])
+            machine.call("disc_answer", [constants, *compact.tables, row, widths])
             operations.append((row[point.REGIME] == point.BLOCKED, widths, machine.operations - before))
             if widths:
                 found = row[point.VELOCITY : point.PRIMED_AFTER + 1]
@@ -194,9 +196,7 @@ def test_disc_and_controller_have_the_bits_of_python(blocks: dict[str, Block]) -
             given = {name: value * (step < 2) for name, value in inputs.items()}
             for name, value in given.items():
                 mine[places[name]] = value
-            machine.call(
-                "disc_step", [block.constants, *([block.pieces] if block.pieces else []), mine, 0.003]
-            )
+            machine.call("disc_step", [block.constants, *(block.tables or ()), mine, 0.003])
             block.run(row, 0.003, given)
             assert np.array(mine).tobytes() == np.array(row).tobytes()
         assert mine != list(block.start)

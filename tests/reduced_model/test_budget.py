@@ -19,7 +19,8 @@ from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import UNITS
 from ringbalance.reduced_model.core import Answers
-from ringbalance.reduced_model.tube.heads import crest_head, log_heads
+from ringbalance.reduced_model.tube.heads import log_heads
+from ringbalance.reduced_model.tube.path import crest_head
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs

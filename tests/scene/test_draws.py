@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.scene.draws import BLOCK, deviates, quantiles
+from ringbalance.controller.deviates import deviates
+from ringbalance.scene.draws import BLOCK, quantiles
 
 
 def test_every_block_takes_each_part_once() -> None:

@@ -37,7 +37,7 @@ _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
 _OF_LEVELS: Final = 0.1 * TOLERANCE
 """Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 10
+_MOST_LEVELS: Final = 16
 """Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
 _OF_SHARE: Final = 0.5 * TOLERANCE
 """As a share decides whether a column separates, a velocity jumps by half of it."""
@@ -53,9 +53,9 @@ _OF_ROUNDING: Final = 0.2
 _BITS: Final = 18
 """Of a place at which pieces may meet, likewise."""
 _CELLS: Final = 96
-_LEVEL_CELLS: Final = 100
+_LEVEL_CELLS: Final = 200
 """Of equal length, each of which knows at which piece to begin looking; pieces end where cells do."""
-_PER_CELL: Final = 20
+_PER_CELL: Final = 10
 """Samples."""
 _EDGE: Final = 1e-3
 """Of a cell: more than rounding moves what lies next to its edge."""
@@ -251,12 +251,14 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float) -> float:
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
     while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
         level = replace(level, allowed=2 * level.allowed)
-    error = level.largest(x, ends)
+    error = np.zeros_like(x)
+    for first, last in pairwise(ends.tolist()):
+        error[first + (first > 0) : last + 1] = np.max(np.abs(level.errors(x, first, last)))
     scale, first = rows.add_cells(x[ends], cells=_LEVEL_CELLS)
     rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = scale, first
     widened = replace(width, value=np.hypot(width.value, error))
     rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
-    return error
+    return float(np.max(error))
 
 
 def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) -> None:

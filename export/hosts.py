@@ -121,7 +121,7 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     return {f"{name}.py": text}
 
 
-_C_TABLES: Final = "CONSTANTS, CELLS, PIECES, LEVELS"
+_C_TABLES: Final = "CONSTANTS, CELL_ROWS, PIECES, LEVELS"
 _TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
 """How a language writes a number; C's hexadecimal ones are short and leave nothing to round."""
 _NUMBERS: Final = {
@@ -153,7 +153,7 @@ def _declared(block: Block, language: str) -> Iterator[str]:
             written = _single if (kind, language) == ("Pieces", "st") else _TEXT[language]
             text = ",\n".join(_ROW[language].format(", ".join(map(written, row))) for row in rows)
             width = f"[{PER_PIECE}]"
-        name = kind.upper()
+        name = "CELL_ROWS" if kind == "Cells" else kind.upper()
         if language == "c":
             yield f"static const {_NUMBERS[kind]['c']} {name}[{len(rows)}]{width} = {{\n{text}\n}};\n"
         elif language == "st":

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from numpy.polynomial.polynomial import polyval
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
-from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
 from ringbalance.scene.arrays import FloatArray, IntArray
@@ -35,14 +35,16 @@ _OF_HEADS: Final = 0.35 * TOLERANCE
 """What of it a head takes."""
 _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
-_OF_LEVELS: Final = 0.1 * TOLERANCE
+_OF_LEVELS: Final = 0.2 * TOLERANCE
 """Of the head of the slowest velocity."""
 _MOST_LEVELS: Final = 16
 """Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
-_OF_SHARE: Final = 0.5 * TOLERANCE
-"""As a share decides whether a column separates, a velocity jumps by half of it."""
-_OF_CHAMBER: Final = 2e-6
-"""Of the largest squared radius and moment."""
+_OF_SHARE: Final = 5e-4
+"""Where a share decides whether a column separates, `point` allows for more."""
+_OF_SURFACE: Final = 4e-6
+"""Of the largest squared radius."""
+_OF_MOMENT: Final = 1e-5
+"""Of the largest moment; part of its half-width."""
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
@@ -52,9 +54,12 @@ _OF_ROUNDING: Final = 0.2
 """Of a piece's error, to which its coefficients are rounded: numbers with few bits make small libraries."""
 _BITS: Final = 18
 """Of a place at which pieces may meet, likewise."""
-_CELLS: Final = 96
-_LEVEL_CELLS: Final = 200
-"""Of equal length, each of which knows at which piece to begin looking; pieces end where cells do."""
+_CELLS: Final = (64, 128, 256)
+"""Of equal length, each of which knows at which piece to begin looking; pieces end where cells do, and where
+these are too long for the tolerance, the next number is taken."""
+_LEVEL_CELLS: Final = 160
+LARGEST: Final = 4096
+"""Of all numbers, bytes; levels take what the rest leaves."""
 _PER_CELL: Final = 10
 """Samples."""
 _EDGE: Final = 1e-3
@@ -161,11 +166,12 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
             "a scene without [fitted]",
         )
     tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
-    rows = LawRows.of(len(tables), cells=_CELLS, edge=_EDGE)
+    rows = LawRows.of(len(tables), edge=_EDGE)
     missed = max(_add_way(rows, law, way, table, slack) for way, table in enumerate(tables))
     _add_chamber(rows, scene, law, slack)
-    first_level = len(rows.arrays({})[1])
-    level_error = _add_levels(rows, law, slack)
+    before, first_level = map(len, rows.arrays({}))
+    left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * first_level
+    level_error = _add_levels(rows, law, slack, most=min(_MOST_LEVELS, left // (8 * WIDTH_OF_ROW)))
     numbers, pieces = rows.arrays(law.scalars() | {point.LOWEST: VELOCITIES[0], point.HIGHEST: VELOCITIES[1]})
     constants, cells = np.split(numbers, [point.PLACES])
     pieces, levels = np.split(pieces, [first_level])
@@ -242,14 +248,14 @@ class _Column:
         return np.transpose([self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())])
 
 
-def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float) -> float:
-    """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
+def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -> float:
+    """The hydrostatic pressure over the fill ratio. Args: `most`: pieces. Returns: its largest error, Pa."""
     x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
     value, allowed = law.hydrostatic_pressure(x), np.full_like(x, _OF_LEVELS * slowest)
     level = _Column(value=value, allowed=allowed)
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
-    while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
+    while (ends := _ends(x, [level, width])).size > most + 1:
         level = replace(level, allowed=2 * level.allowed)
     error = np.zeros_like(x)
     for first, last in pairwise(ends.tolist()):
@@ -263,16 +269,21 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float) -> float:
 
 def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
-    x = _rounded(np.linspace(0.0, law.max_fill_ratio, _CELLS * _PER_CELL + 1))
+    cells = _CELLS[0]
+    x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _PER_CELL + 1))
     # The last piece holds the largest fill, whichever way that is rounded.
     x[-1] = np.nextafter(np.float32(law.max_fill_ratio), np.float32(1.0))
-    columns = []
-    for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
-        allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
-        columns.append(_Column(value=value, allowed=allowed, degree=2))
-    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
+    columns, largest = [], float(np.max(np.abs(law.moment.chamber_moment(x))))
+    square = surface_radius(disc=scene.disc, fill_ratio=x) ** 2
+    for value, allowed in (
+        (square, _OF_SURFACE * float(np.max(square))),
+        (law.moment.chamber_moment(x), _OF_MOMENT * largest),
+    ):
+        columns.append(_Column(value=value, allowed=np.full_like(x, allowed), degree=2))
+    width = np.hypot(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT * largest)
+    columns.append(_half_width(width, slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
-    rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
+    rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends], cells=cells)
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
@@ -280,37 +291,36 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: f
     """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
-    x = _rounded(np.linspace(root * slowest, root * fastest, _CELLS * _PER_CELL + 1))
-    s = np.clip(x / root, slowest, fastest)
-    value = table.quintic(s) / law.density**0.5
-    ratio = _Column(value=value, allowed=_OF_HEADS * value)
-    squared = table.straight(s, LOSS) ** 2
-    beside = _shares(table, s, slack) if way == point.SIPHON else []
-    ends = _ends(x, [ratio, _half_width(squared, slack * _OF_WIDTHS), *chain(*beside)])
-    missed = ratio.largest(x, ends, of=value)
+    for cells in _CELLS:
+        x = _rounded(np.linspace(root * slowest, root * fastest, cells * _PER_CELL + 1))
+        s = np.clip(x / root, slowest, fastest)
+        value = table.quintic(s) / law.density**0.5
+        ratio = _Column(value=value, allowed=_OF_HEADS * value)
+        squared = table.straight(s, LOSS) ** 2
+        beside = _shares(table, s, slack) if way == point.SIPHON else []
+        ends = _ends(x, [ratio, _half_width(squared, slack * _OF_WIDTHS), *beside])
+        missed = ratio.largest(x, ends, of=value)
+        if missed <= _OF_HEADS:
+            break
     # The error of tabulation is part of the half-width, whatever is known of the loss.
     error = _AT_CREST * missed + law.heads.interpolation_error
     exponent = 0.5 + np.gradient(np.log(value), np.log(x)) / 8
     loss = _half_width(squared + (error / exponent) ** 2, slack * _OF_WIDTHS)
-    pieces = len(rows.pieces[0]) if rows.pieces else ends.size - 1
-    more = (way * pieces, *law.carrying_pressures(table))
-    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
-    for columns in beside:
-        rows.add(*(each.pieces(x, ends) for each in columns))
+    more = (ends.size - 1, *law.carrying_pressures(table))
+    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more, cells=cells)
+    if beside:
+        rows.add(*(each.pieces(x, ends) for each in beside))
     return missed
 
 
-def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[tuple[_Column, _Column]]:
-    """Part of the pressure that is lost up to the crest and its half-width, there and back."""
-    width = slack * _OF_WIDTHS
-    return [
-        (
-            _Column(value=table.cubic(s, at), allowed=_OF_SHARE * table.cubic(s, at), degree=3),
-            _half_width(np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE), width),
-        )
-        for at in (SHARE, BACK_SHARE)
-        if at < table.count
-    ]
+def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[_Column]:
+    """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
+    if table.count <= SHARE:
+        return []
+    ways = [table.cubic(s, at) for at in (SHARE, min(BACK_SHARE, table.count - 2))]
+    found = [_Column(value=value, allowed=_OF_SHARE * value, degree=2) for value in ways]
+    width = np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)
+    return [*found, _half_width(width, slack * _OF_WIDTHS)]
 
 
 def _half_width(value: FloatArray, of: float) -> _Column:

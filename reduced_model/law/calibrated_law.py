@@ -27,7 +27,7 @@ from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.pieces.compiled_point import answer_each
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import BACK_SHARE, SHARE, TubeHeads, roots_of, velocities_of
+from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of, velocities_of
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -137,12 +137,13 @@ class CalibratedLaw:
         rows = LawRows.of(len(self.heads.tables))
         rows.add_levels(self.levels)
         error, pieces = self.heads.interpolation_error, siphon.knots.size - 1
-        rows.add_way(point.SIPHON, siphon, density, error=error, more=(0.0, *self.carrying_pressures(siphon)))
-        for column in (SHARE, BACK_SHARE)[: len(ways)]:
-            rows.add_shares(siphon, column, density)
+        rows.add_way(
+            point.SIPHON, siphon, density, error=error, more=(pieces, *self.carrying_pressures(siphon))
+        )
+        if ways:
+            rows.add_shares(siphon, density)
         for at, way in enumerate(ways, start=point.THERE):
-            more = (at * pieces, *self.carrying_pressures(way))
-            rows.add_way(at, way, density, error=error, more=more)
+            rows.add_way(at, way, density, error=error, more=(0.0, *self.carrying_pressures(way)))
         return rows.arrays(self.scalars())
 
     def carrying_pressures(self, table: Table) -> FloatArray:
@@ -345,8 +346,7 @@ class CalibratedLaw:
         if w[point.DRIVING] > 0:
             way = int(c[point.WAY_BACK]) if reverse else point.THERE
             point.set_lost(c, p, w, way)
-            lost, row = w[point.PART_LOST], int(w[point.ROW] + p[way][point.SHARES])
-            off = point.lost_width(p, row, w[point.TO_END])
+            lost, off = w[point.PART_LOST], point.lost_width(p, int(w[point.BESIDE]), w[point.TO_END])
         spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
         point.set_margin(c, w, lost, off, point.known_of(w, lost, spread))
         sides = [

@@ -7,8 +7,8 @@ its answer and all between; the names below are places in them.  A piece is a po
 its end.  Gauge pressures in Pa, velocities in m/s, half-widths at 95 %; upstream is the chamber that gives
 liquid.  Source: `tube.regime`, whose conditions these are; half-widths by linear propagation.
 
-A full siphon loses a part R of what drives it, p_d, up to the crest.  So a column separates where the
-pressure that holds it there is below R p_d, and one velocity is worked out, not the smaller of two.
+A full siphon loses a part R of what drives it, p_d, up to the crest, so that a column separates where the
+pressure that holds it there is below R p_d.  Both velocities are worked out only next to that.
 """
 
 from collections.abc import Sequence
@@ -33,15 +33,16 @@ CHAMBER_SCALE, CHAMBER_CELLS, WAY_BACK, BLOCK, CARRY, CARRY_FROM, PLACES = 21, 2
 
 # Rows of the pieces that say where velocities are found: of the whole tube, and up to the crest.
 SIPHON, THERE = 0, 1
-# In them: pressure below which a flow creeps, velocity over it there, largest eighth root of one, cells; of a
-# way rows from a piece of the whole tube to the share beside it; pressures at which half of the gas over the
-# crest is carried out, none and all.
+# In them: pressure below which a flow creeps, velocity over it there, largest eighth root of one, cells; of
+# the whole tube rows from a piece to what is beside it; pressures at which half of the gas over the crest is
+# carried out, none and all.
 SLOWEST, CREEP, LAST, SCALE, CELLS, SHARES, HALF, NONE, ALL = 0, 1, 2, 3, 4, 5, 6, 7, 8
 # In a piece: its end, the polynomial, and a half-width that is straight; of a chamber two polynomials.
 END, C0, C1, C2, C3, C4, C5, WIDTH, WIDTH_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SQUARE_0, SQUARE_1, SQUARE_2, MOMENT_0, MOMENT_1, MOMENT_2 = 1, 2, 3, 4, 5, 6
-# Beside a piece of the whole tube: part of its pressure that is lost up to the crest, and its half-width.
-SHARE_0, SHARE_1, SHARE_2, SHARE_3, OFF, OFF_SLOPE = 0, 1, 2, 3, 4, 5
+# Beside a piece of the whole tube: part of its pressure that is lost up to the crest, there and back, with
+# the half-width of both.
+SHARE_0, SHARE_1, SHARE_2, BACK_0, BACK_1, BACK_2, OFF, OFF_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7
 
 # Of a query, and of its answer.
 FILL, OPPOSITE_FILL, PRESSURE, PRIMED = 0, 1, 2, 3
@@ -59,12 +60,13 @@ HOLDS, AT_FIRST, SLOWER, SWEPT, PART_LOST, LOST = 34, 35, 36, 37, 38, 39
 # Of the driven chamber, where these are asked for too.
 RADIUS, MOMENT = 40, 41
 # Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
-MARGIN, MARGIN_SQUARE, UP_SQUARE, PLACES_OF_QUERY = 42, 43, 44, 45
+MARGIN, MARGIN_SQUARE, UP_SQUARE, BESIDE, FULL, PLACES_OF_QUERY = 42, 43, 44, 45, 46, 47
 
 BLOCKED, SIPHONING, SEPARATED, REVERSE, UNDECIDED = 0.0, 1.0, 2.0, 3.0, 4.0
 OK, EXTRAPOLATED, STANDS, UNSURE, INVALID = 0.0, 1.0, 2.0, 3.0, 4.0
 
-GREATEST_PRESSURE, FILL_SLACK = 1e12, 1e-9
+# Pressures of which a tabulated share does not decide which is the smaller one differ by less than this part.
+GREATEST_PRESSURE, FILL_SLACK, SURELY, PERHAPS = 1e12, 1e-9, 0.997, 1.003
 # fmt: on
 
 
@@ -279,9 +281,11 @@ def set_swept(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
 
 
 @both_ways
-def lost_part(p: Pieces, row: int, t: float) -> float:
+def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
     """Part of the driving pressure that is lost up to the crest; `row`: beside a piece of the whole tube."""
-    return p[row][SHARE_0] + t * (p[row][SHARE_1] + t * (p[row][SHARE_2] + t * p[row][SHARE_3]))
+    if way == THERE:
+        return p[row][SHARE_0] + t * (p[row][SHARE_1] + t * p[row][SHARE_2])
+    return p[row][BACK_0] + t * (p[row][BACK_1] + t * p[row][BACK_2])
 
 
 @both_ways
@@ -331,7 +335,9 @@ def fastest(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
     """The same, but not above that of the full siphon."""
     if pressure < w[LOST]:
         return velocity(k, p, w, way, pressure)
-    return w[FULL_ROOT] * quintic(p, int(w[FULL_ROW]), w[FULL_TO_END])
+    if w[FULL] == 0.0:
+        return w[FULL_ROOT] * quintic(p, int(w[FULL_ROW]), w[FULL_TO_END])
+    return w[FULL]
 
 
 @both_ways
@@ -357,7 +363,7 @@ def set_widths(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
         if lower < w[LOST]:
             part = larger(w[VELOCITY] - held(k, p, w, way, lower), 0.0)
         w[UNCERTAINTY] = half_width(w, w[DRIVING], full_square(c, w), part)
-    off = lost_width(p, int(w[FULL_ROW] + p[way][SHARES]), w[FULL_TO_END])
+    off = lost_width(p, int(w[BESIDE]), w[FULL_TO_END])
     set_margin(c, w, w[PART_LOST], off, known_of(w, w[PART_LOST], larger(below, above)))
     if w[MARGIN] * w[MARGIN] < w[MARGIN_SQUARE]:
         w[REGIME] = UNDECIDED
@@ -371,8 +377,23 @@ def set_lost(k: Cells, p: Pieces, w: Query, way: int) -> None:
     w[FULL_ROOT] = w[ROOT]
     w[FULL_ROW] = w[ROW]
     w[FULL_TO_END] = w[TO_END]
-    w[PART_LOST] = lost_part(p, int(w[ROW] + p[way][SHARES]), w[TO_END])
+    w[BESIDE] = w[ROW] + p[SIPHON][SHARES]
+    w[PART_LOST] = lost_part(p, int(w[BESIDE]), w[TO_END], way)
     w[LOST] = w[PART_LOST] * w[DRIVING]
+
+
+@both_ways
+def separates(k: Cells, p: Pieces, w: Query, way: int) -> bool:
+    """Whether the column up to the crest is slower than the whole tube, which has been looked up."""
+    w[FULL] = 0.0
+    if w[HOLDS] < SURELY * w[LOST]:
+        return True
+    if w[HOLDS] > PERHAPS * w[LOST]:
+        return False
+    w[FULL] = w[ROOT] * quintic(p, int(w[ROW]), w[TO_END])
+    slower = velocity(k, p, w, way, w[HOLDS]) < w[FULL]
+    find(k, p, w, SIPHON, w[DRIVING])
+    return slower
 
 
 @both_ways
@@ -392,7 +413,7 @@ def over_crest(c: Law, k: Cells, p: Pieces, w: Query, way: int, widths: bool) ->
     w[STATUS] = OK
     w[REGIME] = SIPHONING
     w[PRIMED_AFTER] = w[SWEPT]
-    if w[HOLDS] < w[LOST]:
+    if separates(k, p, w, way):
         w[REGIME] = SEPARATED
         w[PRIMED_AFTER] = 0.0
         if covered:

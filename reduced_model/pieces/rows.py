@@ -27,17 +27,15 @@ class LawRows:
 
     ways: FloatArray
     """Rows that say where velocities are found, shape (ways, `WIDTH_OF_ROW`)."""
-    cells: int = CELLS
-    """Of equal length, that say at which piece to begin looking."""
     edge: float = _EDGE
     """Of a cell, by which what lies next to the edge of a cell is taken to be in the next one."""
     numbers: list[FloatArray] = field(default_factory=lambda: [np.zeros(point.PLACES)])
     pieces: list[FloatArray] = field(default_factory=list)
 
     @classmethod
-    def of(cls, ways: int, cells: int = CELLS, edge: float = _EDGE) -> LawRows:
+    def of(cls, ways: int, edge: float = _EDGE) -> LawRows:
         """With nothing but room for the whole tube and the ways to a crest."""
-        return cls(ways=np.zeros((ways, WIDTH_OF_ROW)), cells=cells, edge=edge)
+        return cls(ways=np.zeros((ways, WIDTH_OF_ROW)), edge=edge)
 
     def add(self, *columns: npt.ArrayLike) -> None:
         """Pieces as columns of what stands in a row, each of shape (pieces,) or (powers, pieces)."""
@@ -46,9 +44,11 @@ class LawRows:
         rows[:, : len(whole)] = whole.T
         self.pieces.append(rows)
 
-    def add_cells(self, knots: FloatArray, *, cells: int = 0) -> tuple[float, float]:
-        """Cells for the pieces that are added next. Returns: cells for one of x, and the place of x = 0."""
-        cells = cells or self.cells
+    def add_cells(self, knots: FloatArray, *, cells: int) -> tuple[float, float]:
+        """Cells for the pieces that are added next, equally long, that say at which piece to begin looking.
+
+        Returns: Cells for one of x, and the place of x = 0.
+        """
         start, place = float(knots[0]), sum(each.size for each in self.numbers)
         first = sum(map(len, (self.ways, *self.pieces)))
         edges = np.linspace(start, float(knots[-1]), cells + 1)
@@ -59,7 +59,14 @@ class LawRows:
         return scale, place - start * scale + self.edge
 
     def add_ratios(
-        self, way: int, knots: FloatArray, ratios: FloatArray, squares: FloatArray, more: Sequence[float]
+        self,
+        way: int,
+        knots: FloatArray,
+        ratios: FloatArray,
+        squares: FloatArray,
+        more: Sequence[float],
+        *,
+        cells: int = CELLS,
     ) -> None:
         """Pieces of a way: velocity over the root of a pressure, along the eighth root of that.
 
@@ -68,7 +75,7 @@ class LawRows:
         """
         first = float(knots[0])
         slowest = float(ratios[:, 0] @ (first - float(knots[1])) ** np.arange(6))
-        row = [first**8, slowest / first**4, float(knots[-1]), *self.add_cells(knots), *more]
+        row = [first**8, slowest / first**4, float(knots[-1]), *self.add_cells(knots, cells=cells), *more]
         self.ways[way, : len(row)] = row
         self.add(knots[1:], ratios, squares)
 
@@ -92,10 +99,17 @@ class LawRows:
         squares = table.lines(table.column(3) ** 2 + (error / exponent) ** 2) / np.array([[1.0], [root]])
         self.add_ratios(way, root * table.knots, ratios, squares, more)
 
-    def add_shares(self, table: Table, column: int, density: float) -> None:
-        """Beside the pieces of the whole tube: a share and its half-width, see `TubeHeads`."""
-        powers = density ** (0.125 * np.arange(4))[:, None]
-        self.add(table.cubics(column) / powers, table.lines(table.column(4)) / powers[:2])
+    def add_shares(self, table: Table, density: float) -> None:
+        """Beside the pieces of the whole tube: from column 4 on, see `TubeHeads`."""
+        powers, length = density ** (0.125 * np.arange(3))[:, None], np.diff(table.knots)
+        shares = []
+        for column in (5, min(7, table.count - 2)):
+            # A parabola through the middle of a cubic piece and both its ends.
+            value, slope, square, cube = table.cubics(column)
+            shares.append(
+                np.array([value, slope - cube * length**2 / 2, square - cube * length * 1.5]) / powers
+            )
+        self.add(*shares, table.lines(table.column(4)) / powers[:2])
 
     def arrays(self, scalars: Mapping[int, float]) -> tuple[FloatArray, FloatArray]:
         """Numbers, with those of the law at their places, and pieces, shape (rows, `WIDTH_OF_ROW`)."""

@@ -38,13 +38,11 @@ _AT_CREST: Final = 2.0
 _OF_LEVELS: Final = 0.2 * TOLERANCE
 """Of the head of the slowest velocity."""
 _MOST_LEVELS: Final = 16
-"""Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
+"""Pieces; a level that asks for more is less exact, and says so in its half-width."""
 _OF_SHARE: Final = 5e-4
 """Where a share decides whether a column separates, `point` allows for more."""
-_OF_SURFACE: Final = 4e-6
-"""Of the largest squared radius."""
-_OF_MOMENT: Final = 1e-5
-"""Of the largest moment; part of its half-width."""
+_OF_CHAMBER: Final = 2e-6
+"""Of the largest squared radius and moment."""
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
@@ -256,7 +254,7 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -
     level = _Column(value=value, allowed=allowed)
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
     while (ends := _ends(x, [level, width])).size > most + 1:
-        level = replace(level, allowed=2 * level.allowed)
+        level, width = (replace(each, allowed=1.5 * each.allowed) for each in (level, width))
     error = np.zeros_like(x)
     for first, last in pairwise(ends.tolist()):
         error[first + (first > 0) : last + 1] = np.max(np.abs(level.errors(x, first, last)))
@@ -273,15 +271,11 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) 
     x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _PER_CELL + 1))
     # The last piece holds the largest fill, whichever way that is rounded.
     x[-1] = np.nextafter(np.float32(law.max_fill_ratio), np.float32(1.0))
-    columns, largest = [], float(np.max(np.abs(law.moment.chamber_moment(x))))
-    square = surface_radius(disc=scene.disc, fill_ratio=x) ** 2
-    for value, allowed in (
-        (square, _OF_SURFACE * float(np.max(square))),
-        (law.moment.chamber_moment(x), _OF_MOMENT * largest),
-    ):
-        columns.append(_Column(value=value, allowed=np.full_like(x, allowed), degree=2))
-    width = np.hypot(np.maximum(law.moment.half_width(x), 0.0), _OF_MOMENT * largest)
-    columns.append(_half_width(width, slack * _OF_MOMENT_WIDTH))
+    columns = []
+    for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
+        allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
+        columns.append(_Column(value=value, allowed=allowed, degree=2))
+    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
     rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends], cells=cells)
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))

@@ -8,7 +8,8 @@ its end.  Gauge pressures in Pa, velocities in m/s, half-widths at 95 %; upstrea
 liquid.  Source: `tube.regime`, whose conditions these are; half-widths by linear propagation.
 
 A full siphon loses a part R of what drives it, p_d, up to the crest, so that a column separates where the
-pressure that holds it there is below R p_d.  Both velocities are worked out only next to that.
+pressure that holds it there is below R p_d.  Both velocities are worked out only next to that, where an
+error of the tabulated R could show.
 """
 
 from collections.abc import Sequence
@@ -65,8 +66,8 @@ MARGIN, MARGIN_SQUARE, UP_SQUARE, BESIDE, FULL, PLACES_OF_QUERY = 42, 43, 44, 45
 BLOCKED, SIPHONING, SEPARATED, REVERSE, UNDECIDED = 0.0, 1.0, 2.0, 3.0, 4.0
 OK, EXTRAPOLATED, STANDS, UNSURE, INVALID = 0.0, 1.0, 2.0, 3.0, 4.0
 
-# Pressures of which a tabulated share does not decide which is the smaller one differ by less than this part.
-GREATEST_PRESSURE, FILL_SLACK, SURELY, PERHAPS = 1e12, 1e-9, 0.997, 1.003
+# Parts of what a full siphon loses beyond which a tabulated share decides which velocity is the smaller one.
+GREATEST_PRESSURE, FILL_SLACK, SURELY, PERHAPS, ALIKE = 1e12, 1e-9, 0.997, 1.003, 1.000001
 # fmt: on
 
 
@@ -259,6 +260,8 @@ def set_swept(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
     gas = gain > 0.0
     if gas:
         w[HOLDS] = w[RESTING] - w[GAS_THERE]
+    else:
+        w[HOLDS] = w[RESTING] - w[CAVITY]
     if w[HOLDS] > p[way][HALF]:
         if w[DRIVING] > p[SIPHON][HALF]:
             w[SWEPT] = 1.0
@@ -331,12 +334,18 @@ def held(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
 
 
 @both_ways
+def full_speed(p: Pieces, w: Query) -> float:
+    """Velocity of the whole tube, as it was looked up."""
+    return w[FULL_ROOT] * quintic(p, int(w[FULL_ROW]), w[FULL_TO_END])
+
+
+@both_ways
 def fastest(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
     """The same, but not above that of the full siphon."""
     if pressure < w[LOST]:
         return velocity(k, p, w, way, pressure)
     if w[FULL] == 0.0:
-        return w[FULL_ROOT] * quintic(p, int(w[FULL_ROW]), w[FULL_TO_END])
+        return full_speed(p, w)
     return w[FULL]
 
 
@@ -353,7 +362,7 @@ def set_widths(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
         if below > 0.0:
             part = w[VELOCITY] - held(k, p, w, way, lower)
         # A velocity grows with its pressure the less the greater that is.
-        if above > below:
+        if above > ALIKE * below:
             part = larger(part, fastest(k, p, w, way, upper) - w[VELOCITY])
         gas = w[UP_GAS] - w[CAVITY]
         square = w[UP_SQUARE] + w[DOWN_WIDTH] * w[DOWN_WIDTH] + c[OF_CREST]
@@ -383,17 +392,21 @@ def set_lost(k: Cells, p: Pieces, w: Query, way: int) -> None:
 
 
 @both_ways
-def separates(k: Cells, p: Pieces, w: Query, way: int) -> bool:
-    """Whether the column up to the crest is slower than the whole tube, which has been looked up."""
+def set_slower(k: Cells, p: Pieces, w: Query, way: int, widths: bool) -> None:
+    """The slower of the whole tube, which has been looked up, and the column up to the crest."""
     w[FULL] = 0.0
-    if w[HOLDS] < SURELY * w[LOST]:
-        return True
-    if w[HOLDS] > PERHAPS * w[LOST]:
-        return False
-    w[FULL] = w[ROOT] * quintic(p, int(w[ROW]), w[TO_END])
-    slower = velocity(k, p, w, way, w[HOLDS]) < w[FULL]
-    find(k, p, w, SIPHON, w[DRIVING])
-    return slower
+    if w[HOLDS] < w[LOST]:
+        w[REGIME] = SEPARATED
+        find(k, p, w, way, w[HOLDS])
+        set_speed(p, w, widths)
+        if w[HOLDS] > SURELY * w[LOST]:
+            w[FULL] = full_speed(p, w)
+            w[VELOCITY] = smaller(w[VELOCITY], w[FULL])
+    else:
+        w[REGIME] = SIPHONING
+        set_speed(p, w, widths)
+        if w[HOLDS] < PERHAPS * w[LOST]:
+            w[VELOCITY] = smaller(w[VELOCITY], velocity(k, p, w, way, w[HOLDS]))
 
 
 @both_ways
@@ -401,25 +414,23 @@ def over_crest(c: Law, k: Cells, p: Pieces, w: Query, way: int, widths: bool) ->
     """The answer of a tube with a crest, if liquid flows; `way`: row of the column up to the crest."""
     covered = w[DOWN_LEVEL] >= c[PORT]
     set_crest(c, w, covered)
-    w[HOLDS] = w[RESTING] - w[CAVITY]
     w[SWEPT] = w[PRIMED]
     w[AT_FIRST] = 0.0
     w[SLOWER] = 0.0
     if w[PRIMED] == 0.0:
         set_swept(c, k, p, w, way)
+    else:
+        w[HOLDS] = w[RESTING] - w[CAVITY]
     if w[HOLDS] <= 0.0:
         return
     set_lost(k, p, w, way)
+    set_slower(k, p, w, way, widths)
     w[STATUS] = OK
-    w[REGIME] = SIPHONING
     w[PRIMED_AFTER] = w[SWEPT]
-    if separates(k, p, w, way):
-        w[REGIME] = SEPARATED
+    if w[REGIME] == SEPARATED:
         w[PRIMED_AFTER] = 0.0
         if covered:
             w[PRIMED_AFTER] = w[SWEPT]
-        find(k, p, w, way, w[HOLDS])
-    set_speed(p, w, widths)
     if widths:
         set_widths(c, k, p, w, way)
     set_status(c, w)

@@ -45,6 +45,16 @@ OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
 }
 
 
+OPERATIONS: Final = (
+    ("blocked", True, 80),
+    ("flows", False, 140),
+    ("flows", True, 200),
+    ("carries", False, 165),
+    ("carries", True, 230),
+)
+"""At the most, by what the tube does and whether half-widths are asked for."""
+
+
 class Returned(Exception):  # noqa: N818
     """RETURN."""
 
@@ -164,14 +174,17 @@ def test_structured_text_has_the_bits_of_python(six: Both) -> None:
             row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
             before = machine.operations
             machine.call("disc_answer", [constants, *compact.tables, row, widths])
-            operations.append((row[point.REGIME] == point.BLOCKED, widths, machine.operations - before))
+            state = "blocked" if row[point.REGIME] == point.BLOCKED else "flows"
+            # Part of the gas over the crest is carried out, which takes a third velocity.
+            state = "carries" if row[point.SLOWER] > 0 else state
+            operations.append((state, widths, machine.operations - before))
             if widths:
                 found = row[point.VELOCITY : point.PRIMED_AFTER + 1]
                 assert np.array(found).tobytes() == expected.tobytes()
         assert row[point.VELOCITY] == expected[0]
         assert row[point.PRIMED_AFTER] == expected[4]
-    for blocked, widths, most in ((True, True, 120), (False, False, 180), (False, True, 300)):
-        assert most - 60 < max(n for at, wide, n in operations if (at, wide) == (blocked, widths)) <= most
+    for state, widths, most in OPERATIONS:
+        assert most - 20 < max(n for at, wide, n in operations if (at, wide) == (state, widths)) <= most
 
 
 def test_the_function_block_is_one(six: Both) -> None:

@@ -21,7 +21,7 @@ import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.trials import rounded
 from ringbalance.design.axes import Plan, Point
-from ringbalance.design.hunt import threshold
+from ringbalance.design.races import threshold
 from ringbalance.design.racing import judged_design, race
 from ringbalance.design.space import Space
 from ringbalance.results.requirements import MET

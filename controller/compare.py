@@ -18,7 +18,7 @@ import numpy as np
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning import plain_settings, setting_text
+from ringbalance.controller.judging.tuning import plain_settings
 from ringbalance.controller.rotor import (
     CommonRotor,
     Rotors,
@@ -33,6 +33,7 @@ from ringbalance.results.requirements import Paired, Proportion
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.origins import SceneFile, with_values_at
 

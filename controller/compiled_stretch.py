@@ -67,6 +67,7 @@ def move(
     if guarded:
         for i in range(half):
             motions[half + i] = motions[i]
+            run.lowest[i] = math.nan
         if not _above_residual(loop, run):
             guarded = _shorten(loop, plant, run, motions, w)
     drift = _pass(loop, plant, run, motions, notes, w)
@@ -105,7 +106,8 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
     for i in range(loop.chambers // 2):
         if run.asked[i] > 0.0 and found:
             motions[spare] = motions[i]
-            found = least_later(plant, motions, spare, w) >= run.residual_fill
+            run.lowest[i] = least_later(plant, motions, spare, w)
+            found = run.lowest[i] >= run.residual_fill
     return found
 
 
@@ -120,7 +122,8 @@ def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: Float
         if run.asked[i] > 0.0:
             asked, time = run.asked[i], 0.0
             if _driven_fill(loop, run, i) > run.residual_fill + NEAR_RESIDUAL:
-                time = opening_within(plant, motions, i, 2 * half, run.side[i], asked, w)
+                side, lowest = run.side[i], run.lowest[i]
+                time = opening_within(plant, motions, i, 2 * half, side, asked, lowest, w)
             if time != asked:
                 chamber = i + half * run.side[i]
                 run.shortened += 1

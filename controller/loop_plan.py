@@ -28,6 +28,7 @@ from ringbalance.controller.loop_records import (
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
+from ringbalance.reduced_model.injection.march import SPARE
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
@@ -156,7 +157,7 @@ class LoopPlan:
         Returns: that trace; an empty one where none is asked for.
         """
         shape = (runs.size, CHUNK if watch is None else 1, 2)
-        motions = np.zeros((runs.size, 2 * self.pairs + 1), dtype=MOTION)
+        motions = np.zeros((runs.size, 2 * self.pairs + SPARE), dtype=MOTION)
         liquid = np.tile(self.liquid, (runs.size, 1))
         room = np.zeros(NOTES), np.zeros(WORKSPACE)
         noise, parts = np.zeros(shape), []

@@ -8,17 +8,17 @@ A sample needs no COUNT.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.design.choices import NAME, as_toml, read_choices
 from ringbalance.results.numbers import given as given_text
 from ringbalance.results.numbers import plain
 from ringbalance.scene.arrays import FloatArray
@@ -36,8 +36,6 @@ Point = Mapping[str, Any]
 """Changed values by path, as `SceneFile.with_values` takes them: SI, or text."""
 
 MOST_POINTS: Final = 1_000_000
-NAME: Final = "name"
-"""Column of a CSV file that names a row, where the table has no such key."""
 _SAMPLES: Final = ("sobol", "latin")
 _OFTEN_WRONG: Final = frozenset({"length", "pressure"})
 """Dimensions whose numbers are often thought of in a unit a thousand or a million times as large or small."""
@@ -79,6 +77,21 @@ class Axis:
     def paths(self) -> tuple[str, ...]:
         """Of the keys."""
         return tuple(self.ranges or dict.fromkeys(path for each in self.choices for path in each))
+
+    @property
+    def head(self) -> str:
+        """What stands for the axis: such as "gas.name" where its rows have names, else its first key."""
+        return f"{self.paths[0].partition('.')[0]}.{NAME}" if self.names else self.paths[0]
+
+    def name_of(self, point: Point) -> str:
+        """The name of the row that a point has; empty without."""
+        return self._name_by_values.get(tuple(map(point.get, self.paths)), "")
+
+    @cached_property
+    def _name_by_values(self) -> Mapping[tuple[Any, ...], str]:
+        rows = [tuple(map(each.get, self.paths)) for each in self.choices]
+        # Of rows with the same values the first one names them.
+        return dict(reversed([*zip(rows, self.names, strict=False)]))
 
     def grid(self) -> tuple[Point, ...]:
         """Every value of the axis. Raises: SceneError: a range without the number of its steps."""
@@ -225,16 +238,28 @@ def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
 
 def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
     if isinstance(name, tuple):
+        if len(name) != len(values):
+            raise _fault(", ".join(map(str, name)), f"{len(values)} lists of values", "one for each key")
         return _linked([_values(scene, path, each) for path, each in zip(name, values, strict=True)], name[0])
     if name in scene_kind(scene.balancer).schema.tables:
         if isinstance(values, str | Path):
             return _table_axis(scene, name, Path(values))
-        rows = [{f"{name}.{key}": value for key, value in row.items()} for row in values]
+        # A table of pandas is taken by its rows, one mapping as the only one.
+        values = values.to_dict("records") if hasattr(values, "to_dict") else values
+        values = [values] if isinstance(values, Mapping) else values
+        if not all(isinstance(row, Mapping) for row in values):
+            raise _fault(name, "its rows are no mappings", "a list of mappings from keys, or a CSV file")
+        named = NAME not in scene_kind(scene.balancer).schema.tables[name].keys
+        names = [str(row[NAME]) for row in values if named and NAME in row]
+        rows = [
+            {f"{name}.{key}": value for key, value in row.items() if not (named and key == NAME)}
+            for row in values
+        ]
         readers = {path: _reader(scene, path) for row in rows for path in row}
         choices = (
             {path: _checked(path, value, readers[path]) for path, value in row.items()} for row in rows
         )
-        return Axis(ranges={}, choices=tuple(choices))
+        return Axis(ranges={}, choices=tuple(choices), names=tuple(names) if len(names) == len(rows) else ())
     return _linked([_values(scene, name, values)], name)
 
 
@@ -244,7 +269,9 @@ def _linked(parts: Sequence[tuple[str, Range | list[Any]]], path: str) -> Axis:
     lists = {path: each for path, each in parts if isinstance(each, list)}
     if not lists:
         return Axis(ranges=ranges)
-    if ranges or len({len(each) for each in lists.values()}) != 1 or not next(iter(lists.values())):
+    if not all(lists.values()):
+        raise _fault(path, "no value stands there", "at least one")
+    if ranges or len({len(each) for each in lists.values()}) != 1:
         raise _fault(path, "keys of one axis differ in kind or number of values", "as many values of each")
     rows = zip(*lists.values(), strict=True)
     return Axis(ranges={}, choices=tuple(dict(zip(lists, row, strict=True)) for row in rows))
@@ -255,7 +282,8 @@ def _values(scene: SceneFile, path: str, given: Any) -> tuple[str, Range | list[
     reader = _reader(scene, path)
     if isinstance(given, str):
         given = given.split(",")
-    given = given.tolist() if hasattr(given, "tolist") else list(given)
+    given = given.tolist() if hasattr(given, "tolist") else given
+    given = list(given) if isinstance(given, Iterable) else [given]
     _check_scale(scene, path, given, reader)
     if len(given) == 1 and isinstance(given[0], str) and ":" in given[0]:
         return path, _range(path, given[0], reader)
@@ -293,7 +321,7 @@ def _range(path: str, text: str, reader: Reader) -> Range:
 
 def _read(path: str, text: str, reader: Reader) -> Any:
     try:
-        return reader.read(_as_toml(text, reader))
+        return reader.read(as_toml(text, reader))
     except FieldError as error:
         raise _fault(f"{path}={text}", error.problem, error.allowed) from error
 
@@ -304,17 +332,6 @@ def _checked(path: str, value: Any, reader: Reader) -> Any:
         return value
     read = _read(path, value, reader)
     return read if isinstance(read, int | float) else value
-
-
-def _as_toml(text: str, reader: Reader) -> Any:
-    """Text as a scene file would have it, where a key without unit takes a number."""
-    if reader.dimension is None:
-        for number in (int, float):
-            try:
-                return number(text)
-            except ValueError:
-                continue
-    return text
 
 
 def _reader(scene: SceneFile, path: str) -> Reader:
@@ -330,30 +347,13 @@ def _reader(scene: SceneFile, path: str) -> Reader:
 
 
 def _table_axis(scene: SceneFile, table: str, file: Path) -> Axis:
-    """Rows of a CSV file, each of which sets some keys of a table; an empty cell takes the key away."""
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
-    except (OSError, ValueError, csv.Error) as error:
-        raise _fault(f"{table}={file}", f"the file cannot be read: {error}", "a CSV file") from error
+    """Rows of a CSV file, each of which sets some keys of a table."""
+    if not file.is_file():
+        raise _fault(f"{table}={file}", "there is no such file", f"a CSV file with keys of [{table}]")
     keys = scene_kind(scene.balancer).schema.tables[table].keys
-    columns = [key for key in (rows[0] if rows else ()) if key != NAME or NAME in keys]
-    if not columns or any(None in row or None in row.values() for row in rows):
-        raise _fault(
-            f"{table}={file}", "it has no rows, or rows of other lengths", "a line of keys, then rows"
-        )
-    readers = {key: _reader(scene, f"{table}.{key}") for key in columns}
-    return Axis(
-        ranges={},
-        names=tuple(row.get(NAME, "") for row in rows),
-        choices=tuple(
-            {
-                f"{table}.{key}": _checked(f"{table}.{key}", text, reader) if (text := row[key]) else None
-                for key, reader in readers.items()
-            }
-            for row in rows
-        ),
-    )
+    found = read_choices(file, table=table, keys=keys)
+    rows = ({f"{table}.{key}": value for key, value in row.items()} for row in found.rows)
+    return Axis(ranges={}, choices=tuple(rows), names=found.names)
 
 
 def unit_of_path(scene: SceneFile, path: str) -> str:

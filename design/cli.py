@@ -10,10 +10,10 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from ringbalance.design.axes import Plan, plan_of_file, plan_of_texts
-from ringbalance.design.sweep import STORE, Sweep, run_sweep
+from ringbalance.design.sweep import STORE, Sweep, check_rows, run_sweep
 from ringbalance.results.result import print_rows
 from ringbalance.scene.changes import file_text
-from ringbalance.scene.faults import SceneError
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import read_tolerance
 from ringbalance.scene.origins import SceneFile
@@ -73,6 +73,7 @@ def sweep(
     if tolerance is not None:
         told = told.with_values({"accuracy.tolerance": read_tolerance(tolerance)})
     planned = _plan(told, vary or [], plan, sample)
+    check_rows(write or [], len(planned.points()))
     check_file(out / TABLE)
     with activity("sweep", "points ...") as shown:
         found = run_sweep(
@@ -86,12 +87,13 @@ def sweep(
             progress=lambda done: shown.show(done.text, done=done.points, total=done.total),
         )
     text = json_format.dumps(found.to_dict(), allow_nan=False)
-    _write(found, out, text, rows=write or [], figures=not no_figures)
+    _write(found, out, text, figures=not no_figures)
     if json:
         print(text)
     else:
         print_rows(found.rows())
         print_message(f"written to {out}")
+    _write_scenes(found, out / "scenes", write or [])
     return 0
 
 
@@ -112,11 +114,22 @@ def _plan(scene: SceneFile, vary: list[str], file: Path | None, sample: str) -> 
     return plan_of_file(scene, file)
 
 
-def _write(found: Sweep, out: Path, text: str, *, rows: list[int], figures: bool) -> None:
-    scenes = [(row, found.point_scene(row)) for row in rows]
+def _write(found: Sweep, out: Path, text: str, *, figures: bool) -> None:
     write_whole(out / TABLE, found.to_csv())
     write_whole(out / SUMMARY, text + "\n")
-    for row, scene in scenes:
-        write_whole(out / "scenes" / f"row-{row}.toml", file_text(scene, to=out / "scenes"))
     if figures:
         found.plot(out / "figures")
+
+
+def _write_scenes(found: Sweep, folder: Path, rows: list[int]) -> None:
+    """Raises: SceneError: rows that have no scene, after those of the others are written."""
+    faults: list[Fault] = []
+    for row in rows:
+        try:
+            write_whole(folder / f"row-{row}.toml", file_text(found.point_scene(row), to=folder))
+        except SceneError as error:
+            problem = f"this row has no scene: {error}"
+            of_row = SceneError.of_option(option="--write", value=row, problem=problem, allowed="other rows")
+            faults += of_row.faults
+    if faults:
+        raise SceneError(faults)

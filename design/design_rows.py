@@ -16,17 +16,17 @@ from ringbalance.controller.judging.tuning import (
     plain_settings,
     required_document,
     required_table,
-    setting_text,
     share_values,
     times_of,
 )
 from ringbalance.design.designing import VALVE, Design, Effect
-from ringbalance.design.hunt import Candidate
+from ringbalance.design.races import Candidate
 from ringbalance.results.numbers import MISSING, given, percent
-from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
+from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN, Paired
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.origins import raw_value_at
 
 _CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
@@ -84,6 +84,7 @@ def _effect_document(effect: Effect) -> dict[str, Any]:
         "path": effect.path,
         "changes": plain_settings(effect.changes),
         "fraction": None if effect.met is None else effect.met.document(),
+        "change": None if effect.compared is None else list(effect.compared.difference),
     }
 
 
@@ -216,13 +217,19 @@ def _effects_table(design: Design) -> Table:
         (
             each.path,
             _effect_text(design, each),
-            "no such design" if each.met is None else percent(each.met.value),
-            "" if each.met is None else f"{percent(each.met.low)} to {percent(each.met.high)}",
+            "no such design" if each.met is None else percent(each.met.value, digits=3),
+            "" if each.compared is None else _change_text(each.compared),
         )
         for each in design.effects
     ]
-    heads = ("key", "instead", "devices that meet all", "95 %")
+    heads = ("key", "instead", "devices that meet all", "change on the same devices, 95 %")
     return Table(caption="One key changed, the settings as they are", heads=heads, rows=rows)
+
+
+def _change_text(compared: Paired) -> str:
+    """Of the fraction of devices."""
+    change, half = compared.difference
+    return f"{percent(change, signed=True)} ({100 * (change - half):+.1f} to {100 * (change + half):+.1f})"
 
 
 def _effect_text(design: Design, effect: Effect) -> str:
@@ -244,7 +251,8 @@ def _front_table(design: Design) -> Table:
         for each in design.front
     ]
     valve = (VALVE,) if design.space.valves else ()
-    heads = ("size", "90 % within", "gas, median", *valve, *paths)
+    columns = (path.rpartition(".")[2].replace("_", " ") for path in paths)
+    heads = ("size", "90 % within", "gas, median", *valve, *columns)
     return Table(
         caption="Others, none of which is better in everything; on the devices of the search",
         heads=heads,

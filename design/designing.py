@@ -6,9 +6,8 @@ What the search finds is judged as `tune` judges: on devices on which nothing wa
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -20,11 +19,13 @@ from ringbalance.controller.balancer import Draws, Settings, balancer_of
 from ringbalance.controller.judging.judge import FRESH, Judgement
 from ringbalance.controller.judging.ranking import Ranking, ranked
 from ringbalance.design.axes import Axis, Point
-from ringbalance.design.hunt import Candidate, Finalist, Hunt, Static, deal, hunt
+from ringbalance.design.closing import Judged, growth, judged_designs
+from ringbalance.design.hunt import Static, hunt
+from ringbalance.design.races import Candidate, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import Space
 from ringbalance.design.static import point_scene, reach_of, static_rows
-from ringbalance.results.requirements import MET, Proportion
+from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -33,13 +34,9 @@ from ringbalance.scene.platform.processes import beside
 
 VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
-_MOST: Final = 10
-"""Designs that are judged at the most, but for one."""
-_SLOPE: Final = 3
-"""Designs to both sides over which the growth of the fraction is taken."""
 _MOVED: Final = 0.05
 """By which a key is moved to either side, relative."""
-_DEVICES: Final = 64
+_DEVICES: Final = 256
 """On which a moved key is answered."""
 _FRONT: Final = 6
 _APART: Final = 0.05
@@ -55,6 +52,8 @@ class Effect:
     """SI; with what follows from it."""
     met: Proportion | None
     """Of the devices; None: no such design."""
+    compared: Paired | None = None
+    """With the design as it is, on the same devices."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -119,10 +118,12 @@ def run_design(
     executor: Executor | None = None,
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
+    start: int = 0,
 ) -> Design:
     """Design what a scene leaves open; see `ringbalance.design`.
 
-    Args: `executor`: who computes; default `workers` processes, default one for each processor.
+    Args: `executor`: who computes; default `workers` processes, default one for each processor. `start`:
+        seed of the points that are tried.
     Raises: SceneError: a scene without [design], or one that leaves nothing to choose.
     """
     space, told = Space.of(liquid_ring_scene(scene)), progress or (lambda _: None)
@@ -132,35 +133,39 @@ def run_design(
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         crew = executor or pool
         asked = balancer.asked_fraction()
-        found = hunt(space, asked=asked, needed=needed, executor=crew, told=told)
-        place, judged = _best(space, found, crew, told)
-        best, judgement = (found.finalists[place], judged[place]) if judged else (None, None)
+        found = hunt(space, asked=asked, needed=needed, executor=crew, told=told, seed=start)
+        judged, races = judged_designs(found), found.races
+        best = _taken(judged, sized=space.sized)
+        judgement: Judgement | None = None
         effects: tuple[Effect, ...] = ()
-        smaller = _smaller(found, place, judged) if judged and space.sized else None
-        if best is not None and judgement is not None:
+        if best is not None:
             told("the verdict, and what changes of it would do")
-            whole = partial(judged_design, scene, best.point, settings=judgement.settings)
-            effects, judgement = _effects(space, best, judgement.settings, crew, whole)
-    ranking, reach = Ranking(), None
-    if best is not None and judgement is not None:
-        ranking = ranked(balancer_of(point_scene(scene, best.point)), judgement)
-        reach = _reach(space, best.point)
+            settings = best.judgement.settings
+            whole = partial(judged_design, scene, best.point, settings=settings, whole=True)
+            effects, judgement = _effects(space, best, settings, crew, whole)
+    sized = best if space.sized else None
     return Design(
         presentation=presentation,
         given=scene,
         space=space,
         static=found.static,
-        raced=len(found.candidates),
+        raced=len(races.candidates) - len(judged),
         needed=needed,
-        reach=reach,
+        reach=None if best is None else _reach(space, best.point),
         point=found.static.reach_point if best is None else best.point,
         judgement=judgement,
-        smaller=smaller,
-        doubt=_doubt(found, place, judgement) if judgement is not None and space.sized else None,
-        front=_front(found, asked, least=0.0 if best is None else best.size),
+        smaller=_smaller(judged, sized) if sized else None,
+        doubt=_doubt(races, sized) if sized else None,
+        front=_front(races, asked, least=0.0 if best is None else best.size),
         effects=effects,
-        ranking=ranking,
+        ranking=_ranked(scene, best, judgement),
     )
+
+
+def _ranked(scene: SceneFile, best: Judged | None, judgement: Judgement | None) -> Ranking:
+    if best is None or judgement is None:
+        return Ranking()
+    return ranked(balancer_of(point_scene(scene, best.point)), judgement)
 
 
 def _reach(space: Space, point: Point) -> float | None:
@@ -168,82 +173,32 @@ def _reach(space: Space, point: Point) -> float | None:
     return reach_of(row)
 
 
-def _best(
-    space: Space, found: Hunt, executor: Executor | None, told: Callable[[str], None]
-) -> tuple[int, dict[int, Judgement]]:
-    """Place of the finalist to take, and all that were judged on fresh devices by their places.
+def _taken(judged: Sequence[Judged], *, sized: bool) -> Judged | None:
+    """The smallest that meets what is required, of one size that with the least gas; else the one that serves
+    most devices."""
 
-    From the first one that promises to meet what is required: on to better ones until two miss, or to others
-    until one meets it; else the one that serves most devices.
-    """
-    judged: dict[int, Judgement] = {}
-    missing = set[int]()
+    def order(each: Judged) -> float:
+        return each.size if sized else float(np.nanmedian(each.judgement.outcomes.energy))
 
-    def judge(*places: int) -> None:
-        some = [
-            at for at in places if 0 <= at < len(found.finalists) and at not in judged and at not in missing
-        ]
-        told(f"judging designs {len(judged) + 1} and on of at most {_MOST}")
-        calls = [_judging(space, found, at) for at in some]
-        for at, answer in zip(some, deal(executor, calls), strict=True):
-            missing.update([at] if answer is None else [])
-            judged.update({} if answer is None else {at: answer})
-
-    def met() -> list[int]:
-        return [at for at, each in judged.items() if each.verdict == MET]
-
-    top = found.start
-    judge(top, top - 1)
-    while space.sized and met() and (least := min(met())) > 0 and len(judged) < _MOST:
-        judge(least - 1, least - 2)
-        if min(met()) == least:
-            break
-    while not met() and top + 1 < len(found.finalists) and len(judged) < _MOST:
-        judge(top + 1, top + 2)
-        top += 2
-    if not space.sized:
-        # The search knows the gas of few devices alone.
-        judge(top + 1, top + 2)
-
-    def order(at: int) -> float:
-        return at if space.sized else float(np.nanmedian(judged[at].outcomes.energy))
-
-    best = min(met(), key=order, default=None)
-    return max(judged, key=lambda at: judged[at].fraction.value, default=-1) if best is None else best, judged
+    best = min((each for each in judged if each.met), key=order, default=None)
+    return best or max(judged, key=lambda each: each.judgement.fraction.value, default=None)
 
 
-def _judging(space: Space, found: Hunt, at: int) -> Callable[[], Judgement | None]:
-    finalist = found.finalists[at]
-    search = found.whole and not space.sets_controller
-    return partial(
-        judged_design,
-        space.hasty,
-        finalist.point,
-        place=finalist.place,
-        settings=finalist.settings,
-        search=search,
-    )
+def _smaller(judged: Sequence[Judged], best: Judged) -> tuple[float, Proportion] | None:
+    below = [each for each in judged if each.size < best.size]
+    next_one = max(below, key=lambda each: each.size, default=None)
+    return None if next_one is None else (next_one.size, next_one.judgement.fraction)
 
 
-def _smaller(found: Hunt, place: int, judged: Mapping[int, Judgement]) -> tuple[float, Proportion] | None:
-    below = [at for at in judged if found.finalists[at].size < found.finalists[place].size]
-    if not below:
-        return None
-    at = max(below, key=lambda each: found.finalists[each].size)
-    return found.finalists[at].size, judged[at].fraction
-
-
-def _doubt(found: Hunt, place: int, judgement: Judgement) -> float | None:
-    """Half-width of the fraction over its growth per logarithm of the size, by the surface."""
-    rows, share = found.finalists, judgement.fraction
-    low, high = rows[max(place - _SLOPE, 0)], rows[min(place + _SLOPE, len(rows) - 1)]
-    rise = high.promise - low.promise
-    return (share.high - share.low) / 2 * math.log(high.size / low.size) / rise if rise > 0 else None
+def _doubt(races: Races, best: Judged) -> float | None:
+    """Half-width of the fraction over its growth with the logarithm of the size."""
+    share, rise = best.judgement.fraction, growth(races, best)
+    return (share.high - share.low) / 2 / rise if rise > 0 else None
 
 
 def _effects(
     space: Space,
-    best: Finalist,
+    best: Judged,
     settings: Settings,
     executor: Executor | None,
     whole: Callable[[], Judgement | None],
@@ -251,17 +206,18 @@ def _effects(
     """Of every key moved alone; and beside them the verdict on the design itself, which takes longest."""
     moves = [(path, change) for axis in space.axes for path, change in _moves(axis, best.point)]
     base = {path: value for path, value in best.point.items() if path in space.paths}
-    points = [space.followed({**base, **change}) for _, change in moves]
-    draws = Draws.block(FRESH, _DEVICES)
+    points = [best.point, *(space.followed({**base, **change}) for _, change in moves)]
+    draws = Draws.block(FRESH, _DEVICES, whole=False)
     calls = [partial(devices_row, space.hasty, point, settings=settings, draws=draws) for point in points]
-    judgement, *counts = deal(executor, [whole, *calls])
+    judgement, now, *moved = deal(executor, [whole, *calls])
     effects = [
         Effect(
             path=path,
             changes=change,
-            met=None if count is None else Proportion(count=count, of=_DEVICES),
+            met=None if then is None else Proportion(count=int(np.count_nonzero(then)), of=then.size),
+            compared=None if then is None or now is None else Paired.of(then, now),
         )
-        for (path, change), count in zip(moves, counts, strict=True)
+        for (path, change), then in zip(moves, moved, strict=True)
     ]
     return tuple(effects), judgement
 
@@ -282,15 +238,15 @@ def _moves(axis: Axis, point: Point) -> Sequence[tuple[str, dict[str, Any]]]:
     ]
 
 
-def _front(found: Hunt, asked: float, *, least: float) -> tuple[Candidate, ...]:
+def _front(races: Races, asked: float, *, least: float) -> tuple[Candidate, ...]:
     """The smallest first; of those that are nearly alike the first.
 
     Args: `least`: size of the design, m^3: smaller ones met what is required on few devices alone.
     """
     passing = [
         each
-        for each in sorted(found.candidates, key=lambda each: each.size)
-        if each.size >= least and each.race.meets.size == DEVICES and each.race.fraction >= found.threshold
+        for each in sorted(races.candidates, key=lambda each: each.size)
+        if each.size >= least and each.race.meets.size >= DEVICES and each.race.fraction >= races.threshold
     ]
 
     def of(each: Candidate) -> tuple[float, float, float]:

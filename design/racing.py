@@ -15,12 +15,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, Draws, Settings, quick_balancer
-from ringbalance.controller.judging.judge import Judgement, judged_all
+from ringbalance.controller.balancer import Balancer, Demand, Draws, Outcomes, Settings, quick_balancer
+from ringbalance.controller.judging.judge import FRESH, Judgement, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
 from ringbalance.design.static import FAULTS, point_scene
+from ringbalance.results.requirements import OPEN
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
@@ -37,6 +38,10 @@ _WATCHED: Final = 10.0
 """s, for which a race watches a device that has held its limit; a verdict watches longer."""
 _KEPT: Final = (39, 8, 1)
 """Settings at most that go on after each heat but the last."""
+_CHOSEN: Final = 256
+"""Devices of a verdict that choose between settings; the best goes on."""
+_SURELY: Final = 3.0
+"""Standard deviations, from which on fewer devices than all decide."""
 _BEHIND: Final = 2
 """Devices by which settings may be behind the best after a heat."""
 _LEFT: Final = 0.2
@@ -51,8 +56,6 @@ class Race:
     """None: under the scene's own settings."""
     settings: Settings
     """By path, SI."""
-    block: int = 0
-    """Of `DEVICES` devices each, from which those are that ran."""
     meets: BoolArray
     """Of each device that ran."""
     times: FloatArray
@@ -72,8 +75,9 @@ class Race:
 
     @cached_property
     def gas(self) -> float:
-        """Median over the devices, J."""
-        return float(np.median(self.energy)) if self.energy.size else math.inf
+        """Median over the devices that ran, J; infinite where none did."""
+        ran = self.energy[np.isfinite(self.energy)]
+        return float(np.median(ran)) if ran.size else math.inf
 
     def time(self, fraction: float) -> float:
         """By which a fraction of the devices has settled, s."""
@@ -158,7 +162,7 @@ def _settings(trials: Trials, levels: tuple[float, ...]) -> Settings | None:
 def _raced(
     balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], asked: float, block: int
 ) -> Race:
-    running = [Race(place=place, settings=settings, block=block, **_NOBODY) for place, settings in field]
+    running = [Race(place=place, settings=settings, **_NOBODY) for place, settings in field]
     first, start = 0, block * DEVICES
     for heat, last in enumerate(HEATS):
         running = sorted(
@@ -175,16 +179,17 @@ def _heat(balancer: Balancer, races: Sequence[Race], numbers: Sequence[int]) -> 
     draws, demands = Draws(numbers=tuple(numbers), whole=False), balancer.demands()
     ran = balancer.run_all([each.settings for each in races], draws, further=_WATCHED)
     return [
-        each.joined(
-            replace(
-                each,
-                meets=np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0)),
-                times=outcomes.settling_time,
-                energy=outcomes.energy,
-            )
-        )
+        each.joined(replace(each, **_outcome(demands, outcomes)))
         for each, outcomes in zip(races, ran, strict=True)
     ]
+
+
+def _outcome(demands: Sequence[Demand], outcomes: Outcomes) -> dict[str, Any]:
+    return {
+        "meets": np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0)),
+        "times": outcomes.settling_time,
+        "energy": outcomes.energy,
+    }
 
 
 _NOBODY: Final[dict[str, Any]] = {
@@ -201,12 +206,13 @@ def judged_design(
     place: Place | None = None,
     settings: Settings | None = None,
     search: bool = False,
+    whole: bool = False,
 ) -> Judgement | None:
     """The settings that serve most devices of a design; None: it breaks down.
 
-    Judged on devices on which nothing was chosen.
+    Judged on devices on which nothing was chosen, the same for every design.
     Args: `place`, `settings`: some to judge; without any the scene's own. `search`: whether others
-        are looked for as `tune` does.
+        are looked for as `tune` does. `whole`: as `Draws`.
     """
     try:
         balancer = quick_balancer(point_scene(scene, point))
@@ -214,10 +220,39 @@ def judged_design(
         tried += [] if settings is None else [settings]
         tried += [searched(balancer)] if search else []
         fresh = [each for i, each in enumerate(tried or [{}]) if each not in tried[:i]]
-        judged = judged_all(balancer, fresh)
+        return _judged(balancer, fresh, whole=whole)
     except (SceneError, *FAULTS):
         return None
-    return max(judged, key=lambda each: each.fraction.value, default=None)
+
+
+def judged_race(judgement: Judgement, place: Place | None) -> Race:
+    """A judgement as a race of one setting."""
+    outcome = _outcome(judgement.demands, judgement.outcomes)
+    return Race(place=place, settings=judgement.settings, **outcome)
+
+
+def _judged(balancer: Balancer, settings: Sequence[Settings], *, whole: bool) -> Judgement | None:
+    """The best of some settings, on as many devices as a verdict takes.
+
+    A look before the last ends only what is three standard deviations from what is asked, so that a design at
+    the edge is decided by all devices and not by the first look at which it happens to be above.
+    Source: Haybittle, "Repeated Assessment of Results in Clinical Trials of Cancer Treatment", British
+        Journal of Radiology 44 (1971).
+    """
+    few, most = balancer.verdict_draws
+    best, running, first = None, list(settings), 0
+    done: list[Judgement] = []
+    for last in sorted({few, min(_CHOSEN, most), most}):
+        count, start = last - first, FRESH + first
+        ran = judged_all(balancer, running, first=count, most=count, start=start, whole=whole)
+        done = [a.joined(b) for a, b in zip(done, ran, strict=True)] if done else list(ran)
+        best = max(done, key=lambda each: each.fraction.value, default=None)
+        if best is None or best.fraction.verdict(best.asked, deviations=_SURELY) != OPEN:
+            break
+        if last >= _CHOSEN:
+            done, running = [best], [best.settings]
+        first = last
+    return best
 
 
 def tuned_settings(scene: SceneFile, point: Point) -> Settings | None:
@@ -228,11 +263,11 @@ def tuned_settings(scene: SceneFile, point: Point) -> Settings | None:
         return None
 
 
-def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> int | None:
-    """How many of some devices meet what is required; None: the point is refused or breaks down."""
+def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> BoolArray | None:
+    """Which devices meet what is required; None: the point is refused or breaks down."""
     try:
         balancer = quick_balancer(point_scene(scene, point))
-        (outcomes,) = balancer.run_all([settings], draws)
-        return int(np.count_nonzero(np.all([each.met(outcomes) for each in balancer.demands()], axis=0)))
+        (outcomes,) = balancer.run_all([settings], draws, further=_WATCHED)
+        return np.asarray(np.all([each.met(outcomes) for each in balancer.demands()], axis=0))
     except (SceneError, *FAULTS):
         return None

@@ -11,10 +11,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.judging.tuning import setting_text
 from ringbalance.design.axes import Axis, Point, Range, plan_of, plan_of_texts
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.describe import setting_text
+from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
@@ -219,12 +219,14 @@ def _valves(scene: Scene) -> tuple[Axis, ...]:
 
 
 def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
-    """An error of an axis as one of the scene's key that has it."""
+    """An error of an axis as one of the scene's key that has it; one of a file of valves as it is."""
+    if fault.file != COMMAND_LINE:
+        return fault
     return Fault(
         file=scene.file,
         table="design",
         key=key,
-        value=fault.value or toml_text(fault.file),
+        value=toml_text(scene.design.valve_file) if key == "valve_file" else fault.value,
         problem=fault.problem,
         allowed=fault.allowed,
     )

@@ -1,75 +1,112 @@
 """Fraction of the devices that designs serve, as a smooth function of their places.
 
-Each design ran as some devices of one block.  The logit of the fraction is a quadratic of the coordinates and
-an effect of the block, fitted to the counts; normal priors hold what few designs determine.  So many designs
-of 64 devices say together what each of them says within 3 % alone.
+The logit of the fraction is a Gaussian process of the coordinates, seen through the counts of the designs
+that ran; how fast it changes along each coordinate follows from the counts themselves.  So many designs of 64
+devices say together what each of them says within 3 % alone, and a cliff in one direction does not hide what
+another does on the plain behind it.
+Source: Rasmussen and Williams, "Gaussian Processes for Machine Learning" (2006), algorithm 2.1, equations
+    4.17 (Matern, 5/2) and 5.9; the logit of a count and its variance: Haldane, "The Estimation and
+    Significance of the Logarithm of a Ratio of Frequencies", Annals of Human Genetics 20 (1956).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
-from scipy.special import expit
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize
 
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.draws import BLOCK
 
-_WIDE, _CURVED, _BLOCK = 10.0, 5.0, 0.3
-"""Standard deviations of the priors in logits: of constant and slopes, of curvatures, of a block's effect."""
-_STEPS: Final = 25
-"""Of Newton's method, which needs some six."""
-_LONGEST: Final = 2.0
-"""Step of the logits at the most."""
+_PRIOR: Final = (2.0, 0.5)
+"""Standard deviation of the process in logits and lengths on which it changes: medians of their priors, whose
+logarithms have a standard deviation of 1."""
+_LEVEL: Final = 1.0
+"""Standard deviation of the process's mean, in logits."""
+_EVEN: Final = 0.5
+"""Variance of the count of a block, relative to that of independent devices: the block's inputs are spread
+evenly."""
+_ROUGH: Final = 0.01
+"""Variance of what is not smooth, such as the settings that served best."""
+_STEPS: Final = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
-    """Normal approximation of the coefficients."""
+    """The process, given the counts."""
 
-    centre: FloatArray
-    """Coordinates about which powers are taken, shape (k,)."""
-    mean: FloatArray
-    covariance: FloatArray
+    places: FloatArray
+    """Of the designs, shape (n, k)."""
+    mean: float
+    scale: float
+    """Standard deviation, in logits."""
+    lengths: FloatArray
+    """Shape (k,)."""
+    factor: tuple[FloatArray, bool]
+    """Of the covariance of what was counted, as `scipy.linalg.cho_factor` has it."""
+    weights: FloatArray
+    """Inverse of that covariance times what was counted, shape (n,)."""
 
     @classmethod
-    def of(
-        cls, places: FloatArray, *, met: IntArray, devices: IntArray, blocks: IntArray, weights: FloatArray
-    ) -> Surface:
-        """Fit.
-
-        Args: `places`: coordinates, shape (n, k). `met`, `devices`: counts of each design. `blocks`: number
-            of its block. `weights`: of the counts, from 0 to 1, less for designs far away.
-        """
-        centre = np.average(places, axis=0, weights=weights)
-        terms = _terms(places - centre)
-        effects = (blocks[:, np.newaxis] == np.unique(blocks)).astype(np.float64)
-        x, k = np.hstack([terms, effects]), places.shape[1]
-        widths = np.concatenate(
-            [
-                np.full(1 + k, _WIDE),
-                np.full(terms.shape[1] - 1 - k, _CURVED),
-                np.full(effects.shape[1], _BLOCK),
-            ]
+    def of(cls, places: FloatArray, *, met: IntArray, devices: IntArray) -> Surface:
+        """Args: `places`: coordinates, shape (n, k). `met`, `devices`: counts of each design."""
+        seen = np.log((met + 0.5) / (devices - met + 0.5))
+        even = np.where(devices >= BLOCK, _EVEN, 1.0)
+        noise = even * (1 / (met + 0.5) + 1 / (devices - met + 0.5)) + _ROUGH
+        mean = float(np.average(seen, weights=1 / (noise + 1.0)))
+        start = np.log([_PRIOR[0], *[_PRIOR[1]] * places.shape[1]])
+        apart = (places[:, np.newaxis] - places) ** 2
+        loss = partial(_loss, start=start, apart=apart, seen=seen - mean, noise=noise)
+        best = np.exp(minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": _STEPS}).x)
+        covariance = best[0] ** 2 * _matern(_distance(apart, best[1:])) + _LEVEL**2
+        factor = cho_factor(covariance + np.diag(noise), lower=True)
+        return cls(
+            places=places,
+            mean=mean,
+            scale=float(best[0]),
+            lengths=best[1:],
+            factor=factor,
+            weights=cho_solve(factor, seen - mean),
         )
-        prior, mean = np.diag(widths**-2.0), np.zeros(x.shape[1])
-        for _ in range(_STEPS):
-            fraction = expit(x @ mean)
-            force = x.T @ (weights * (met - devices * fraction)) - prior @ mean
-            curvature = (x.T * (weights * devices * fraction * (1 - fraction))) @ x + prior
-            step = np.linalg.solve(curvature, force)
-            mean = mean + step * min(1.0, _LONGEST / max(float(np.max(np.abs(x @ step))), 1e-9))
-        size = terms.shape[1]
-        return cls(centre=centre, mean=mean[:size], covariance=np.linalg.inv(curvature)[:size, :size])
 
     def logits(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Logits of the fractions at places, shape (n, k), and their standard deviations."""
-        terms = _terms(places - self.centre)
-        spread = np.sqrt(np.einsum("ni,ij,nj->n", terms, self.covariance, terms))
-        return np.asarray(terms @ self.mean), np.asarray(spread)
+        apart = (places[:, np.newaxis] - self.places) ** 2
+        shared = self.scale**2 * _matern(_distance(apart, self.lengths)) + _LEVEL**2
+        known = np.einsum("ij,ji->i", shared, cho_solve(self.factor, shared.T))
+        variance = np.maximum(self.scale**2 + _LEVEL**2 - known, 0.0)
+        return self.mean + shared @ self.weights, np.sqrt(variance)
 
 
-def _terms(z: FloatArray) -> FloatArray:
-    """Powers up to the second, shape (n, 1 + k + k (k + 1)/2)."""
-    one, other = np.triu_indices(z.shape[1])
-    return np.hstack([np.ones((len(z), 1)), z, z[:, one] * z[:, other]])
+def _loss(
+    parameters: FloatArray, *, start: FloatArray, apart: FloatArray, seen: FloatArray, noise: FloatArray
+) -> tuple[float, FloatArray]:
+    """Minus the logarithm of the parameters' posterior density, with its gradient.
+
+    Args: `parameters`: logarithms of scale and lengths. `start`: means of their priors. `apart`: squared
+        differences of coordinates, shape (n, n, k).
+    """
+    scale, lengths = np.exp(2 * parameters[0]), np.exp(parameters[1:])
+    distance = _distance(apart, lengths)
+    smooth = scale * _matern(distance)
+    factor = cho_factor(smooth + _LEVEL**2 + np.diag(noise), lower=True)
+    weights = cho_solve(factor, seen)
+    from_prior = parameters - start
+    loss = 0.5 * seen @ weights + np.sum(np.log(np.diag(factor[0]))) + 0.5 * from_prior @ from_prior
+    change = cho_solve(factor, np.eye(seen.size)) - np.outer(weights, weights)
+    steep = change * (scale * 5 / 3 * (1 + distance) * np.exp(-distance))
+    by_length = 0.5 * np.einsum("ij,ijk->k", steep, apart) / lengths**2
+    return float(loss), from_prior + np.array([np.sum(change * smooth), *by_length])
+
+
+def _distance(apart: FloatArray, lengths: FloatArray) -> FloatArray:
+    return np.sqrt(5 * (apart @ lengths**-2.0))
+
+
+def _matern(distance: FloatArray) -> FloatArray:
+    """Correlation at a distance in lengths, times the root of 5."""
+    return np.asarray((1 + distance + distance**2 / 3) * np.exp(-distance))

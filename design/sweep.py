@@ -14,15 +14,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.design.axes import Plan, Point, unit_of_path
+from ringbalance.design.axes import Axis, Plan, Point, unit_of_path
 from ringbalance.design.sensitivity import first_order, total_order
 from ringbalance.design.static import EMPTY, Record, content_of, point_scene, reach_of, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import given as given_text
+from ringbalance.results.numbers import percent
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
 from ringbalance.results.rows import Finding, Quantity, around
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
@@ -42,6 +44,12 @@ _OF_RUNS: Final = {
     "settling_time_high": ("settling_time high", "s"),
 }
 """Columns of runs: name and SI unit."""
+
+
+Shares = dict[str, dict[str, tuple[float, float]]]
+"""By result and axis, which its first key or the column of its names stands for: the share of the result's
+variance, and the half-width of that (95 %).
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -102,17 +110,23 @@ class Sweep(Result):
             ranked = [(None if value is None else -value, i) for value, i in ranked]
         return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
 
+    @cached_property
+    def nearest(self) -> int | None:
+        """Where runs show no feasible point, the one that serves most devices; None where none serves any."""
+        ranked = [(run["fraction"] or 0.0, -i) for i, run in enumerate(self.driven)]
+        fraction, place = max(ranked, default=(0.0, 0))
+        return -place if self.runs and self.best is None and fraction > 0 else None
+
     def point_scene(self, row: int) -> SceneFile:
         """The scene of a row. Raises: SceneError: the row was refused, or there is none."""
-        if not 0 <= row < len(self.points):
-            allowed = f"0 to {len(self.points) - 1}"
-            raise SceneError.of_option(option="--write", value=row, problem="no such row", allowed=allowed)
+        check_rows([row], len(self.points))
         return point_scene(self.scene, self.points[row])
 
     def columns(self) -> dict[str, list[Any]]:
         """The table, one list a column, by name with SI unit such as "velocity [m/s]".
 
-        In this order: `row`; the changed keys by path; static answers, each with the half-width of its
+        In this order: `row`; the changed keys by path, those of a list with names behind these, such as
+        "gas.name"; static answers, each with the half-width of its
         interval (95 %, by the uncertain inputs; only with `intervals`); with runs `devices`, `fraction` with
         its bounds, and `settling_time` with its upper one; `status`, `verdict`, `finding` (why a point has no
         answer) and `scene sha256`. None where a value is not known.
@@ -124,10 +138,7 @@ class Sweep(Result):
         of_runs = _OF_RUNS if self.runs else {}
         return [
             ("row", "", list(range(len(self.points)))),
-            *(
-                (path, unit_of_path(self.scene, path), [point.get(path) for point in self.points])
-                for path in self.plan.paths
-            ),
+            *self._changed_columns(),
             *self._static_columns(),
             *((name, unit, [run[key] for run in self.driven]) for key, (name, unit) in of_runs.items()),
             ("status", "", [row["status"] for row in self.static]),
@@ -135,6 +146,13 @@ class Sweep(Result):
             ("finding", "", self.failures),
             ("scene sha256", "", [row["sha256"] for row in self.static]),
         ]
+
+    def _changed_columns(self) -> Iterator[tuple[str, str, list[Any]]]:
+        for axis in self.plan.axes:
+            if axis.names:
+                yield axis.head, "", [axis.name_of(point) for point in self.points]
+            for path in axis.paths:
+                yield path, unit_of_path(self.scene, path), [point.get(path) for point in self.points]
 
     def _static_columns(self) -> Iterator[tuple[str, str, list[Any]]]:
         units = {name: unit for row in self.static for name, unit in row["units"].items()}
@@ -182,23 +200,38 @@ class Sweep(Result):
         source = {"title": self.scene.name, "source": f"ringbalance sweep of {self.scene.source}"}
         return dataset(variables, coords=coords, attrs=source | {"scene_sha256": self.scene.sha256})
 
-    def sensitivity(self, *, total: bool = False) -> dict[str, dict[str, tuple[float, float]]]:
-        """By result and varied number: the share of the variance that it explains, and its half-width (95 %).
+    def sensitivity(self, *, total: bool = False) -> Shares:
+        """By result and axis: the share of the variance that it explains, and its half-width (95 %).
 
         Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.  A share
         below zero, or shares that sum to more than 1, are noise of the sample: an interval that holds zero
         shows no influence, and more points narrow it.
         Args: `total`: whether what it explains together with others counts too, see `total_order`.
         """
+        changed = {*self.plan.paths, *(axis.head for axis in self.plan.axes)}
+        names = [name for name, _, _ in self.fields() if name not in changed]
+        return self._shares(names, total=total)
+
+    @cached_property
+    def _main_shares(self) -> Shares:
+        """Of the result by which the best point is chosen."""
+        return self._shares(["fraction" if self.runs else "reach"])
+
+    def _shares(self, names: Sequence[str], *, total: bool = False) -> Shares:
         columns = {name: _array(values) for name, _, values in self.fields()}
         numbers = {name: each for name, each in columns.items() if each.dtype == np.float64}
-        paths = [path for path in self.plan.paths if path in numbers] if self.plan.sample else []
+        for axis in self.plan.axes:
+            if axis.names:
+                numbers[axis.head] = np.array([axis.names.index(each) for each in columns[axis.head]], float)
+        paths = [axis.head for axis in self.plan.axes if axis.head in numbers] if self.plan.sample else []
         found = {}
-        for name, each in numbers.items() if paths else ():
-            known = np.isfinite(np.array([each, *(numbers[path] for path in paths)])).all(axis=0)
-            if name not in paths and known.any():
+        for name in names if paths else ():
+            if name not in numbers:
+                continue
+            known = np.isfinite(np.array([numbers[each] for each in (name, *paths)])).all(axis=0)
+            if known.any():
                 inputs = np.array([numbers[path][known] for path in paths]).T
-                shares, widths = (total_order if total else first_order)(inputs, each[known])
+                shares, widths = (total_order if total else first_order)(inputs, numbers[name][known])
                 if np.isfinite(shares).all():
                     found[name] = dict(
                         zip(paths, zip(shares.tolist(), widths.tolist(), strict=True), strict=True)
@@ -206,22 +239,29 @@ class Sweep(Result):
         return found
 
     def grid(self) -> dict[str, list[Any]]:
-        """Values by path of a grid whose axes are one key each, the last fastest; else "row" with numbers."""
-        if self.plan.sample or any(len(axis.paths) != 1 for axis in self.plan.axes):
+        """Values of each axis of a grid, the last fastest: names of its rows, else its first key; of a sample
+        "row" with numbers."""
+        if self.plan.sample:
             return {"row": list(range(len(self.points)))}
-        return {axis.paths[0]: [point[axis.paths[0]] for point in axis.grid()] for axis in self.plan.axes}
+        return {
+            axis.head: list(axis.names) or [point[axis.head] for point in axis.grid()]
+            for axis in self.plan.axes
+        }
 
-    def plot(self, folder: str | PathLike[str]) -> tuple[Path, ...]:  # type: ignore[override]
-        """Draw the map or curves of the sweep into a folder: feasible points, their boundary, the best.
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Draw the map or curves of the sweep: feasible points, their boundary, the best.
 
-        Returns: The files. Raises: OSError: they cannot be written.
+        Args: `path`: a folder for an SVG file each; None: none.
+        Returns: The files, or without a folder figures that a notebook shows; `svg()` has them as text.
+        Raises: OSError: a file cannot be written.
         """
-        files: tuple[Path, ...] = registered("function", "sweep_figures")(self, Path(folder))
-        return files
+        if path is None:
+            return super().plot()
+        return registered("function", "sweep_figures")(self, Path(path))
 
     def to_dict(self) -> Record:
         """What `ringbalance sweep --json` prints: the summary; the table is `columns`."""
-        scene, best = self.scene, self.best
+        scene, best, nearest = self.scene, self.best, self.nearest
         return {
             "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
             "balancer": scene.balancer,
@@ -230,8 +270,10 @@ class Sweep(Result):
             "points": len(self.points),
             "runs": self.runs,
             "verdicts": dict(Counter(self.verdicts)),
-            "best": None if best is None else {"row": best, "changes": dict(self.points[best])},
+            "best": None if best is None else self._place(best),
+            "nearest": None if nearest is None else self._place(nearest),
             "left_out": list(self.errors),
+            "sensitivity": self._main_shares,
             "times": dict(self.designs_per_second),
             "resumed": dict(self.resumed),
             **self.rows().document(),
@@ -253,7 +295,7 @@ class Sweep(Result):
             title=f"Sweep of {self.scene.name} ({self.scene.source})",
             quantities=tuple(quantities),
             findings=tuple(self._findings()),
-            tables=(self._verdict_table(), self._best_table()),
+            tables=tuple(self._tables()),
         )
 
     def _findings(self) -> list[Finding]:
@@ -264,38 +306,94 @@ class Sweep(Result):
             found.append(Finding(code="sweep_resumed", values={"count": kept, "what": what}))
         if best is not None:
             found.append(Finding(code="sweep_best", values={"row": best, "changes": self._change_text(best)}))
+        if (nearest := self.nearest) is not None:
+            fraction = self.driven[nearest]["fraction"]
+            values = {"row": nearest, "changes": self._change_text(nearest), "fraction": fraction}
+            found.append(Finding(code="sweep_nearest", values=values))
         if failed := [text for text in self.failures if text]:
             found.append(Finding(code="sweep_refused", values={"count": len(failed), "text": failed[0]}))
         tolerance = float(getattr(self.scene, "tolerance", math.inf))
-        for each in self.errors:
-            code = "sweep_left_out" if each["error"] <= tolerance else "sweep_too_coarse"
-            found.append(Finding(code=code, values={**each, "tolerance": tolerance}))
+        found += [
+            Finding(code="sweep_too_coarse", values={**each, "tolerance": tolerance})
+            for each in self.errors
+            if each["error"] > tolerance
+        ]
+        if self.errors:
+            worst = max(self.errors, key=lambda each: float(each["error"]))
+            found.append(Finding(code="sweep_left_out", values={**worst, "tolerance": tolerance}))
         return found
 
     def _change_text(self, row: int) -> str:
-        return ", ".join(
-            f"{path} = {given(value, unit_of_path(self.scene, path)) if isinstance(value, float) else value}"
-            for path, value in self.points[row].items()
-        )
+        return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)
 
-    def _verdict_table(self) -> Table:
+    def axis_text(self, axis: Axis, row: int) -> str:
+        """What a row has of an axis: the name where it was chosen by name, else keys with values."""
+        point = self.points[row]
+        if axis.names:
+            return f"{axis.head} = {axis.name_of(point)}"
+        return ", ".join(f"{path} = {setting_text(path, point.get(path))}" for path in axis.paths)
+
+    def _place(self, row: int) -> Record:
+        """A row as the summary names it."""
+        point = self.points[row]
+        names = {axis.head: axis.name_of(point) for axis in self.plan.axes if axis.names}
+        return {"row": row, "changes": dict(point), "names": names}
+
+    def _tables(self) -> Iterator[Table]:
         counts = Counter(self.verdicts)
-        return Table(heads=("verdict", "points"), rows=[(name, str(n)) for name, n in counts.most_common()])
+        yield Table(heads=("verdict", "points"), rows=[(name, str(n)) for name, n in counts.most_common()])
+        yield from self._best_table()
+        yield from self._shares_table()
+        yield from self._left_out_table()
 
-    def _best_table(self) -> Table:
-        best = self.best
-        if best is None:
-            return Table(heads=("quantity", "value"), rows=[])
-        row = self.static[best]
-        known = [
-            (name, value, width or 0.0) for name, (value, width) in row["values"].items() if value is not None
+    def _best_table(self) -> Iterator[Table]:
+        """What the best or the nearest point comes to."""
+        place = self.nearest if self.best is None else self.best
+        if place is None:
+            return
+        row, run = self.static[place], self.driven[place]
+        answers = {name: (pair, row["units"][name]) for name, pair in row["values"].items()}
+        cells = [
+            (name, Quantity(key=name, name=name, value=value, unit=unit, lower=low, upper=high).text)
+            for name, ((value, width), unit) in answers.items()
+            if value is not None
+            for low, high in (around(value, width or 0.0),)
         ]
-        cells = []
-        for name, value, width in known:
-            low, high = around(value, width)
-            shown = Quantity(key=name, name=name, value=value, unit=row["units"][name], lower=low, upper=high)
-            cells.append((name, shown.text))
-        return Table(caption=f"Row {best}", heads=("quantity", "value"), rows=cells)
+        if self.runs:
+            shown = ("fraction low", "fraction", "fraction high", "settling_time")
+            cells = [
+                ("devices", str(run["devices"])),
+                *(
+                    (name, given_text(run[key], unit, digits=3))
+                    for key, (name, unit) in _OF_RUNS.items()
+                    if name in shown
+                ),
+                *cells,
+            ]
+        what = "Nearest" if self.best is None else "Best"
+        yield Table(caption=f"{what}: row {place}", heads=("quantity", "value"), rows=cells)
+
+    def _shares_table(self) -> Iterator[Table]:
+        for name, shares in self._main_shares.items():
+            rows = [(path, percent(share), percent(width)) for path, (share, width) in shares.items()]
+            heads = ("key", "share of its variance", "half-width, 95 %")
+            yield Table(caption=f"What decides {name.replace('_', ' ')}", heads=heads, rows=rows)
+
+    def _left_out_table(self) -> Iterator[Table]:
+        rows = [
+            (each["quantity"], percent(each["error"]), percent(each["uncertainty"])) for each in self.errors
+        ]
+        heads = ("quantity", "rows err by at most", "the models themselves")
+        if rows:
+            yield Table(caption="Beside a calibration of some rows", heads=heads, rows=rows)
+
+
+def check_rows(rows: Sequence[int], count: int) -> None:
+    """Raises: SceneError: a row that a table of so many rows does not have."""
+    for row in rows:
+        if not 0 <= row < count:
+            allowed = f"0 to {count - 1}"
+            raise SceneError.of_option(option="--write", value=row, problem="no such row", allowed=allowed)
 
 
 def _array(values: Sequence[Any]) -> Any:

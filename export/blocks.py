@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import cmath
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from types import ModuleType
 from typing import Any, Final, Literal
 
+import numpy as np
+
 from ringbalance.controller.algorithms.built_in import TargetVector
+from ringbalance.controller.algorithms.law_based import LawBased
+from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import chamber, controller, disc
+from ringbalance.export import chamber, controller, disc, law_based
 from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -32,6 +36,8 @@ Kind = Literal["law", "disc", "controller"]
 Numbers = tuple[float, ...]
 _LONGEST: Final = 1e-3
 """s, of a part of a step of the disc."""
+_LONGEST_FOLLOWED: Final = 5e-3
+"""s, the same of the liquid that a controller follows."""
 _OF_LINE: Final = 0.04
 """Of the line's time constant: near its end a pressure changes some fifty times as fast, and the method is
 stable up to 2.8 of the reciprocal."""
@@ -151,19 +157,10 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
     Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack, or
         inputs that were fitted together.
     """
-    if law.moment.across is not None:
-        raise SceneError.of_file(
-            scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
-        )
-    compact = compact_law(scene=scene, law=law, uncertainty=False)
-    constants = [*compact.constants, *_disc_numbers(scene, law)]
-    constants[point.BLOCK] = float(len(compact.constants))
-    half, fill, ambient = scene.disc.chambers // 2, scene.disc.initial_fill, scene.gas.ambient_pressure
-    row = [0.0] * (disc.FIRST_PAIR + disc.PER_PAIR * half)
-    content = ambient * disc.gas_volume(constants, fill) / scene.gas.temperature
-    for pair in range(half):
-        at = disc.FIRST_PAIR + disc.PER_PAIR * pair
-        row[at : at + disc.STATES] = [fill, ambient, ambient, content, content]
+    gas, half = scene.gas, scene.disc.chambers // 2
+    given = {FILLING: gas.conductance, LAG: gas.valve_lag}
+    modelled = [term for term, value in given.items() if value is not None]
+    compact, constants, row = _disc(scene, law, modelled)
     disc.show(constants, compact.tables.cells, compact.tables.pieces, row)
 
     def place(offset: str, chamber: int | None) -> int:
@@ -187,12 +184,29 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
     )
 
 
-def _disc_numbers(scene: Scene, law: CalibratedLaw) -> Numbers:
+def _disc(
+    scene: Scene, law: CalibratedLaw, modelled: Collection[str]
+) -> tuple[CompactLaw, list[float], list[float]]:
+    """Its law, the numbers of both, and its row at the start."""
+    if law.moment.across is not None:
+        raise SceneError.of_file(
+            scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
+        )
+    compact = compact_law(scene=scene, law=law, uncertainty=False)
+    constants = [*compact.constants, *_disc_numbers(scene, law, modelled)]
+    constants[point.BLOCK] = float(len(compact.constants))
+    half, fill, ambient = scene.disc.chambers // 2, scene.disc.initial_fill, scene.gas.ambient_pressure
+    row = [0.0] * (disc.FIRST_PAIR + disc.PER_PAIR * half)
+    content = ambient * disc.gas_volume(constants, fill) / scene.gas.temperature
+    for pair in range(half):
+        at = disc.FIRST_PAIR + disc.PER_PAIR * pair
+        row[at : at + disc.STATES] = [fill, ambient, ambient, content, content]
+    return compact, constants, row
+
+
+def _disc_numbers(scene: Scene, law: CalibratedLaw, modelled: Collection[str]) -> Numbers:
     """What `disc` finds behind the law."""
     gas, rotor, half = scene.gas, scene.rotor, scene.disc.chambers // 2
-    modelled = [
-        name for name, given in ((FILLING, gas.conductance), (LAG, gas.valve_lag)) if given is not None
-    ]
     dynamics = dynamics_of(scene=scene, model=BalancerModel.of(law), modelled=modelled)
     plant = dynamics.plant(total=2 * scene.disc.initial_fill)[0]
     least = (1 - law.max_fill_ratio) * law.chamber_volume + dynamics.dead_volume
@@ -227,18 +241,16 @@ def _parts(value: complex) -> tuple[float, float]:
     return value.real, value.imag
 
 
-def controller_block(scene: Scene) -> Block:
-    """The target-vector controller with the scene's settings.
+def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
+    """The control algorithm with the scene's settings. Args: `law`: calibrated, for the law-based one.
 
-    Raises: SceneError: another algorithm.
+    Raises: SceneError: another algorithm, or as `disc_block` for the law-based one.
     """
-    kind = scene.controller.kind
-    if kind != "target_vector":
-        problem = f"the controller {kind!r} runs in this program alone and is not exported"
-        allowed = (
-            'controller.kind = "target_vector", with the settings that `ringbalance tune` names as the '
-            "best of that kind"
-        )
+    if scene.controller.kind == "law_based" and law is not None:
+        return _law_based_block(scene, law)
+    if scene.controller.kind != "target_vector":
+        problem = f"the controller {scene.controller.kind!r} runs in this program alone and is not exported"
+        allowed = 'controller.kind = "target_vector" or "law_based"'
         raise SceneError.of_file(scene.file, problem, allowed)
     chambers = scene.disc.chambers
 
@@ -258,6 +270,51 @@ def controller_block(scene: Scene) -> Block:
         start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
         modules=(point, controller),
         steps="step",
+        timed=True,
+        variables=_variables("controller", place, chambers=chambers),
+    )
+
+
+def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
+    compact, constants, row = _disc(scene, law, ())
+    half, chambers = scene.disc.chambers // 2, scene.disc.chambers
+    d, r = len(compact.constants), len(row)
+    # It follows the liquid of whole injections: none is cut, and parts may be long.
+    constants[d + disc.RESIDUAL], constants[d + disc.LONGEST] = -1.0, _LONGEST_FOLLOWED
+    loop, run = np.zeros(1, dtype=LOOP)[0], np.zeros(1, dtype=RUN)[0]
+    LawBased(scene=scene, model=BalancerModel.of(law)).fill(loop, run)
+    constants += (
+        float(loop["rest_limit"]),
+        float(loop["minimum_gas_time"]),
+        float(loop["maximum_gas_time"]),
+        float(loop["probe"]),
+        float(loop["least_fill"]),
+        abs(complex(loop["influence"])),
+        float(loop["law_deviation"]) ** 2,
+        float(loop["assumed_amplitude_noise"]) ** 2,
+        float(loop["assumed_phase_noise"]) ** 2,
+        *loop["offset"][:chambers].tolist(),
+    )
+    first_chamber = r + law_based.FIRST_CHANGE + law_based.PER_CHANGE * half
+    row += [0.0] * (first_chamber - r + law_based.PER_CHAMBER * chambers)
+    row[r + law_based.LEARNT_X], row[r + law_based.LEARNT_Y] = _parts(complex(run["influence"]))
+    row[r + law_based.VARIANCE] = float(run["variance"])
+    names = {"VIBRATION_X": "SEEN_X", "VIBRATION_Y": "SEEN_Y", "RESTING": "RESTS"}
+
+    def place(offset: str, chamber: int | None) -> int:
+        value = int(getattr(law_based, names.get(offset, offset)))
+        return r + value if chamber is None else first_chamber + law_based.PER_CHAMBER * chamber + value
+
+    return Block(
+        kind="controller",
+        title="Law-based controller of a liquid-ring balancer",
+        scene=scene.file,
+        facts="Settings of the scene; the vibration enters by its components.\n   " + _tabulation(compact),
+        constants=tuple(constants),
+        tables=compact.tables,
+        start=tuple(row),
+        modules=(point, chamber, disc, law_based),
+        steps="control",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),
     )

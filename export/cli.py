@@ -88,10 +88,12 @@ def export(
 
 
 def _made(scene: Scene, block: Kind) -> tuple[Block, CompactLaw | None]:
-    if block == "controller":
+    if block == "controller" and scene.controller.kind != "law_based":
         return controller_block(scene), None
     with activity("export", "calibrating ..."):
         law = chamber_and_law(scene)[1]
+        if block == "controller":
+            return controller_block(scene, law), None
         if block == "disc":
             return disc_block(scene, law), None
         compact = compact_law(scene=scene, law=law)

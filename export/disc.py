@@ -250,18 +250,23 @@ def show(c: Law, k: Cells, p: Pieces, w: Query) -> None:
     w[VIBRATION_Y] = c[d + START_Y] + y
 
 
+def pass_pair(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: float) -> None:
+    """Let a time pass, s, for one pair."""
+    left = time
+    while left > 0.0:
+        settle(c, k, p, q, w, at)
+        part = length(c, w, at, left)
+        move(c, k, p, q, w, at, part)
+        tick(w, at, part)
+        left = left - part
+
+
 def step(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
     """Let a time pass, s, with each valve open from its beginning on for as long as is asked."""
     pair = 0
     while pair < int(c[int(c[BLOCK]) + PAIRS]):
         at = FIRST_PAIR + PER_PAIR * pair
         command(c, w, at)
-        left = time
-        while left > 0.0:
-            settle(c, k, p, q, w, at)
-            part = length(c, w, at, left)
-            move(c, k, p, q, w, at, part)
-            tick(w, at, part)
-            left = left - part
+        pass_pair(c, k, p, q, w, at, time)
         pair = pair + 1
     show(c, k, p, w)

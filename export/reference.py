@@ -22,7 +22,7 @@ _PRESSURES: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
 _OPENINGS: Final = (0.06, 0.02, 0.03)
 """s, asked of the disc's first chambers one after the other, five rows apart at least."""
 _TURN: Final = (3e-6, 0.0), (3e-6, 2e-6), (-1e-6, 1e-6), (-1e-9, 0.0)
-"""m, vibrations that the controller sees, 100 rows each."""
+"""m, vibrations that the controller sees, 60 rows each."""
 
 
 def reference_files(block: Block, name: str) -> dict[str, bytes]:
@@ -67,7 +67,7 @@ def _stimuli(block: Block) -> Iterator[Mapping[str, float]]:
                 yield {**zeros, name: max(opening - step * _STEP, 0.0)}
     else:
         for x, y in _TURN:
-            for _ in range(100):
+            for _ in range(60):
                 yield {**zeros, "vibration_x": x, "vibration_y": y}
 
 

@@ -108,9 +108,9 @@ def file_name(path: Path) -> str:
     return name if name.isprintable() else toml_text(name)
 
 
-def read_content(path: Path) -> tuple[bytes, tuple[Fault, ...]]:
+def read_content(path: Path, *, what: str = _WHAT) -> tuple[bytes, tuple[Fault, ...]]:
     """The bytes of a file, no more than are read in any case, or why there are none."""
-    content, problem = read_bounded(path, what=_WHAT, most=LARGEST_FILE)
+    content, problem = read_bounded(path, what=what, most=LARGEST_FILE)
     # One that is too large is refused with what else is wrong with its bytes.
     return content, () if content or not problem else (data_fault(file_name(path), "", problem),)
 
@@ -143,8 +143,8 @@ def _place(content: bytes, at: int) -> tuple[int, int]:
     return before.count(b"\n") + 1, len(before[start:].decode("utf-8-sig", "replace")) + 1
 
 
-def parse_table(text: str, *, file: str) -> tuple[Table | None, tuple[Fault, ...]]:
-    """The table of a text, or all that is wrong with its form."""
+def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table | None, tuple[Fault, ...]]:
+    """The table of a text, or all that is wrong with its form. Args: `most`: rows that it may have."""
     numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
     head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
     header, faults = _header(numbered[: head_at - 1], file)
@@ -155,7 +155,7 @@ def parse_table(text: str, *, file: str) -> tuple[Table | None, tuple[Fault, ...
         if not data:
             problem = "the file has no line with the names of the columns"
         return None, (*faults, data_fault(file, "", problem))
-    if len(data) - 1 > MOST_ROWS:
+    if len(data) - 1 > most:
         problem = f"{len(data) - 1} rows; a row is one measurement, so average or thin out a recording"
         return None, (*faults, data_fault(file, "", problem, allowed=f"up to {MOST_ROWS} rows"))
     if header is None:

@@ -19,13 +19,12 @@ from ringbalance.controller.judging.tuning import (
     judgement_document,
     plain_settings,
     required_document,
-    setting_text,
 )
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.rows import Finding
-from ringbalance.scene.describe import usual_unit
+from ringbalance.scene.describe import setting_text, usual_unit
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile, raw_value_at, value_at
 from ringbalance.scene.toml import toml_text

@@ -20,6 +20,7 @@ from ringbalance.reports.pages.standing import CONDITIONS
 from ringbalance.reports.pages.tube import TUBE
 from ringbalance.reports.run_figures import figures_of
 from ringbalance.reports.sections import drawings_in
+from ringbalance.reports.sweep_figures import sweep_drawings
 from ringbalance.results.result import Result
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification import papers
@@ -51,7 +52,7 @@ class _ResultFigures:
 
 
 def figures_of_result(result: Result) -> _ResultFigures:
-    """Of a calibration, a run, a tuning, a fit, a comparison or a trade study.
+    """Of a calibration, a run, a tuning, a fit, a comparison, a trade study or a sweep.
 
     Raises: TypeError: there is nothing to draw of such a result.
     """
@@ -124,6 +125,7 @@ _DRAWN: Final[Mapping[str, Callable[[Any], list[Drawing]]]] = MappingProxyType(
         "Tuning": _tuning,
         "Comparison": _comparison,
         "Fit": lambda fit: fit_figures(against_fit(fit.result)),
+        "Sweep": sweep_drawings,
         "TradeStudy": _trade,
     }
 )

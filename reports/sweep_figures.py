@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,41 +14,86 @@ from matplotlib.colors import ListedColormap
 from ringbalance.design.axes import unit_of_path
 from ringbalance.design.sweep import Sweep
 from ringbalance.reports.figure import FIFTH, FOUND, INK, MAP, MUTED, Axis, Drawing, draw
+from ringbalance.results.numbers import given
+from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.platform.files import write_whole
 
 _SHOWN: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor")
 """Columns that are drawn, where there are numbers."""
+_LONGEST_NOTE: Final = 50
+"""Characters beside a legend."""
 _OUTSIDE: Final = {"marker": "x", "color": FIFTH, "linewidths": 0.8}
 _BEST: Final = {"marker": "*", "facecolors": "none", "edgecolors": INK}
 
 
-def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
-    """Write a figure of each quantity over the keys that vary; none where a key takes texts.
+@dataclass(frozen=True, kw_only=True)
+class _View:
+    """What of a sweep a figure shows."""
 
-    Returns: The files. Raises: OSError: they cannot be written.
-    """
-    fields = {name: (unit, values) for name, unit, values in sweep.fields()}
-    paths = [path for path in sweep.plan.paths if _numbers(fields[path][1])][:2]
-    if not paths:
-        return ()
-    drawings = [
-        _drawing(sweep, paths, name, *fields[name])
-        for name in _SHOWN
-        if name in fields and any(value is not None for value in fields[name][1])
-    ]
+    sweep: Sweep
+    paths: tuple[str, ...]
+    """Keys of one or two axes."""
+    shown: BoolArray
+    """By point: of a grid of more axes those with the others as in one row."""
+    note: str
+    """The values of these; empty where all points are shown."""
+
+
+def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
+    """Write `sweep_drawings` into a folder. Returns: The files. Raises: OSError: they cannot be written."""
+    drawings = sweep_drawings(sweep)
     return tuple(write_whole(folder / f"{each.name}.svg", each.standalone()) for each in drawings)
 
 
-def _numbers(values: list[Any]) -> bool:
-    return all(isinstance(value, int | float) for value in values)
+def sweep_drawings(sweep: Sweep) -> list[Drawing]:
+    """A figure of each quantity over the keys that vary; none where a key takes texts.
+
+    Over a grid of more than two axes the two with most values, and the others as in the best row.
+    """
+    fields = {name: (unit, values) for name, unit, values in sweep.fields()}
+    view = _view(sweep)
+    if view is None:
+        return []
+    return [
+        _drawing(view, name, *fields[name])
+        for name in _SHOWN
+        if name in fields and any(value is not None for value in np.array(fields[name][1])[view.shown])
+    ]
 
 
-def _drawing(sweep: Sweep, paths: list[str], name: str, unit: str, values: list[Any]) -> Drawing:
-    keys = [np.array([point[path] for point in sweep.points], dtype=np.float64) for path in paths]
-    shown = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+def _view(sweep: Sweep) -> _View | None:
+    """None where no axis has numbers."""
+    numbers = [axis for axis in sweep.plan.axes if not axis.names and _numbers(sweep, axis.head)]
+    everything = np.ones(len(sweep.points), dtype=np.bool_)
+    if not numbers:
+        return None
+    if sweep.plan.sample:
+        paths = tuple(axis.head for axis in numbers[:2])
+        return _View(sweep=sweep, paths=paths, shown=everything, note="")
+    most = sorted(numbers, key=lambda axis: -len(axis.grid()))[:2]
+    drawn = [axis for axis in sweep.plan.axes if axis in most]
+    row = next((each for each in (sweep.best, sweep.nearest) if each is not None), 0)
+    others = [axis for axis in sweep.plan.axes if axis not in most and len(axis.grid()) > 1]
+    for axis in others:
+        values = [sweep.points[row].get(path) for path in axis.paths]
+        everything &= [[point.get(path) for path in axis.paths] == values for point in sweep.points]
+    held = ", ".join(sweep.axis_text(axis, row) for axis in others)
+    note = f"{held if len(held) <= _LONGEST_NOTE else 'other keys'} as in row {row}" if others else ""
+    return _View(sweep=sweep, paths=tuple(axis.head for axis in drawn), shown=everything, note=note)
+
+
+def _numbers(sweep: Sweep, path: str) -> bool:
+    return all(isinstance(point.get(path), int | float) for point in sweep.points)
+
+
+def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
+    sweep, paths = view.sweep, view.paths
+    keys = [np.array([point[path] for point in sweep.points], dtype=np.float64)[view.shown] for path in paths]
+    shown = np.array([np.nan if value is None else value for value in values], dtype=np.float64)[view.shown]
     axes: list[Axis] = [(path, unit_of_path(sweep.scene, path)) for path in paths]
     title = name.replace("_", " ")
-    best, feasible = sweep.best, np.array(sweep.feasible)
+    feasible = np.array(sweep.feasible)[view.shown]
+    best = np.flatnonzero(view.shown) == sweep.best
     over = [*keys, shown][:2]
 
     def points(panel: Axes, mask: Any, look: dict[str, Any]) -> None:
@@ -59,31 +106,37 @@ def _drawing(sweep: Sweep, paths: list[str], name: str, unit: str, values: list[
         if len(keys) == 1:
             order = np.argsort(over[0], kind="stable")
             panel.plot(over[0][order], over[1][order], color=MUTED, linewidth=1)
+            _noted(panel, view.note)
         else:
-            look = _coloured(panel, sweep, keys, shown, f"{title} in {unit}" if unit != "1" else title)
+            look = _coloured(panel, view, keys, shown, feasible, title, unit)
         if look:
             points(panel, feasible, {"s": 14, "label": "feasible", **look})
         points(panel, ~feasible, {"s": 12, "label": "not feasible", **_OUTSIDE})
-        if best is not None:
-            points(panel, np.arange(feasible.size) == best, {"s": 90, "label": "best", **_BEST})
+        points(panel, best, {"s": 90, "label": "best", **_BEST})
 
     y = axes[1] if len(axes) > 1 else (title, unit)
     return draw(f"sweep-{name.replace('_', '-')}", paint, x=axes[0], y=y, columns=3, wide=True, height=3.6)
 
 
-def _coloured(panel: Axes, sweep: Sweep, keys: list[Any], shown: Any, label: str) -> dict[str, Any]:
+def _noted(panel: Axes, *parts: str) -> None:
+    """A line above the frame, on the right, beside the legend."""
+    panel.text(1, 1.02, "; ".join(filter(None, parts)), ha="right", transform=panel.transAxes)
+
+
+def _coloured(
+    panel: Axes, view: _View, keys: list[Any], shown: Any, feasible: Any, title: str, unit: str
+) -> dict[str, Any]:
     """Shades over a grid of two keys with the boundary of what is feasible; else a look of the points."""
     known = shown[np.isfinite(shown)]
     low, high = float(known.min()), float(known.max())
     span: dict[str, Any] = {"cmap": ListedColormap(list(MAP)), "vmin": low, "vmax": high}
-    sizes = [len(each) for each in sweep.grid().values()]
-    if len(sizes) != 2 or min(sizes) < 2:
+    ends = f"{title}: {given(low, unit, digits=3)} (light) to {given(high, unit, digits=3)} (dark)"
+    _noted(panel, view.note, ends)
+    sizes = [len(np.unique(each)) for each in keys]
+    if view.sweep.plan.sample or min(sizes) < 2 or math.prod(sizes) != shown.size:
         return {"c": shown, **span}
-    x, y, z, inside = (np.reshape(each, sizes) for each in (*keys, shown, np.array(sweep.feasible)))
+    x, y, z, inside = (np.reshape(each, sizes) for each in (*keys, shown, feasible))
     panel.pcolormesh(x, y, z, shading="nearest", edgecolors="none", **span)
     if inside.any() and not inside.all():
         panel.contour(x, y, inside.astype(float), levels=[0.5], colors=INK, linewidths=1.2)
-    panel.text(
-        1, 1.02, f"{label}: {low:.3g} (light) to {high:.3g} (dark)", ha="right", transform=panel.transAxes
-    )
     return {}

@@ -46,18 +46,21 @@ class Proportion:
         """Upper 95 % bound."""
         return self._ends()[1]
 
-    def verdict(self, asked: float) -> str:
+    def verdict(self, asked: float, *, deviations: float = _NORMAL_95) -> str:
         """`MET` where the lower bound is at least the fraction asked for, `MISSED` where the upper bound is
-        below it, else `OPEN`."""
-        low, high = self._ends()
+        below it, else `OPEN`.
+
+        Args: `deviations`: half the width of the interval, in standard deviations; default that of 95 %.
+        """
+        low, high = self._ends(deviations)
         if low >= asked:
             return MET
         return MISSED if high < asked else OPEN
 
-    def _ends(self) -> tuple[float, float]:
+    def _ends(self, deviations: float = _NORMAL_95) -> tuple[float, float]:
         if self.of == 0:
             return 0.0, 1.0
-        p, z2 = self.value, _NORMAL_95**2 / self.of
+        p, z2 = self.value, deviations**2 / self.of
         centre = (p + z2 / 2) / (1 + z2)
         half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
         return max(centre - half, 0.0), min(centre + half, 1.0)
@@ -95,6 +98,17 @@ class Paired:
         n = self.first_alone + self.second_alone
         tail = sum(comb(n, k) for k in range(min(self.first_alone, self.second_alone) + 1))
         return min(1.0, float(2 * tail) / float(1 << n))
+
+    @property
+    def difference(self) -> tuple[float, float]:
+        """Fraction of the devices by which the first does better, and half its 95 % interval.
+
+        Source: Wald's interval of the difference of paired proportions, Agresti, "Categorical Data Analysis"
+            (2002), section 10.1.
+        """
+        n = self.both + self.first_alone + self.second_alone + self.neither
+        change, differ = self.first_alone - self.second_alone, self.first_alone + self.second_alone
+        return change / n, _NORMAL_95 * math.sqrt(differ - change**2 / n) / n
 
     def better(self, level: float) -> int | None:
         """0 or 1, the one under which more devices do; None: no difference is shown at a level."""

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from ringbalance.design.axes import plan_of
-from ringbalance.design.static import EMPTY, static_rows
+from ringbalance.design.static import EMPTY, REFUSED, static_rows
 from ringbalance.design.sweep import Sweep, run_sweep
 from ringbalance.design.work import Progress
 from ringbalance.scene import AnyScene
 from ringbalance.scene.changes import checked_scene
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.registry import registered
 
 
@@ -52,6 +54,12 @@ def sweep(
         6
     """
     scene = checked_scene(scene)
+    if not isinstance(vary, Mapping):
+        raise TypeError(f'`vary` maps keys to values, such as {{"tube.bore": [1e-3, 2e-3]}}: {vary!r}')
+    if executor is not None and not hasattr(executor, "submit"):
+        raise TypeError(f"`executor` is none of concurrent.futures: {executor!r}")
+    for name, count, least in (("runs", runs, 0), ("check", check, 0), ("workers", workers, 1)):
+        _check_count(name, count, least)
     return run_sweep(
         scene,
         plan_of(scene, vary, sample=sample),
@@ -73,8 +81,9 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
     Returns: The columns of a sweep's row in SI, None where not known: of a liquid ring `lambda`, `moment`,
         `velocity`, `usable_moment` and others; with runs `fraction` of the devices that meets all that the
         scene requires, its bounds `low` and `high` (95 %), and `settling_time`. `status` is "ok", "blocked"
-        (no flow) or "point_refused", `verdict` with runs "met", "not met" or "undecided", `finding` says why
-        there is no answer. A refused change raises nothing, so that a search goes on.
+        (no flow) or "point_refused", `verdict` with runs "met", "not met" or "undecided", else the status,
+        `finding` says why there is no answer. A refused value raises nothing, so that a search goes on.
+    Raises: SceneError: a path that is no key of the scene.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
@@ -83,7 +92,10 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
         ('ok', True)
     """
     scene = checked_scene(scene)
+    _check_count("runs", runs, 0)
     (row,) = static_rows(scene, [dict(changes)], intervals=False)
+    if row["status"] == REFUSED and not all(_is_key(scene, path) for path in changes):
+        scene.with_values(changes)  # Says which.
     driven = runs and row["sha256"]
     run = registered("function", "run_row")(scene, dict(changes), runs) if driven else EMPTY
     finding = row["finding"] or run["finding"]
@@ -91,5 +103,17 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
         **{name: value for name, (value, _) in row["values"].items()},
         **{name: value for name, value in run.items() if name not in ("ended", "finding")},
         "status": row["status"],
+        "verdict": run["verdict"] if driven else row["status"],
         "finding": finding["values"]["text"] if finding else "",
     }
+
+
+def _is_key(scene: AnyScene, path: str) -> bool:
+    *tables, key = path.split(".")
+    return key in scene_kind(scene.balancer).schema.keys_in(tables) if tables else False
+
+
+def _check_count(name: str, count: int, least: int) -> None:
+    """Raises: ValueError: no whole number, or below the least."""
+    if not isinstance(count, Integral) or count < least:
+        raise ValueError(f"`{name}` is a whole number of at least {least}, not {count!r}")

@@ -216,7 +216,7 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
             schema.tables[path].keys if path in schema.tables else keys[name].takes if name in keys else None
         )
         value, deviation = _plain(value, takes)
-        content[name] = _written(value, takes, like=content.get(name))
+        content[name] = _written(value, takes, like=content.get(name, _as_usual(keys.get(name))))
         if deviation:
             width = _written(NORMAL_95 * deviation, takes)
             _place(document, f"uncertainty.{name}", width, schema=schema, origin=origin)
@@ -244,17 +244,25 @@ def _plain(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> tu
         return str(value), 0.0
 
 
+def _as_usual(key: Key | None) -> str | None:
+    """A quantity in the unit in which a person writes it."""
+    return f"1 {key.usual_unit}" if key is not None and key.usual_unit else None
+
+
 def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None, *, like: object = None) -> Any:
     """A value as a scene file would have it: a number for a quantity with a unit is one in SI.
 
-    Args: `like`: what stands there now; its unit is kept.
+    Args: `like`: what stands there now, or would usually; its unit is kept.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
         keys = takes.keys if isinstance(takes, Entries) else takes if isinstance(takes, Mapping) else {}
-        return {key: _written(each, keys[key].takes if key in keys else None) for key, each in value.items()}
+        return {
+            name: _written(each, key.takes if (key := keys.get(name)) else None, like=_as_usual(key))
+            for name, each in value.items()
+        }
     if isinstance(value, list | tuple):
-        each_written = [_written(each, takes) for each in value]
+        each_written = [_written(each, takes, like=like) for each in value]
         single = isinstance(takes, Reader) and takes.one_for_all and len(value) == 1
         return each_written[0] if single else each_written
     dimension = takes.dimension if isinstance(takes, Reader) else None

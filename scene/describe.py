@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -16,7 +16,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.registry import balancers
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
-from ringbalance.scene.units import DIMENSIONS, format_quantity
+from ringbalance.scene.units import DIMENSIONS, format_quantity, shortest_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,6 +136,30 @@ def in_usual_unit(path: str, value: float) -> float:
     return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT).split(" ")[0])
 
 
+def setting_text(path: str, value: object) -> str:
+    """A value of a scene, SI, as a reader knows it."""
+    if value is None:
+        return "none"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ", ".join(setting_text(path, each) for each in value)
+    if isinstance(value, float | int):
+        return _short_text(_line_at(path), float(value))
+    return str(value)
+
+
+def _short_text(line: _Line, value: float) -> str:
+    if not line.dimension:
+        return f"{value:.4g} {line.shown.unit}".rstrip()
+    return format_quantity(value, line.dimension, _suited_unit(line, value), digits=4)
+
+
+def _suited_unit(line: _Line, *values: float) -> str:
+    """The usual unit; seconds where minutes would need many digits."""
+    unit = line.shown.unit
+    texts = [shortest_quantity(each, unit) for each in values if each] if unit == "min" else []
+    return "s" if any(text.endswith(" s") for text in texts) else unit
+
+
 def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault:
     """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
     table, key = path.split(".")
@@ -150,10 +174,8 @@ def scene_lines(scene: AnyScene) -> Iterator[str]:
 
 
 def _short(scene: AnyScene, path: str) -> str:
-    value, unit = _value(scene, path), usual_unit(path)
-    if isinstance(value, float):
-        return f"{in_usual_unit(path, value):.4g} {unit}".rstrip()
-    return str(value)
+    value = _value(scene, path)
+    return _short_text(_line_at(path), value) if isinstance(value, float) else str(value)
 
 
 def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:
@@ -183,7 +205,8 @@ def _value(scene: AnyScene, path: str) -> Any:
 def _written(line: _Line, value: Any) -> str:
     if line.dimension:
         values = value if isinstance(value, tuple) else (value,)
-        return ", ".join(format_quantity(each, line.dimension, line.shown.unit) for each in values)
+        unit = _suited_unit(line, *values)
+        return ", ".join(format_quantity(each, line.dimension, unit) for each in values)
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, tuple):

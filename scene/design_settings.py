@@ -53,6 +53,7 @@ class DesignSettings:
         standard([], "valves at hand; without any, and without `valve_file`, the scene's own stays"),
         Listed(
             '[{ name = "V1", conductance = "0.4 l/(s*bar)", critical_ratio = 0.3, valve_lag = "2 ms" }, ...]'
+            ', or valve_file = "valves.csv" in place of the list'
         ),
         Shown("valves at hand"),
     ] = ()

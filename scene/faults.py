@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from ringbalance.scene.toml import toml_text
 
 MISSING = "missing"
+COMMAND_LINE = "command line"
+"""File of the errors of options."""
 MOST_SHOWN = 50
 """Errors that the message of a `SceneError` lists; more are counted."""
 _LONGEST_VALUE = 60
@@ -81,7 +83,7 @@ class SceneError(Exception):
     def of_option(cls, *, option: str, value: object, problem: str, allowed: str) -> SceneError:
         """The error of a command-line option that cannot be used."""
         value = toml_text(value)
-        return cls([Fault(file="command line", key=option, value=value, problem=problem, allowed=allowed)])
+        return cls([Fault(file=COMMAND_LINE, key=option, value=value, problem=problem, allowed=allowed)])
 
 
 def closest(word: str, known: Iterable[str]) -> str:

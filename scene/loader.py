@@ -158,9 +158,7 @@ def _records(reading: Reading, before: CheckedValues | None) -> dict[str, Any]:
 
 
 def _record(name: str, kind: type, values: Mapping[str, Any], before: object) -> Any:
-    given = {
-        field: values.get(path) for field, path, needed in _fields(kind, name) if needed or path in values
-    }
+    given = {field: values.get(path, absent) for field, path, absent in _fields(kind, name)}
     if type(before) is kind and all(_equal(value, getattr(before, key)) for key, value in given.items()):
         return before
     return kind(**given)
@@ -172,9 +170,12 @@ def _equal(value: object, before: object) -> bool:
 
 
 @cache
-def _fields(kind: type, table: str) -> tuple[tuple[str, str, bool], ...]:
-    """Name, path and whether there is no default, of each field of a table's record."""
-    return tuple((each.name, f"{table}.{each.name}", each.default is MISSING) for each in fields(kind))
+def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
+    """Name, path and value without one there, of each field of a table's record."""
+    return tuple(
+        (each.name, f"{table}.{each.name}", None if each.default is MISSING else each.default)
+        for each in fields(kind)
+    )
 
 
 def _uncertainty(reading: Reading) -> Iterator[InputUncertainty]:

@@ -171,7 +171,8 @@ def written_like(value: float, like: object, dimension: str) -> str:
     In SI where there is no such text, its unit does not give the value back, or that saves many digits.
     """
     kind = DIMENSIONS[dimension]
-    in_si = f"{value!r} {kind.si_unit}"
+    plain = repr(value).removesuffix(".0")
+    in_si = f"{plain} {kind.si_unit}"
     unit = _unit_of(like, dimension) if isinstance(like, str) else ""
     if not unit or not abs(value) <= kind.largest:
         return in_si
@@ -179,7 +180,7 @@ def written_like(value: float, like: object, dimension: str) -> str:
     number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
     texts = (f"{number:.{digits}g} {unit}" for digits in (15, 16, 17))
     text = next((each for each in texts if parse_quantity(each, dimension) == value), in_si)
-    return in_si if len(in_si) + _SAVED <= len(text) else text
+    return in_si if len(plain) + _SAVED <= len(text.split(" ")[0]) else text
 
 
 @lru_cache(1024)

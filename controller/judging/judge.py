@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -35,6 +35,10 @@ class Judgement:
     def meets(self) -> BoolArray:
         """Whether each device meets every demand."""
         return np.asarray(np.all([each.met(self.outcomes) for each in self.demands], axis=0))
+
+    def joined(self, more: Judgement) -> Judgement:
+        """On these devices and further ones."""
+        return replace(self, outcomes=self.outcomes.joined(more.outcomes))
 
     @property
     def fraction(self) -> Proportion:
@@ -106,7 +110,8 @@ def judged_all(
         ran = balancer.run_all([settings[i] for i in left], draws, further=further)
         for place, outcomes in zip(left, ran, strict=True):
             before = done.get(place)
-            done[place] = judgement(place, before.outcomes.joined(outcomes) if before else outcomes)
+            ended = judgement(place, outcomes)
+            done[place] = before.joined(ended) if before else ended
         left, count = [i for i in left if done[i].verdict == OPEN], count + more
         more = min(count, most - count)
     return tuple(done[i] for i in range(len(settings)))

@@ -20,7 +20,7 @@ from ringbalance.results.result import Cells, Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
-from ringbalance.scene.describe import in_usual_unit, usual_unit
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import SceneFile, raw_value_at, with_values_at
 
@@ -254,9 +254,6 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
     if tuning.longer is not None:
         values = {**share_values(tuning.longer), "time": LONGER, "first": FURTHER}
         yield Finding(code="tuned_longer", values=values)
-    others = {each.kind: each.judgement for each in tuning.tried}
-    if "target_vector" in others and tuning.scene.controller.kind == "law_based":
-        yield Finding(code="tuned_not_exported", values=share_values(others["target_vector"]))
     if best.verdict != MET and (causes := causes_of(best)):
         yield Finding(code="tuned_causes", values={"causes": causes})
     if not tuning.remedies and tuning.along and best.verdict != MET:
@@ -343,17 +340,6 @@ def _settings_table(tuning: Tuning) -> Table:
         for path, value in tuning.recommended.settings.items()
     ]
     return Table(caption="Settings", heads=("key", "the scene's", "recommended"), rows=rows)
-
-
-def setting_text(path: str, value: object) -> str:
-    """A value of a scene, SI, as a reader knows it."""
-    if value is None:
-        return "none"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return ", ".join(setting_text(path, each) for each in value)
-    if isinstance(value, float | int):
-        return f"{in_usual_unit(path, float(value)):.4g} {usual_unit(path)}".rstrip()
-    return str(value)
 
 
 def required_table(judgement: Judgement) -> Table:

@@ -24,7 +24,7 @@ from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import compression_work
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
-from ringbalance.reduced_model.injection.dynamics import PLANT, Dynamics
+from ringbalance.reduced_model.injection.dynamics import Dynamics, empty_plants
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import HELD
@@ -235,7 +235,7 @@ class _Under:
 
 def _under(drawn: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str]) -> Iterator[_Under]:
     """Devices under one gas pressure whose scenes are alike; with each its scene there."""
-    plants, stack = np.zeros(len(drawn), dtype=PLANT), Designs.stacked(scenes)
+    plants, stack = empty_plants(len(drawn)), Designs.stacked(scenes)
     # What is held in the tube follows from the other terms, of all devices at once.
     before = [term for term in modelled if term != HELD]
     dynamics = [

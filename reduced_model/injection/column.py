@@ -90,7 +90,7 @@ def tube_loss(plant: Record, which: int, speed: float, of_law: float) -> tuple[f
     """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
     if abs(speed) < _SLOWEST:
         return 0.0, 0.0
-    root, growth = root_of_velocity(plant.roots[which], plant.rows, which, of_law)
+    root, growth = root_of_velocity(plant.root_cells[which], plant.roots, plant.rows, which, of_law)
     fourth = root * root * root * root
     loss = fourth * fourth / plant.density
     return math.copysign(loss, speed), 8.0 * loss / root / growth * (of_law / abs(speed))

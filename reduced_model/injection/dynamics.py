@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -23,12 +24,12 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.pieces import point
-from ringbalance.reduced_model.pieces.inverse import ROOT_PLACES, root_cells
+from ringbalance.reduced_model.pieces.inverse import ROOT_PLACES, WIDTH_OF_ROOT, root_cells, root_pieces
 from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
-from ringbalance.scene.arrays import FloatArray, plain
+from ringbalance.scene.arrays import FloatArray, Records, plain
 from ringbalance.scene.models import Scene, Tube
 
 
@@ -109,11 +110,22 @@ PLANT: Final = np.dtype(
     + [(name, np.int64) for name in _PLANT_WHOLE]
     + [
         ("numbers", np.float64, (NUMBERS,)),  # of the law, as `point` reads it
-        ("roots", np.float64, (WAYS, ROOT_PLACES)),  # where to look for the root of a velocity
+        ("root_cells", np.float64, (WAYS, ROOT_PLACES)),  # where to look for the root of a velocity
+        ("roots", np.float64, (ROWS, WIDTH_OF_ROOT)),  # beside `rows`, next to such roots
         ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # its pieces, or those of a law that is tabled
     ]
 )
 """Constants of a plant with moving liquid, filling gas and late valves."""
+
+
+def empty_plants(count: int) -> Records:
+    """Records of type `PLANT`, of zeros.
+
+    Few laws fill the room for their pieces.  What is not written to takes neither memory nor time here;
+    arrays of NumPy's own would lie on huge pages, which the system fills with zeros as a whole.
+    """
+    return np.frombuffer(mmap.mmap(-1, count * PLANT.itemsize), dtype=PLANT)
+
 
 X: Final = 0
 U: Final = 1
@@ -278,7 +290,7 @@ class Dynamics:
 
     def plant(self, *, total: float, relative_error: float | None = None) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
-        plant = np.zeros(1, dtype=PLANT)
+        plant = empty_plants(1)
         self.fill(plant, total=total, relative_error=relative_error)
         return plant
 
@@ -373,7 +385,9 @@ def _fill_rows(plant: npt.NDArray[np.void], ways: int, numbers: FloatArray, rows
         raise ValueError(f"the law has {len(rows)} pieces, at most {ROWS} can be compiled")
     plant["numbers"][0, : numbers.size], plant["rows"][0, : len(rows)] = numbers, rows
     for way in range(ways):
-        plant["roots"][0, way] = root_cells(numbers, rows, way)
+        plant["root_cells"][0, way] = root_cells(numbers, rows, way)
+        first, roots = root_pieces(numbers, rows, way)
+        plant["roots"][0, first : first + len(roots)] = roots
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:

@@ -40,6 +40,7 @@ from ringbalance.reduced_model.injection.step import (
     BETWEEN,
     END,
     between,
+    in_closed_form,
     rates_at_end,
     shorten,
     take,
@@ -52,14 +53,16 @@ _ROUND_OFF: Final = 1e-12
 _BISECTIONS: Final = 40
 _SECANTS: Final = 12
 """Of these, that may be guided: a smooth event takes five."""
-_REST_EVENT: Final = 0.01
-"""Of the instant of an event in a step at rest, which may be long, over the error allowed to a step."""
+_REST_EVENT: Final = 1e-11
+"""Of a step at rest, which may be long: the instant of an event in it."""
 _NOTHING_MOVED: Final = 1e-13
 """Fill ratio below which a start has come to nothing but round-off."""
 _LITTLE_MOVED: Final = 1e-9
 """Fill ratio below which a flow that ends was the last swing of a column about its balance."""
 _OPENINGS: Final = 42
 """Valve-open times that are tried at most to leave a chamber its residual fill."""
+SPARE: Final = 3
+"""Motions that these are tried on."""
 _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 
 
@@ -75,10 +78,10 @@ def advance(
     # What is due at the end counts, whatever the clock has rounded off.
     while min(motion.opens, motion.closes) <= left + _ROUND_OFF:
         until = min(motion.opens, motion.closes, left)
-        _march(plant, motion, until, notes, row, count, w)
+        _march(plant, motion, until, notes, row, count, w, True)
         left -= until
         _flip(plant, motion)
-    _march(plant, motion, left, notes, row, count, w)
+    _march(plant, motion, left, notes, row, count, w, True)
     _settle(plant, motion)
     _note_regime(plant, motion)
     _pause(plant, motion)
@@ -95,26 +98,39 @@ def _pause(plant: Record, motion: Record) -> None:
 
 @in_place
 def opening_within(
-    plant: Record, motions: Record, pair: int, spare: int, chamber: int, duration: float, w: FloatArray
+    plant: Record,
+    motions: Record,
+    pair: int,
+    spare: int,
+    chamber: int,
+    duration: float,
+    lowest: float,
+    w: FloatArray,
 ) -> float:
     """Longest valve-open time, at most `duration`, that leaves the driven chamber its residual fill, s.
 
-    `motions[spare]` is written to.  Returns: zero where the chamber is already there.
+    All times that are tried have the steps of the shorter ones in common, which are taken once.
+    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: fill of the driven chamber that
+        `duration` leaves, not a number where it is not known.
+    Returns: zero where the chamber is already there.
     """
     y, residual = motions[pair].state, motions[pair].residual
     low, high, near, stays = 0.0, duration, 1e-9 * duration, 0
     # How far the driven chamber falls below its residual fill, with either time.
     before = residual - (plant.total - y[X] if chamber else y[X])
-    after = residual - _least_after(plant, motions, pair, spare, chamber, duration, w)
+    motions[spare + 2] = motions[pair]
+    _open(plant, motions[spare + 2], chamber, w)
+    after = residual - (_least_after(plant, motions, spare, duration, w) if math.isnan(lowest) else lowest)
     if after <= 0.0:
         return duration
     for step in range(_OPENINGS):
         middle = _look_at(low, high, before, after, step, near)
-        found = residual - _least_after(plant, motions, pair, spare, chamber, middle, w)
+        found = residual - _least_after(plant, motions, spare, middle, w)
         if found > 0.0:
             high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1
         else:
             low, before, after, stays = middle, found, after * (0.5 if stays > 0 else 1.0), 1
+            motions[spare + 2] = motions[spare + 1]
         if high - low <= near:
             break
     return low
@@ -134,13 +150,27 @@ def _look_at(low: float, high: float, before: float, after: float, step: int, ne
 
 
 @in_place
-def _least_after(
-    plant: Record, motions: Record, pair: int, spare: int, chamber: int, duration: float, w: FloatArray
-) -> float:
-    """Lowest fill of the driven chamber until an injection and its tail are over."""
-    motions[spare] = motions[pair]
-    command(plant, motions[spare], chamber, duration)
-    advance(plant, motions[spare], plant.valve_lag + duration, w, 0, 0, w)
+def _open(plant: Record, motion: Record, chamber: int, w: FloatArray) -> None:
+    """Command a valve, and let it open for good."""
+    command(plant, motion, chamber, math.inf)
+    advance(plant, motion, plant.valve_lag, w, 0, 0, w)
+    motion.now = 0.0
+
+
+@in_place
+def _least_after(plant: Record, motions: Record, spare: int, duration: float, w: FloatArray) -> float:
+    """Lowest fill of the driven chamber until an injection and its tail are over.
+
+    `motions[spare + 2]` is on the way, its valve open, and `motions[spare + 1]` will be as far on it as steps
+    have nothing to do with its end.
+    """
+    motions[spare + 1] = motions[spare + 2]
+    left = duration - motions[spare + 1].now
+    _march(plant, motions[spare + 1], left, w, 0, 0, w, False)
+    motions[spare] = motions[spare + 1]
+    motion = motions[spare]
+    motion.closes = duration - motion.now
+    advance(plant, motion, motion.closes, w, 0, 0, w)
     return least_later(plant, motions, spare, w)
 
 
@@ -159,9 +189,19 @@ def least_later(plant: Record, motions: Record, pair: int, w: FloatArray) -> flo
 
 @in_place
 def _march(
-    plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
+    plant: Record,
+    motion: Record,
+    duration: float,
+    notes: FloatArray,
+    row: int,
+    count: int,
+    w: FloatArray,
+    to_end: bool,
 ) -> None:
-    """Steps and their events, with the valves as they are."""
+    """Steps and their events, with the valves as they are.
+
+    Args: `to_end`: whether the last step is shortened to what is left, or not taken.
+    """
     left, goes_on = duration, False
     while left > 0.0:
         if not goes_on:
@@ -175,6 +215,8 @@ def _march(
         if _quiet(plant, motion):
             _rest_gases(plant, motion)
             _pass(plant, motion, left, notes, row, count)
+            return
+        if not to_end and motion.length >= left and not in_closed_form(plant, motion):
             return
         h, goes_on = _step(plant, motion, left, notes, row, count, w)
         _pass(plant, motion, left if h >= left else h, notes, row, count)
@@ -241,7 +283,7 @@ def _step(
 def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     """End the step just taken at the first event. Returns: its length then, s."""
     rates_at_end(plant, motion, w)
-    near = plant.relative_error * (_REST_EVENT if motion.direction == 0 else 1.0)
+    near = _REST_EVENT if motion.direction == 0 else plant.relative_error
     part = _event_part(plant, motion, h, near, w)
     if part < 1.0:
         shorten(plant, motion, h, part, w)

@@ -289,7 +289,7 @@ def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
 
 
 @inlined
-def _in_closed_form(plant: Record, motion: Record) -> bool:
+def in_closed_form(plant: Record, motion: Record) -> bool:
     """Whether isothermal gases alone change, while the liquid rests."""
     return bool(motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0)
 
@@ -297,7 +297,7 @@ def _in_closed_form(plant: Record, motion: Record) -> bool:
 @in_place
 def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """One accepted step that does not pass `left`, s, into row `END`. Returns: its length, s."""
-    if _in_closed_form(plant, motion):
+    if in_closed_form(plant, motion):
         return _rest(plant, motion, left, w)
     _linearize(plant, motion, w)
     while True:
@@ -332,7 +332,7 @@ def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 @in_place
 def shorten(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """End the step of length h just taken after a part of it, with what lies `between`."""
-    if (plant.inertia and motion.direction != 0) or _in_closed_form(plant, motion):
+    if (plant.inertia and motion.direction != 0) or in_closed_form(plant, motion):
         between(plant, motion, h, part, w)
         _copy(w, BETWEEN, END)
     else:
@@ -342,7 +342,7 @@ def shorten(plant: Record, motion: Record, h: float, part: float, w: FloatArray)
 @in_place
 def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """State after a part of the step into row `BETWEEN`, cubic by the rates at both ends (row `_RATE`)."""
-    if _in_closed_form(plant, motion):
+    if in_closed_form(plant, motion):
         rest_after(plant, motion, h * part, w, BETWEEN)
         return
     for i in range(8):

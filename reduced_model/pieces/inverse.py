@@ -32,6 +32,7 @@ from ringbalance.reduced_model.pieces.point import (
     piece,
     quintic,
 )
+from ringbalance.reduced_model.pieces.table import polynomial
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.both_ways import both_ways
 
@@ -44,6 +45,9 @@ ROOT_HEAD: Final = 4
 """What stands before the cells."""
 ROOT_PLACES: Final = ROOT_HEAD + ROOT_CELLS + 1
 _EDGE: Final = 1e-12
+R0, R1, R2, R3, START = 1, 2, 3, 4, 5
+"""In a piece of roots, behind its end: the polynomial, and the root at the start of the piece."""
+WIDTH_OF_ROOT: Final = START + 1
 Row = Sequence[float] | FloatArray
 
 
@@ -82,25 +86,57 @@ def root_cells(numbers: FloatArray, rows: FloatArray, way: int) -> FloatArray:
     Returns: Cells per fourth root, the place of zero, the smallest and the largest velocity, then the piece
         at the start of each cell; shape (`ROOT_PLACES`,).
     """
-    scale, place = rows[way, SCALE], rows[way, CELLS]
-    start = rows[way, SLOWEST] ** 0.125
-    first, last = (int(numbers[int(s * scale + place)]) for s in (start, rows[way, LAST]))
-    inside = slice(first, last + 1)
-    slowest = rows[way, SLOWEST] * rows[way, CREEP]
-    ends = rows[inside, END] ** 4 * rows[inside, C0]
-    edges = np.linspace(slowest**0.25, ends[-1] ** 0.25, ROOT_CELLS + 1)
+    first, last = _span(numbers, rows, way)
+    ends, slowest = _fourth_roots(rows, first, last), rows[way, SLOWEST] * rows[way, CREEP]
+    edges = np.linspace(slowest**0.25, ends[-1], ROOT_CELLS + 1)
     each = ROOT_CELLS / (edges[-1] - edges[0])
     # The last edge, and what rounding brings before the first, belong to the piece beside them.
-    found = first + np.minimum(np.searchsorted(ends, edges**4 * (1.0 - _EDGE)), last - first)
-    return np.concatenate([[each, ROOT_HEAD - edges[0] * each, slowest, ends[-1]], found])
+    found = first + np.minimum(np.searchsorted(ends, edges * (1.0 - _EDGE)), last - first)
+    fastest = rows[last, END] ** 4 * rows[last, C0]
+    return np.concatenate([[each, ROOT_HEAD - edges[0] * each, slowest, fastest], found])
+
+
+def root_pieces(numbers: FloatArray, rows: FloatArray, way: int) -> tuple[int, FloatArray]:
+    """For each piece of a way the eighth root of the pressure over the fourth root of the velocity.
+
+    Cubic, with the values and slopes at both ends of the piece: next to what `root_of_velocity` looks for.
+    Returns: The row of the first piece, and rows, shape (pieces, `WIDTH_OF_ROOT`).
+    """
+    first, last = _span(numbers, rows, way)
+    inside = rows[first : last + 1]
+    start = rows[way, SLOWEST] ** 0.125
+    s = np.concatenate([[start], inside[:, END]])
+    t = start - inside[0, END]
+    at_start = quintic(inside, 0, t), growth(inside, 0, t)
+    ratio, rise = np.concatenate([[at_start], inside[:, [C0, C1]]]).T
+    w = np.concatenate([[s[0] * at_start[0] ** 0.25], _fourth_roots(rows, first, last)])
+    slope = s / w / (1.0 + 0.25 * s * rise / ratio)
+    h = np.diff(w)
+    powers = polynomial(h, (s[:-1], s[1:]), (slope[:-1], slope[1:]))
+    return first, np.stack([w[1:], *(each / h**power for power, each in enumerate(powers)), s[:-1]], axis=1)
+
+
+def _span(numbers: FloatArray, rows: FloatArray, way: int) -> tuple[int, int]:
+    """First and last piece of a way."""
+    scale, place = rows[way, SCALE], rows[way, CELLS]
+    first, last = (
+        int(numbers[int(s * scale + place)]) for s in (rows[way, SLOWEST] ** 0.125, rows[way, LAST])
+    )
+    return first, last
+
+
+def _fourth_roots(rows: FloatArray, first: int, last: int) -> FloatArray:
+    """Of the velocities at the ends of pieces."""
+    inside = slice(first, last + 1)
+    return np.asarray(np.sqrt(np.sqrt(rows[inside, END] ** 4 * rows[inside, C0])))
 
 
 @both_ways
-def root_of_velocity(cells: Row, p: Pieces, way: int, velocity: float) -> tuple[float, float]:
+def root_of_velocity(cells: Row, roots: Pieces, p: Pieces, way: int, velocity: float) -> tuple[float, float]:
     """Eighth root of the pressure that a velocity above zero, m/s, takes, and d(velocity)/d(root).
 
     Below a table the pressure is proportional to the velocity, above it to its square.
-    Args: `cells`: `root_cells` of the way.
+    Args: `cells`: `root_cells` of the way. `roots`: `root_pieces`, by the rows of `p`.
     """
     if velocity <= cells[2]:
         s = sqrt(sqrt(sqrt(velocity / p[way][CREEP])))
@@ -108,29 +144,19 @@ def root_of_velocity(cells: Row, p: Pieces, way: int, velocity: float) -> tuple[
     if velocity >= cells[3]:
         s = p[way][LAST] * sqrt(sqrt(velocity / cells[3]))
         return s, 4.0 * velocity / s
-    row = int(cells[int(sqrt(sqrt(velocity)) * cells[0] + cells[1])])
-    end = p[row][END]
-    slowest, fastest = cells[2], end * end * end * end * p[row][C0]
-    start = sqrt(sqrt(sqrt(p[way][SLOWEST])))
-    before = p[row - 1][END] if row > cells[ROOT_HEAD] else start
-    if row > cells[ROOT_HEAD]:
-        slowest = before * before * before * before * p[row - 1][C0]
-    while velocity > fastest:
-        row += 1
-        before, slowest, end = end, fastest, p[row][END]
-        fastest = end * end * end * end * p[row][C0]
-    return _within(p, row, velocity, before, slowest, fastest)
+    fourth = sqrt(sqrt(velocity))
+    row = piece(roots, int(cells[int(fourth * cells[0] + cells[1])]), fourth)
+    t, end = fourth - roots[row][END], p[row][END]
+    near = roots[row][R0] + t * (roots[row][R1] + t * (roots[row][R2] + t * roots[row][R3]))
+    return _within(p, row, velocity, near - end, roots[row][START] - end)
 
 
 @both_ways
-def _within(
-    p: Pieces, row: int, velocity: float, start: float, slowest: float, fastest: float
-) -> tuple[float, float]:
-    """The same on one piece, from its start and the velocities there and at its end."""
+def _within(p: Pieces, row: int, velocity: float, t: float, start: float) -> tuple[float, float]:
+    """The same on one piece, from a first place on it; places count from its end."""
     end = p[row][END]
-    low, high = start - end, 0.0
-    t = low * (fastest - velocity) / (fastest - slowest)
-    tiny, s, slope = _CONVERGED * (end - start), end, 1.0
+    low, high = start, 0.0
+    tiny, s, slope = -_CONVERGED * start, end, 1.0
     for _ in range(_NEWTON_STEPS):
         s = end + t
         ratio = quintic(p, row, t)

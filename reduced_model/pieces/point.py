@@ -58,10 +58,13 @@ FULL_ROOT, FULL_ROW, FULL_TO_END = 31, 32, 33
 # Of the column up to the crest: pressure that holds it; at first, before a part of the gas is carried out,
 # with its velocity there; part of the driving pressure that a full siphon loses, and that pressure.
 HOLDS, AT_FIRST, SLOWER, SWEPT, PART_LOST, LOST = 34, 35, 36, 37, 38, 39
+# Row beside the piece of the whole tube, and its velocity where that is worked out, too.
+BESIDE, FULL = 40, 41
+# Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width; that of
+# the upstream chamber's pressure.
+MARGIN, MARGIN_SQUARE, UP_SQUARE = 42, 43, 44
 # Of the driven chamber, where these are asked for too.
-RADIUS, MOMENT = 40, 41
-# Lowest pressure of a full siphon less what lies over the crest, and the square of its half-width.
-MARGIN, MARGIN_SQUARE, UP_SQUARE, BESIDE, FULL, PLACES_OF_QUERY = 42, 43, 44, 45, 46, 47
+RADIUS, MOMENT, PLACES_OF_QUERY = 45, 46, 47
 
 BLOCKED, SIPHONING, SEPARATED, REVERSE, UNDECIDED = 0.0, 1.0, 2.0, 3.0, 4.0
 OK, EXTRAPOLATED, STANDS, UNSURE, INVALID = 0.0, 1.0, 2.0, 3.0, 4.0
@@ -326,7 +329,7 @@ def set_margin(c: Law, w: Query, lost: float, width: float, known: float) -> Non
 
 
 @both_ways
-def held(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
+def held_velocity(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
     """Velocity of the column up to the crest, which may be known already."""
     if pressure == w[AT_FIRST]:
         return w[SLOWER]
@@ -360,7 +363,7 @@ def set_widths(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
     part = 0.0
     if w[REGIME] == SEPARATED:
         if below > 0.0:
-            part = w[VELOCITY] - held(k, p, w, way, lower)
+            part = w[VELOCITY] - held_velocity(k, p, w, way, lower)
         # A velocity grows with its pressure the less the greater that is.
         if above > ALIKE * below:
             part = larger(part, fastest(k, p, w, way, upper) - w[VELOCITY])
@@ -370,7 +373,7 @@ def set_widths(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
         w[UNCERTAINTY] = half_width(w, w[HOLDS], square, part)
     else:
         if lower < w[LOST]:
-            part = larger(w[VELOCITY] - held(k, p, w, way, lower), 0.0)
+            part = larger(w[VELOCITY] - held_velocity(k, p, w, way, lower), 0.0)
         w[UNCERTAINTY] = half_width(w, w[DRIVING], full_square(c, w), part)
     off = lost_width(p, int(w[BESIDE]), w[FULL_TO_END])
     set_margin(c, w, w[PART_LOST], off, known_of(w, w[PART_LOST], larger(below, above)))

@@ -18,6 +18,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from ringbalance.scene.keys.fields import Reader, choice
+from ringbalance.scene.units import DIMENSIONS, unit_of
 
 Part = TypeVar("Part")
 
@@ -76,6 +77,16 @@ class Key:
     """Whether [uncertainty] may have its half-width."""
     common: bool = False
     """Whether all devices of a scene have it alike, so that its uncertainty is lack of knowledge."""
+    shown_unit: str = ""
+    """In which it is described; empty where its declaration does not say."""
+
+    @property
+    def usual_unit(self) -> str:
+        """Unit in which a person writes its number; empty for what has no unit."""
+        if self.takes.dimension is None:
+            return ""
+        kind = DIMENSIONS[self.takes.dimension]
+        return self.shown_unit if self.shown_unit in kind.units else unit_of(kind.example)
 
 
 @dataclass(frozen=True)
@@ -161,6 +172,7 @@ def keys_of(record: type) -> Mapping[str, Key]:
                 presence=presence,
                 uncertain=(mark := _part(hint, _Uncertain)) is not None,
                 common=mark is not None and mark.common,
+                shown_unit=shown.unit if (shown := _part(hint, Shown)) is not None else "",
             )
             for name, hint in hints.items()
             if (presence := _part(hint, Presence)) is not None

@@ -14,7 +14,7 @@ from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import Place, Schema
 from ringbalance.scene.toml import toml_key, toml_text
-from ringbalance.scene.units import FieldError
+from ringbalance.scene.units import FieldError, format_quantity
 
 _MOST_GUESSED = 100
 """Unknown keys of a file for which the key that was meant is looked for: a third of a millisecond each."""
@@ -107,8 +107,13 @@ class Reading:
         return content if isinstance(content, Mapping) else {}
 
     def _default_text(self, path: str) -> str:
+        if not self.known(path):
+            return MISSING
         source = "from the mesh" if path in self.derived else "by default"
-        return f"{toml_text(self.values[path])} (SI, {source})" if self.known(path) else MISSING
+        value, key = self.values[path], self.schema.key_at(tuple(path.split(".")))
+        if isinstance(value, float) and key.takes.dimension is not None:
+            value = format_quantity(value, key.takes.dimension, key.usual_unit)
+        return f"{toml_text(value)} ({source})"
 
     def completed(self) -> Reading:
         """Fill in the defaults that follow from other values, as far as those are known.

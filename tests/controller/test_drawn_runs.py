@@ -18,7 +18,7 @@ from ringbalance.controller.loop_records import NOTES
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.injection.events import command
-from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
+from ringbalance.reduced_model.injection.march import SPARE, advance, least_later, opening_within
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid, residual_fill_ratio
@@ -146,7 +146,7 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
     )
     made = tuple(chosen.device(number) for number in range(4))
     for under in chosen._under(made, paper_scene.gas.pressure):
-        plant, motions, w = under.plant[0], np.zeros(2, dtype=MOTION), np.zeros(WORKSPACE)
+        plant, motions, w = under.plant[0], np.zeros(1 + SPARE, dtype=MOTION), np.zeros(WORKSPACE)
         rest = LoopPlan.of(
             scene=under.scene,
             model=under.device.model,
@@ -156,10 +156,10 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
         )
         runs = rest.runs(1)
         runs["speed"], runs["residual_fill"] = 1.0, under.residual
-        begun = np.zeros((1, 2 * rest.pairs + 1), dtype=MOTION)
+        begun = np.zeros((1, 2 * rest.pairs + SPARE), dtype=MOTION)
         rest._continued(runs, begun, rest.liquid[None], np.zeros((1, 0, 2)), np.zeros(NOTES), w, traced=False)
         motions[0] = begun[0, 0]
-        longest = opening_within(plant, motions, 0, 1, 0, 5.0, w)
+        longest = opening_within(plant, motions, 0, 1, 0, 5.0, math.nan, w)
         assert 0.0 < longest < 5.0
         fills = []
         for time in (longest, 1.000001 * longest):
@@ -168,4 +168,4 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
             advance(plant, motions[1], plant["valve_lag"] + time, w, 0, 0, w)
             fills.append(least_later(plant, motions, 1, w))
         assert fills[0] >= under.residual > fills[1]
-        assert opening_within(plant, motions, 0, 1, 0, longest / 2, w) == longest / 2
+        assert opening_within(plant, motions, 0, 1, 0, longest / 2, math.nan, w) == longest / 2

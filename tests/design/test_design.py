@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,8 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.judging.search import searched
 from ringbalance.design import designing
-from ringbalance.design.hunt import _MOST, hunt, threshold
+from ringbalance.design.hunt import hunt
+from ringbalance.design.races import VERDICT, threshold
 from ringbalance.design.racing import _settings, near
 from ringbalance.design.space import Space
 from ringbalance.results.requirements import MET, OPEN, Proportion
@@ -117,9 +119,21 @@ def test_the_tube_follows_the_disc() -> None:
 
 @pytest.mark.parametrize("asked", [0.5, 0.9, 0.99])
 def test_the_threshold_is_the_least_fraction_that_is_surely_enough(asked: float) -> None:
-    count = round(threshold(asked) * _MOST)
-    assert Proportion(count=count, of=_MOST).verdict(asked) == MET
-    assert Proportion(count=count - 1, of=_MOST).verdict(asked) == OPEN
+    count = round(threshold(asked) * VERDICT)
+    assert Proportion(count=count, of=VERDICT).verdict(asked) == MET
+    assert Proportion(count=count - 1, of=VERDICT).verdict(asked) == OPEN
+
+
+def test_an_error_in_a_file_of_valves_names_its_cell(tmp_path: Path) -> None:
+    text = rb.bundled_scene("spindle_design").read_text(encoding="utf-8")
+    file = tmp_path / "scene.toml"
+    with_file = re.sub(r"valves = \[.*?^\]", 'valve_file = "v.csv"', text, flags=re.DOTALL | re.MULTILINE)
+    file.write_text(with_file, encoding="utf-8")
+    (tmp_path / "v.csv").write_text("name,conductance,critical_ratio,valve_lag\nV1,0.3 mm,0.3,2 ms\n")
+    with pytest.raises(
+        rb.SceneError, match=r'v\.csv: line 2, column "conductance" = "0.3 mm": "mm" is a unit'
+    ):
+        rb.find_design(rb.load_scene(file))
 
 
 @pytest.mark.parametrize(
@@ -127,7 +141,8 @@ def test_the_threshold_is_the_least_fraction_that_is_surely_enough(asked: float)
     [
         ('pressure = "0.8 MPa"\nvary = ["tube.bor=1mm:2mm"]', "did you mean"),
         ('outer_radius = "20 mm"', "no chamber has room there"),
-        ('valve_file = "none.csv"', "cannot be read"),
+        ('valve_file = "none.csv"', 'valve_file = "none.csv": there is no such file'),
+        ('valves = "valves.csv"', 'or valve_file = "valves.csv" in place of the list'),
         ("", "leaves nothing to choose"),
     ],
 )

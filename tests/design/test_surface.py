@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import expit, logit
+from scipy.optimize import check_grad
+from scipy.special import expit
 
+from ringbalance.design import surface as under_test
 from ringbalance.design.surface import Surface
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 
-BLOCKS = 8
 DEVICES = 64
 
 
@@ -18,15 +19,19 @@ def true_logits(places: FloatArray) -> FloatArray:
     return np.asarray(1.0 + 4.0 * places[:, 0] - 12.0 * (places[:, 1] - 0.4) ** 2)
 
 
+def counted(fraction: FloatArray, *, seed: int) -> IntArray:
+    """Of a block each, whose inputs are spread evenly: half the variance of independent devices."""
+    spread = np.sqrt(0.5 * DEVICES * fraction * (1 - fraction))
+    count = DEVICES * fraction + spread * np.random.default_rng(seed).standard_normal(fraction.size)
+    return np.clip(np.rint(count), 0, DEVICES).astype(np.intp)
+
+
 @pytest.fixture(scope="module")
 def known() -> tuple[FloatArray, Surface]:
     random = np.random.default_rng(1)
-    places, blocks = random.random((120, 3)), np.arange(120) % BLOCKS
-    lucky = np.linspace(-0.5, 0.5, BLOCKS)[blocks]
-    met = random.binomial(DEVICES, expit(true_logits(places) + lucky))
-    devices = np.full(120, DEVICES)
-    surface = Surface.of(places, met=met, devices=devices, blocks=blocks, weights=np.ones(120))
-    return random.random((400, 3)), surface
+    places = random.random((160, 3))
+    met = counted(expit(true_logits(places)), seed=2)
+    return random.random((400, 3)), Surface.of(places, met=met, devices=np.full(160, DEVICES))
 
 
 def test_many_designs_say_more_than_each(known: tuple[FloatArray, Surface]) -> None:
@@ -44,21 +49,45 @@ def test_the_optimum_is_found_where_it_lies(known: tuple[FloatArray, Surface]) -
     assert line[np.argmax(surface.logits(line)[0]), 1] == pytest.approx(0.4, abs=0.05)
 
 
-def test_designs_far_away_do_not_bend_it() -> None:
-    """All of them fail, at places that look alike; their weights are small."""
-    random = np.random.default_rng(2)
-    places = random.random((80, 1))
-    near = np.arange(80) < 60
-    met = np.where(near, random.binomial(DEVICES, 0.9, 80), 0)
-    fits = [
-        Surface.of(
-            places,
-            met=met,
-            devices=np.full(80, DEVICES),
-            blocks=np.zeros(80, dtype=np.intp),
-            weights=np.where(near, 1.0, weight),
-        ).logits(np.array([[0.5]]))[0][0]
-        for weight in (1e-6, 1.0)
-    ]
-    assert fits[0] == pytest.approx(logit(0.9), abs=0.25)
-    assert fits[1] < fits[0] - 1.0
+def test_what_does_not_matter_is_recognised(known: tuple[FloatArray, Surface]) -> None:
+    _, surface = known
+    assert surface.lengths[2] > 3 * min(surface.lengths[:2])
+
+
+def test_a_cliff_does_not_hide_what_matters_on_the_plain_behind_it() -> None:
+    """Devices that cannot be balanced below a size; a loop that loses fewer of the others at an optimum."""
+
+    def true(places: FloatArray) -> FloatArray:
+        loop = expit(3.0 - 20.0 * (places[:, 1] - 0.6) ** 2)
+        return np.asarray(expit(40.0 * (places[:, 0] - 0.4)) * loop)
+
+    places = np.random.default_rng(3).random((150, 2))
+    surface = Surface.of(places, met=counted(true(places), seed=4), devices=np.full(150, DEVICES))
+    line = np.column_stack([np.full(101, 0.7), np.linspace(0, 1, 101)])
+    assert line[np.argmax(surface.logits(line)[0]), 1] == pytest.approx(0.6, abs=0.07)
+    cliff = np.column_stack([np.linspace(0.3, 0.8, 101), np.full(101, 0.6)])
+    assert np.max(np.abs(expit(surface.logits(cliff)[0]) - true(cliff))) < 0.08
+
+
+def test_a_design_of_many_devices_is_known_better(known: tuple[FloatArray, Surface]) -> None:
+    places, _ = known
+    some, met = places[:2], np.array([58, 928])
+    surface = Surface.of(some, met=met, devices=np.array([DEVICES, 16 * DEVICES]))
+    _, spread = surface.logits(some)
+    assert spread[1] < 0.5 * spread[0]
+
+
+def test_the_gradient_by_which_lengths_are_found_is_right() -> None:
+    random = np.random.default_rng(5)
+    places, start = random.random((20, 3)), np.log([2.0, 0.5, 0.5, 0.5])
+    given = {
+        "start": start,
+        "apart": (places[:, np.newaxis] - places) ** 2,
+        "seen": random.standard_normal(20),
+        "noise": np.full(20, 0.1),
+    }
+    at = start + 0.3 * random.standard_normal(4)
+    difference = check_grad(
+        lambda x: under_test._loss(x, **given)[0], lambda x: under_test._loss(x, **given)[1], at
+    )
+    assert difference < 1e-5

@@ -37,10 +37,12 @@ def all_blocks(name: str, both: Both) -> dict[str, Block]:
     """Of a bundled scene, by kind."""
     scene = cast(Scene, rb.load_scene(rb.bundled_scene(name)))
     law, compact = both
+    other = scene.with_values({"controller.kind": "law_based"})
     return {
         "law": law_block(compact),
         "disc": disc_block(scene, law),
         "controller": controller_block(scene),
+        "law_based": controller_block(other, law),
     }
 
 

@@ -50,3 +50,17 @@ def test_bad_input_is_one_error_and_no_file(
     assert main(["export", *words, "--out", str(tmp_path / "out")]) == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_law_based_scene_exports_its_controller(tmp_path: Path) -> None:
+    """What `tune --save` may recommend."""
+    text = Path(OIL).read_text(encoding="utf-8")
+    scene = tmp_path / "tuned.toml"
+    scene.write_text(
+        text.replace("[controller]\n", '[controller]\nkind = "law_based"\n').replace(
+            'kind = "target_vector"\n', ""
+        )
+    )
+    words = ["export", str(scene), "--to", "python", "--block", "controller", "--name", "ctrl"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    assert "Law-based controller" in (tmp_path / "out" / "ctrl.py").read_text(encoding="utf-8")

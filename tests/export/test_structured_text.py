@@ -200,6 +200,7 @@ def test_disc_and_controller_have_the_bits_of_python(blocks: dict[str, Block]) -
     for kind, inputs in (
         ("disc", {"open_time_a": 0.004, "open_time_e": 0.002}),
         ("controller", {"vibration_x": 3e-6, "vibration_y": -2e-6}),
+        ("law_based", {"vibration_x": 3e-6, "vibration_y": -2e-6}),
     ):
         block = blocks[kind]
         machine = Machine(st_files(block, "disc")["disc.st"])
@@ -209,7 +210,7 @@ def test_disc_and_controller_have_the_bits_of_python(blocks: dict[str, Block]) -
             given = {name: value * (step < 2) for name, value in inputs.items()}
             for name, value in given.items():
                 mine[places[name]] = value
-            machine.call("disc_step", [block.constants, *(block.tables or ()), mine, 0.003])
+            machine.call(f"disc_{block.steps}", [block.constants, *(block.tables or ()), mine, 0.003])
             block.run(row, 0.003, given)
             assert np.array(mine).tobytes() == np.array(row).tobytes()
         assert mine != list(block.start)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from ringbalance.reduced_model.pieces.inverse import root_cells, root_of_velocity, velocity_under
+from ringbalance.reduced_model.pieces.inverse import root_cells, root_of_velocity, root_pieces, velocity_under
 from ringbalance.reduced_model.pieces.point import SIPHON
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import (
@@ -85,15 +85,17 @@ def test_a_velocity_loses_the_head_that_drives_it(u: list[float]) -> None:
     whole = rows.arrays({})
     cells = root_cells(*whole, SIPHON).tolist()
     numbers, pieces = (each.tolist() for each in whole)
+    first, near = root_pieces(*whole, SIPHON)
+    near_roots = [[0.0]] * first + near.tolist()
     inside = (s[0] ** 8 / 2 < np.array(u)) & (np.array(u) < s[-1] ** 4 / 2)
     roots = roots_of(table, u)
     right = np.sqrt((np.array(u) + np.sqrt(np.array(u) ** 2 + 4 * np.array(u))) / 2) ** 0.5
     np.testing.assert_allclose(roots[inside], right[inside], rtol=1e-9)
     for speed, root in zip(u, roots.tolist(), strict=True):
         assert velocity_under(numbers, pieces, SIPHON, 1000.0 * root**8) == pytest.approx(speed, rel=1e-12)
-        found, slope = root_of_velocity(cells, pieces, SIPHON, speed)
+        found, slope = root_of_velocity(cells, near_roots, pieces, SIPHON, speed)
         assert found == pytest.approx(1000.0**0.125 * root, rel=1e-12)
-        more = root_of_velocity(cells, pieces, SIPHON, speed * (1 + 1e-6))[0]
+        more = root_of_velocity(cells, near_roots, pieces, SIPHON, speed * (1 + 1e-6))[0]
         assert speed * 1e-6 / (more - found) == pytest.approx(slope, rel=1e-4)
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ringbalance.scene.describe import setting_text
 from ringbalance.scene.units import DIMENSIONS, FieldError, format_quantity, parse_quantity
 
 EVERY_UNIT = [(dimension, unit) for dimension, kind in DIMENSIONS.items() for unit in kind.units]
@@ -145,3 +146,18 @@ def test_any_text_is_read_or_refused(text: str) -> None:
         value, problem = 0.0, error.problem
     assert math.isfinite(value)
     assert problem.isprintable()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "text"),
+    [
+        ("controller.integral_time", 48.0, "0.8 min"),
+        ("controller.integral_time", 5.0, "5 s"),
+        ("controller.derivative_time", 0.06, "0.06 s"),
+        ("controller.limit", 1.375e-7, "0.1375 um"),
+        ("liquid.temperature", 293.15, "20 degC"),
+        ("disc.chambers", 6, "6"),
+    ],
+)
+def test_a_setting_stands_in_minutes_where_these_are_round(path: str, value: float, text: str) -> None:
+    assert setting_text(path, value) == text

@@ -194,15 +194,31 @@ def test_a_nameless_scene_has_the_values_and_the_hash_of_the_named_one(values: d
         ("gas.pressure", 0.88e6, "0.88 MPa"),
         ("tube.bore", 1.37e-3, "1.37 mm"),
         ("liquid.temperature", 300.0, "26.85 degC"),
-        ("controller.integral_time", 10.0, "10.0 s"),
+        ("controller.integral_time", 10.0, "10 s"),
         ("controller.integral_time", 30.0, "0.5 min"),
-        ("rotor.speed", 1000.0, "1000.0 rad/s"),
-        ("gas.valve_lag", 3e-3, "0.003 s"),
+        ("rotor.speed", 1000.0, "1000 rad/s"),
+        ("gas.valve_lag", 3e-3, "3 ms"),
+        ("gas.dead_volume", 1e-6, "1 ml"),
+        ("controller.limit", 1.375e-7, "0.1375 um"),
+        ("controller.gas_time_offset", [1e-3, 2e-3, 0.0, 0.0], ["1 ms", "2 ms", "0 ms", "0 ms"]),
     ],
 )
-def test_a_changed_value_keeps_the_unit_of_its_file(path: str, value: float, text: str) -> None:
-    """Where that gives the value back to its last bit without many digits; else it stands in SI."""
+def test_a_changed_value_keeps_the_unit_of_its_file(path: str, value: object, text: object) -> None:
+    """Where the file has none, the usual unit; in SI where that saves many digits."""
     table, key = path.split(".")
     changed = bundled(PAPER).with_values({path: value})
-    assert getattr(getattr(changed, table), key) == value
+    found = getattr(getattr(changed, table), key)
+    assert (list(found) if isinstance(value, list) else found) == value
     assert tomllib.loads(file_text(changed, to=Path()).decode())[table][key] == text
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_what_is_taken_away_is_gone(whole: bool) -> None:
+    """Alone, beside what stays, and as a whole table."""
+    scene = bundled("spindle_design")
+    changes = dict.fromkeys(["design"] if whole else ["design.pressure", "requirement.settling_time"])
+    without = scene.with_values(changes)
+    assert isinstance(without, Scene)
+    assert without.design.pressure is None
+    assert (without.requirement.settling_time is None) is not whole
+    assert (without.design.axial_width is None) is whole

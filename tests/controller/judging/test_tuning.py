@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -65,14 +64,6 @@ def test_a_tuned_scene_is_a_scene(paper: Tuning) -> None:
     document = paper.to_dict()
     assert document["verdict"] == MET
     assert json.loads(json.dumps(document, allow_nan=False))["settings"] == document["settings"]
-
-
-def test_that_an_algorithm_cannot_be_exported_is_said(paper: Tuning) -> None:
-    settings = {**paper.recommended.settings, "controller.kind": "law_based"}
-    other = replace(paper, recommended=replace(paper.recommended, settings=settings))
-    (told,) = [each.text for each in other.rows().findings if each.code == "tuned_not_exported"]
-    assert "`ringbalance export` writes the target vector" in told
-    assert all(each.code != "tuned_not_exported" for each in paper.rows().findings)
 
 
 def test_too_little_pressure_is_told_from_capacity() -> None:

@@ -1,0 +1,80 @@
+"""How sharp the answer of `ringbalance design` is: the bundled spindle, with six things open, from several
+starts of the search, and with other drawn devices.
+
+python benchmarks/design_spread.py [STARTS [SEEDS]]
+
+A start is the seed of the points that are tried, a seed that of the drawn devices (`run.seed`).  Each answer
+is checked on devices that no step of its search has seen.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+from typing import Final
+
+import ringbalance as rb
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.judging.judge import FRESH, judged_all
+from ringbalance.design.design_rows import design_document, design_rows
+from ringbalance.design.designing import run_design
+from ringbalance.results.result import Presentation
+
+CHECKED: Final = 4096
+"""Further devices on which an answer is checked."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """Of one search."""
+
+    start: int
+    seed: int
+    design: rb.Design
+    fraction: float
+    """Of the further devices."""
+    seconds: float
+    """Processor time of the search."""
+
+    @property
+    def text(self) -> str:
+        """A line."""
+        point = self.design.point
+        keys = (
+            f"bore {1e3 * point['tube.bore']:.3g} mm, {point['gas.pressure'] / 1e6:.3g} MPa, "
+            f"{self.design.space.valve(point)}"
+        )
+        return (
+            f"start {self.start}, seed {self.seed}: {1e6 * self.design.size:.1f} ml, {keys}; "
+            f"{self.fraction:.1%} of {CHECKED} further devices; {self.seconds:.0f} s"
+        )
+
+
+def answer(start: int, seed: int) -> Answer:
+    """Design the bundled spindle, and check it."""
+    scene = rb.load_scene(rb.bundled_scene("spindle_design")).with_values({"run.seed": seed})
+    begun = time.process_time()
+    presentation = Presentation(document=design_document, rows=design_rows)
+    design = run_design(scene, presentation=presentation, workers=1, start=start)
+    seconds = time.process_time() - begun
+    balancer = balancer_of(design.recommended_scene)
+    first = FRESH + CHECKED
+    (judgement,) = judged_all(balancer, [{}], first=CHECKED, most=CHECKED, start=first, whole=False)
+    return Answer(start=start, seed=seed, design=design, fraction=judgement.fraction.value, seconds=seconds)
+
+
+def main(starts: int = 4, seeds: int = 4) -> None:
+    """Print every answer, and how far they lie apart."""
+    for pairs in ([(start, 0) for start in range(starts)], [(0, seed) for seed in range(1, seeds)]):
+        sizes = []
+        for start, seed in pairs:
+            found = answer(start, seed)
+            print(found.text, flush=True)
+            sizes.append(found.design.size)
+        if sizes:
+            print(f"largest over smallest: {max(sizes) / min(sizes) - 1:+.1%}")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))

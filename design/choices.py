@@ -1,0 +1,111 @@
+"""Things to choose from, such as valves: a CSV file, a row for each, whose columns are keys of a table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ringbalance.identification.tables import (
+    Table,
+    decoded,
+    file_name,
+    in_order,
+    parse_table,
+    read_content,
+    split_head,
+)
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
+from ringbalance.scene.keys.declaration import Key
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.schema import ORIGIN
+from ringbalance.scene.units import FieldError
+
+NAME: Final = "name"
+"""Column that names a row, where the table of the scene has no such key."""
+MOST_ROWS: Final = 1_000_000
+_REMARK: Final = re.compile(r"^#.*$", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choices:
+    """Rows of a file, in its order."""
+
+    names: tuple[str, ...]
+    """Empty without a column of them."""
+    rows: tuple[Mapping[str, Any], ...]
+    """By key: a number in SI, a word, or None for an empty cell, which takes the key away."""
+
+
+def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
+    """Read a CSV file as spreadsheets write it, with commas, semicolons or tabs; lines marked # are remarks.
+
+    A head is a key, or a key with the unit of the numbers below it, such as "conductance [l/(s*bar)]".
+    Args: `table`: of the scene. `keys`: of that table.
+    Raises: SceneError: every error of the file, with line and column.
+    """
+    content = _parsed(file)
+    columns: dict[str, list[Any]] = {}
+    faults: list[Fault] = []
+    for head in content.heads:
+        name, unit = split_head(head) or (head, "")
+        key = keys.get(name)
+        if name == NAME and key is None:
+            continue
+        if key is None or name == ORIGIN or not isinstance(key.takes, Reader):
+            known = [each for each, other in keys.items() if isinstance(other.takes, Reader)]
+            problem = f"[{table}] of a scene has no such key{did_you_mean(name, known)}"
+            faults.append(content.head_fault(head, problem, ", ".join((*known, NAME))))
+        elif name in columns:
+            faults.append(content.head_fault(head, "this column stands twice"))
+        else:
+            columns[name], wrong = _column(content, head, unit, key.takes)
+            faults += wrong
+    if not columns and not faults:
+        faults.append(
+            content.head_fault(content.heads[0], f"no column is a key of [{table}]", ", ".join(keys))
+        )
+    if faults:
+        raise SceneError(in_order(faults))
+    rows = tuple(dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    return Choices(names=content.texts(NAME) if NAME in content.heads and NAME not in keys else (), rows=rows)
+
+
+def as_toml(text: str, reader: Reader) -> Any:
+    """Text as a scene file would have it, where a key without unit takes a number."""
+    if reader.dimension is None:
+        for number in (int, float):
+            try:
+                return number(text)
+            except ValueError:
+                continue
+    return text
+
+
+def _parsed(file: Path) -> Table:
+    """Raises: SceneError: the file cannot be read, or is no table."""
+    shown = file_name(file)
+    content, faults = read_content(file, what="file of choices")
+    text, further = ("", faults) if faults else decoded(content, file=shown)
+    if further:
+        raise SceneError(further)
+    table, faults = parse_table(_REMARK.sub("", text), file=shown, most=MOST_ROWS)
+    if table is None or faults:
+        raise SceneError(in_order(faults))
+    return table
+
+
+def _column(table: Table, head: str, unit: str, reader: Reader) -> tuple[list[Any], list[Fault]]:
+    """Values of a column as a scene takes them, and the errors of its cells."""
+    values: list[Any] = []
+    faults: list[Fault] = []
+    for line, cell in zip(table.lines, table.texts(head), strict=True):
+        text = f"{cell} {unit}".strip() if cell else ""
+        try:
+            read = reader.read(as_toml(text, reader)) if text else None
+            values.append(read if isinstance(read, int | float) or not text else text)
+        except FieldError as error:
+            faults.append(table.fault(line, head, cell, error.problem, error.allowed))
+    return values, faults

@@ -164,23 +164,30 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
             "a scene without [fitted]",
         )
     tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
-    rows = LawRows.of(len(tables), edge=_EDGE)
+    rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
     missed = max(_add_way(rows, law, way, table, slack) for way, table in enumerate(tables))
     _add_chamber(rows, scene, law, slack)
-    before, first_level = map(len, rows.arrays({}))
-    left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * first_level
-    level_error = _add_levels(rows, law, slack, most=min(_MOST_LEVELS, left // (8 * WIDTH_OF_ROW)))
-    numbers, pieces = rows.arrays(law.scalars() | {point.LOWEST: VELOCITIES[0], point.HIGHEST: VELOCITIES[1]})
+    before, count = map(len, rows.arrays({}))
+    left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
+    level_error = _add_levels(level_rows, law, slack, most=min(_MOST_LEVELS, left // (8 * WIDTH_OF_ROW)))
+    level_numbers, levels = level_rows.arrays({})
+    numbers, pieces = rows.arrays(
+        law.scalars()
+        | {
+            point.LOWEST: VELOCITIES[0],
+            point.HIGHEST: VELOCITIES[1],
+            point.LEVEL_SCALE: level_numbers[point.LEVEL_SCALE],
+        }
+    )
     constants, cells = np.split(numbers, [point.PLACES])
-    pieces, levels = np.split(pieces, [first_level])
-    constants[[point.LEVEL_CELLS, point.CHAMBER_CELLS]] -= point.PLACES
-    pieces[: len(tables), point.CELLS] -= point.PLACES
-    cells[-_LEVEL_CELLS - 1 :] -= first_level
+    # Cells of the levels come first.
+    constants[point.CHAMBER_CELLS] += _LEVEL_CELLS + 1
+    pieces[: len(tables), point.CELLS] += _LEVEL_CELLS + 1
     made = CompactLaw(
         scene=scene.file,
         constants=tuple(constants.tolist()),
         tables=Tables(
-            cells=tuple(map(int, cells)),
+            cells=tuple(map(int, (*level_numbers[point.PLACES :], *cells))),
             pieces=_tuples(pieces.astype(np.float32)),
             levels=_tuples(levels),
         ),
@@ -258,8 +265,7 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -
     error = np.zeros_like(x)
     for first, last in pairwise(ends.tolist()):
         error[first + (first > 0) : last + 1] = np.max(np.abs(level.errors(x, first, last)))
-    scale, first = rows.add_cells(x[ends], cells=_LEVEL_CELLS)
-    rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = scale, first
+    rows.numbers[0][point.LEVEL_SCALE] = rows.add_cells(x[ends], cells=_LEVEL_CELLS)[0]
     widened = replace(width, value=np.hypot(width.value, error))
     rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
     return float(np.max(error))

@@ -161,6 +161,7 @@ class CalibratedLaw:
         return {
             point.LARGEST_FILL: self.max_fill_ratio,
             point.AMBIENT: self.ambient_pressure,
+            point.LEAST_PRESSURE: -self.ambient_pressure,
             point.GAS_FACTOR: self.gas_factor,
             point.PORT: path.port_pressure,
             point.CREST: path.crest,
@@ -184,9 +185,10 @@ class CalibratedLaw:
         }
 
     @cached_property
-    def _lists(self) -> tuple[list[float], list[list[float]]]:
+    def _lists(self) -> tuple[list[float], list[float], list[list[float]]]:
+        """Numbers, cells and pieces."""
         numbers, pieces = self.constants
-        return numbers.tolist(), pieces.tolist()
+        return numbers[: point.PLACES].tolist(), numbers[point.PLACES :].tolist(), pieces.tolist()
 
     def evaluate(
         self,
@@ -243,8 +245,8 @@ class CalibratedLaw:
     def _answer(self, x: Any, y: Any, p: Any, primed: Any) -> list[float]:
         """A query of `point` with its answer."""
         query = [float(x), float(y), float(p), float(primed), *_REST_OF_QUERY]
-        numbers, pieces = self._lists
-        point.answer(numbers, numbers, pieces, pieces, query, True)
+        numbers, cells, pieces = self._lists
+        point.answer(numbers, cells, pieces, pieces, query, True)
         return query
 
     def _answers(self, asked: _Asked, margins: FloatArray = _NO_MARGINS) -> _Answers:
@@ -334,8 +336,8 @@ class CalibratedLaw:
         """`point.set_margin` over a primed tube's cavity in one direction, Pa; both None without a crest."""
         if not self.path.crest:
             return None, None
-        (c, p), w = self._lists, [*fills, gas_pressure, 1.0, *_REST_OF_QUERY]
-        point.set_levels(c, c, p, w, *fills)
+        (c, k, p), w = self._lists, [*fills, gas_pressure, 1.0, *_REST_OF_QUERY]
+        point.set_levels(c, k, p, w, *fills)
         w[point.UP_GAS] = self.gas_factor * gas_pressure
         if reverse:
             point.turn(w)
@@ -345,7 +347,7 @@ class CalibratedLaw:
         w[point.HOLDS], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
         if w[point.DRIVING] > 0:
             way = int(c[point.WAY_BACK]) if reverse else point.THERE
-            point.set_lost(c, p, w, way)
+            point.set_lost(k, p, w, way)
             lost, off = w[point.PART_LOST], point.lost_width(p, int(w[point.BESIDE]), w[point.TO_END])
         spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
         point.set_margin(c, w, lost, off, point.known_of(w, lost, spread))

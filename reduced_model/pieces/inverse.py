@@ -23,8 +23,8 @@ from ringbalance.reduced_model.pieces.point import (
     END,
     LARGEST_FILL,
     LAST,
-    LEVEL_CELLS,
     LEVEL_SCALE,
+    PLACES,
     SCALE,
     SLOWEST,
     Law,
@@ -63,7 +63,7 @@ def growth(p: Pieces, row: int, t: float) -> float:
 def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
     """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; it goes on straight beyond the fills."""
     x = max(0.0, min(fill, c[LARGEST_FILL]))
-    row = int(c[int(x * c[LEVEL_SCALE] + c[LEVEL_CELLS])])
+    row = int(c[PLACES + int(x * c[LEVEL_SCALE])])
     t = x - p[row][END]
     slope = growth(p, row, t)
     return quintic(p, row, t) + (fill - x) * slope, slope
@@ -76,7 +76,7 @@ def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
         return pressure * p[way][CREEP]
     root = sqrt(sqrt(pressure))
     s = min(sqrt(root), p[way][LAST])
-    row = piece(p, int(c[int(s * p[way][SCALE] + p[way][CELLS])]), s)
+    row = piece(p, int(c[PLACES + int(s * p[way][SCALE] + p[way][CELLS])]), s)
     return root * root * quintic(p, row, s - p[row][END])
 
 
@@ -120,7 +120,7 @@ def _span(numbers: FloatArray, rows: FloatArray, way: int) -> tuple[int, int]:
     """First and last piece of a way."""
     scale, place = rows[way, SCALE], rows[way, CELLS]
     first, last = (
-        int(numbers[int(s * scale + place)]) for s in (rows[way, SLOWEST] ** 0.125, rows[way, LAST])
+        int(numbers[PLACES + int(s * scale + place)]) for s in (rows[way, SLOWEST] ** 0.125, rows[way, LAST])
     )
     return first, last
 

@@ -2,10 +2,11 @@
 
 The one source of every host: Python runs it as it stands, `translate` writes it in other languages, so it
 keeps to numbers, rows of numbers, `if`, `while` and functions.  `c` holds the law's numbers, `p` its pieces,
-`q` those of the levels, `k` cells of equal length that say at which piece to begin looking, `w` a query with
-its answer and all between; the names below are places in them.  A piece is a polynomial in the distance from
-its end.  Gauge pressures in Pa, velocities in m/s, half-widths at 95 %; upstream is the chamber that gives
-liquid.  Source: `tube.regime`, whose conditions these are; half-widths by linear propagation.
+`q` those of the levels, `k` cells of equal length that say at which piece to begin looking, the levels'
+first, `w` a query with its answer and all between; the names below are places in them.  A piece is a
+polynomial in the distance from its end.  Gauge pressures in Pa, velocities in m/s, half-widths at 95 %;
+upstream is the chamber that gives liquid.  Source: `tube.regime`, whose conditions these are; half-widths by
+linear propagation.
 
 A full siphon loses a part R of what drives it, p_d, up to the crest, so that a column separates where the
 pressure that holds it there is below R p_d.  Both velocities are worked out only next to that, where an
@@ -28,7 +29,7 @@ Query = list[float] | FloatArray
 # Of the law; OF_...: squared half-widths, relative but for that of the crest.
 LARGEST_FILL, AMBIENT, GAS_FACTOR, PORT, CREST, COLUMN, TRAPPED, VAPOUR = 0, 1, 2, 3, 4, 5, 6, 7
 RELEASED, CAVITY_KNOWN, OF_DENSITY, OF_BLOWN, OF_SPEED, OF_GAS, OF_CREST = 8, 9, 10, 11, 12, 13, 14
-OF_LIQUID, CLEARING_KNOWN, LOWEST, HIGHEST, LEVEL_SCALE, LEVEL_CELLS = 15, 16, 17, 18, 19, 20
+OF_LIQUID, CLEARING_KNOWN, LOWEST, HIGHEST, LEVEL_SCALE, LEAST_PRESSURE = 15, 16, 17, 18, 19, 20
 # Row of the way back; where a block that builds on the law has its own numbers; how a velocity carries gas.
 CHAMBER_SCALE, CHAMBER_CELLS, WAY_BACK, BLOCK, CARRY, CARRY_FROM, PLACES = 21, 22, 23, 24, 25, 26, 27
 
@@ -116,7 +117,7 @@ def quintic(p: Pieces, row: int, t: float) -> float:
 @both_ways
 def level(c: Law, k: Cells, q: Levels, w: Query, fill: float) -> float:
     """Hydrostatic pressure of a chamber's liquid, with its half-width; a fill within the range."""
-    row = int(k[int(fill * c[LEVEL_SCALE] + c[LEVEL_CELLS])])
+    row = int(k[int(fill * c[LEVEL_SCALE])])
     t = fill - q[row][END]
     w[LEVEL_WIDTH] = q[row][WIDTH] + t * q[row][WIDTH_SLOPE]
     return larger(
@@ -395,11 +396,18 @@ def set_lost(k: Cells, p: Pieces, w: Query, way: int) -> None:
 
 
 @both_ways
-def set_slower(k: Cells, p: Pieces, w: Query, way: int, widths: bool) -> None:
-    """The slower of the whole tube, which has been looked up, and the column up to the crest."""
+def set_slower(k: Cells, p: Pieces, w: Query, way: int, covered: bool, widths: bool) -> None:
+    """The slower of the whole tube, which has been looked up, and the column up to the crest.
+
+    Args: `covered`: whether the downstream liquid covers the port; else a column that separates runs out.
+    """
     w[FULL] = 0.0
+    w[PRIMED_AFTER] = w[SWEPT]
     if w[HOLDS] < w[LOST]:
         w[REGIME] = SEPARATED
+        w[PRIMED_AFTER] = 0.0
+        if covered:
+            w[PRIMED_AFTER] = w[SWEPT]
         find(k, p, w, way, w[HOLDS])
         set_speed(p, w, widths)
         if w[HOLDS] > SURELY * w[LOST]:
@@ -427,13 +435,8 @@ def over_crest(c: Law, k: Cells, p: Pieces, w: Query, way: int, widths: bool) ->
     if w[HOLDS] <= 0.0:
         return
     set_lost(k, p, w, way)
-    set_slower(k, p, w, way, widths)
+    set_slower(k, p, w, way, covered, widths)
     w[STATUS] = OK
-    w[PRIMED_AFTER] = w[SWEPT]
-    if w[REGIME] == SEPARATED:
-        w[PRIMED_AFTER] = 0.0
-        if covered:
-            w[PRIMED_AFTER] = w[SWEPT]
     if widths:
         set_widths(c, k, p, w, way)
     set_status(c, w)
@@ -522,7 +525,7 @@ def is_usual(c: Law, w: Query) -> bool:
         if w[FILL] <= c[LARGEST_FILL]:
             if w[OPPOSITE_FILL] >= 0.0:
                 if w[OPPOSITE_FILL] <= c[LARGEST_FILL]:
-                    if w[PRESSURE] + c[AMBIENT] >= 0.0:
+                    if w[PRESSURE] >= c[LEAST_PRESSURE]:
                         return w[PRESSURE] <= GREATEST_PRESSURE
     return False
 
@@ -530,7 +533,7 @@ def is_usual(c: Law, w: Query) -> bool:
 @both_ways
 def worth_of(c: Law, w: Query) -> float:
     """What an unusual query is worth."""
-    if w[PRESSURE] + c[AMBIENT] >= 0.0 and w[PRESSURE] <= GREATEST_PRESSURE:
+    if w[PRESSURE] >= c[LEAST_PRESSURE] and w[PRESSURE] <= GREATEST_PRESSURE:
         return larger(fill_status(c, w[FILL]), fill_status(c, w[OPPOSITE_FILL]))
     return INVALID
 

@@ -47,9 +47,9 @@ class LawRows:
     def add_cells(self, knots: FloatArray, *, cells: int) -> tuple[float, float]:
         """Cells for the pieces that are added next, equally long, that say at which piece to begin looking.
 
-        Returns: Cells for one of x, and the place of x = 0.
+        Returns: Cells for one of x, and the place of x = 0, counted from the first of all cells.
         """
-        start, place = float(knots[0]), sum(each.size for each in self.numbers)
+        start, place = float(knots[0]), sum(each.size for each in self.numbers[1:])
         first = sum(map(len, (self.ways, *self.pieces)))
         edges = np.linspace(start, float(knots[-1]), cells + 1)
         scale = cells / (float(knots[-1]) - start)
@@ -82,10 +82,9 @@ class LawRows:
     def add_levels(self, levels: Table) -> None:
         """Hydrostatic pressure over the fill, with its half-width in column 3.
 
-        Its knots are equally spaced, and cells end there.
+        The first that is added. Its knots are equally spaced, and cells end there.
         """
-        cells = self.add_cells(levels.knots, cells=levels.knots.size - 1)
-        self.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = cells
+        self.numbers[0][point.LEVEL_SCALE] = self.add_cells(levels.knots, cells=levels.knots.size - 1)[0]
         self.add(levels.knots[1:], levels.quintics, levels.lines(levels.column(3)))
 
     def add_way(self, way: int, table: Table, density: float, *, error: float, more: Sequence[float]) -> None:

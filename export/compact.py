@@ -31,7 +31,7 @@ VELOCITIES: Final = (1e-3, 100.0)
 """m/s, that heads are tabulated for."""
 TOLERANCE: Final = 1e-4
 """Of a velocity against the calibrated law."""
-_OF_HEADS: Final = 0.35 * TOLERANCE
+_OF_HEADS: Final = 0.25 * TOLERANCE
 """What of it a head takes."""
 _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""

@@ -27,7 +27,14 @@ from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.pieces.compiled_point import answer_each
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of, velocities_of
+from ringbalance.reduced_model.tube.heads import (
+    BACK_SHARE,
+    SHARE,
+    SHARE_WIDTH,
+    TubeHeads,
+    roots_of,
+    velocities_of,
+)
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -346,9 +353,12 @@ class CalibratedLaw:
         w[point.UP_SQUARE] = point.up_square(c, w)
         w[point.HOLDS], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
         if w[point.DRIVING] > 0:
-            way = int(c[point.WAY_BACK]) if reverse else point.THERE
-            point.set_lost(k, p, w, way)
-            lost, off = w[point.PART_LOST], point.lost_width(p, int(w[point.BESIDE]), w[point.TO_END])
+            point.find(k, p, w, point.SIPHON, w[point.DRIVING])
+            root = w[point.EIGHTH] / self.density**0.125
+            column = BACK_SHARE if reverse and self.heads.return_hump else SHARE
+            lost = float(self.heads.siphon.cubic(root, column))
+            off = float(self.heads.siphon.straight(root, SHARE_WIDTH))
+            w[point.LOST] = lost * w[point.DRIVING]
         spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
         point.set_margin(c, w, lost, off, point.known_of(w, lost, spread))
         sides = [

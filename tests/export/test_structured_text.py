@@ -46,11 +46,11 @@ OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
 
 
 OPERATIONS: Final = (
-    ("blocked", True, 80),
-    ("flows", False, 140),
+    ("blocked", True, 90),
+    ("flows", False, 120),
     ("flows", True, 200),
-    ("carries", False, 165),
-    ("carries", True, 230),
+    ("carries", False, 145),
+    ("carries", True, 225),
 )
 """At the most, by what the tube does and whether half-widths are asked for."""
 

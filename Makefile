@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd pages docs dist lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-units test-versions lint format bench bench-cfd pages docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -34,6 +34,10 @@ test: lint ## lint, types and every test but the heavy ones and the faults
 
 test-faults: env ## kills, damaged caches, odd environments: a few minutes, part of .ci/run
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults
+
+test-units: env ## units of `export` under FMPy, fmutool and the cross-compiler, which it fetches
+	$(VENV)/bin/uv run --no-project --python $(PYTHON_IN_VENV) --with fmpy --with fmu-manipulation-toolbox --with ziglang -- \
+		python -m pytest tests/export/test_fmu.py
 
 test-short: lint ## lint, types and a short selection of the tests
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) $(SHORT_TESTS)

@@ -104,10 +104,10 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
     """Whether each driven chamber has kept its residual fill and will, with the tail of its injection."""
     spare, found = loop.chambers // 2 * 2, True
     for i in range(loop.chambers // 2):
-        if run.asked[i] > 0.0 and found:
+        if run.asked[i] > 0.0:
             motions[spare] = motions[i]
             run.lowest[i] = least_later(plant, motions, spare, w)
-            found = run.lowest[i] >= run.residual_fill
+            found = found and run.lowest[i] >= run.residual_fill
     return found
 
 

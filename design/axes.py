@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
@@ -23,7 +23,7 @@ from ringbalance.results.numbers import given as given_text
 from ringbalance.results.numbers import plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
-from ringbalance.scene.faults import Fault, SceneError, did_you_mean
+from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError, did_you_mean
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
@@ -156,17 +156,22 @@ def _merged(parts: Sequence[Point]) -> Point:
 
 def _shares(sample: str, axes: int) -> FloatArray:
     """Points of a sample in the unit cube, shape (n, axes)."""
-    kind, _, text = sample.partition(":")
-    if kind not in _SAMPLES or not text.isdecimal() or not 1 <= int(text) <= MOST_POINTS:
-        allowed = f"one of {', '.join(f'{each}:N' for each in _SAMPLES)} with at most {MOST_POINTS} points"
-        problem = "this is no sample"
-        raise SceneError.of_option(option="--sample", value=sample, problem=problem, allowed=allowed)
-    count = int(text)
+    kind, count = _sample_size(sample)
     if kind == "latin":
         columns = [quantiles(f"axis {place}", range(count), seed=0) for place in range(axes)]
         return np.stack(columns, axis=-1)
     found: FloatArray = registered("function", "sobol")(axes, count)
     return found
+
+
+def _sample_size(sample: str) -> tuple[str, int]:
+    """Kind and number of points. Raises: SceneError: no sample."""
+    kind, _, text = sample.partition(":")
+    if kind not in _SAMPLES or not text.isdecimal() or not 1 <= int(text) <= MOST_POINTS:
+        allowed = f"one of {', '.join(f'{each}:N' for each in _SAMPLES)} with at most {MOST_POINTS} points"
+        problem = "this is no sample"
+        raise SceneError.of_option(option="--sample", value=sample, problem=problem, allowed=allowed)
+    return kind, int(text)
 
 
 def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> Plan:
@@ -209,15 +214,37 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
 
     Raises: SceneError: it cannot be read, or anything in it is wrong.
     """
+    if not file.is_file():
+        raise SceneError.of_file(str(file), "there is no such file", "a TOML file with vary and sample")
     try:
         content = read_toml(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise SceneError.of_file(str(file), f"the plan cannot be read: {error}") from error
     texts, sample = content.pop("vary", None), content.pop("sample", "")
-    if content or not isinstance(texts, list) or not isinstance(sample, str):
-        problem = f"unknown key {next(iter(content))}" if content else "it is no plan"
-        raise SceneError.of_file(str(file), problem, 'vary = ["tube.bore=0.5mm:2mm:30"], sample = "sobol:64"')
-    return plan_of_texts(scene, list(map(str, texts)), sample=sample, folder=file.parent)
+    faults = [
+        (name, f"unknown key{did_you_mean(name, ('vary', 'sample'))}", "vary and sample") for name in content
+    ]
+    if not isinstance(texts, list) or not all(isinstance(each, str) for each in texts):
+        faults.append(("vary", "it is no list of axes", '["tube.bore=0.5mm:2mm:30"]'))
+    if not isinstance(sample, str):
+        faults.append(("sample", "it is no text", '"sobol:64"'))
+    if faults:
+        raise SceneError(
+            Fault(file=str(file), key=name, problem=problem, allowed=allowed)
+            for name, problem, allowed in faults
+        )
+    try:
+        plan = plan_of_texts(scene, texts, sample=sample, folder=file.parent)
+        if sample:
+            _sample_size(sample)
+    except SceneError as error:
+        raise SceneError(
+            replace(each, file=str(file), key=each.key.removeprefix("--"))
+            if each.file == COMMAND_LINE
+            else each
+            for each in error.faults
+        ) from error
+    return plan
 
 
 def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
@@ -232,7 +259,7 @@ def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
         else:
             raise _fault(text, "no key stands before a sign =", "KEY=VALUES, such as tube.bore=0.5mm:2mm:30")
     if len(keys) == 1 and keys[0][0] in scene_kind(scene.balancer).schema.tables:
-        return _table_axis(scene, keys[0][0], folder / keys[0][1][0])
+        return _table_axis(scene, keys[0][0], folder / keys[0][1][0], shown=keys[0][1][0])
     return _linked([_values(scene, path, values) for path, values in keys], keys[0][0])
 
 
@@ -243,7 +270,7 @@ def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
         return _linked([_values(scene, path, each) for path, each in zip(name, values, strict=True)], name[0])
     if name in scene_kind(scene.balancer).schema.tables:
         if isinstance(values, str | Path):
-            return _table_axis(scene, name, Path(values))
+            return _table_axis(scene, name, Path(values), shown=str(values))
         # A table of pandas is taken by its rows, one mapping as the only one.
         values = values.to_dict("records") if hasattr(values, "to_dict") else values
         values = [values] if isinstance(values, Mapping) else values
@@ -346,10 +373,10 @@ def _reader(scene: SceneFile, path: str) -> Reader:
     return declared.takes
 
 
-def _table_axis(scene: SceneFile, table: str, file: Path) -> Axis:
-    """Rows of a CSV file, each of which sets some keys of a table."""
+def _table_axis(scene: SceneFile, table: str, file: Path, *, shown: str) -> Axis:
+    """Rows of a CSV file, each of which sets some keys of a table. Args: `shown`: its name."""
     if not file.is_file():
-        raise _fault(f"{table}={file}", "there is no such file", f"a CSV file with keys of [{table}]")
+        raise _fault(f"{table}={shown}", "there is no such file", f"a CSV file with keys of [{table}]")
     keys = scene_kind(scene.balancer).schema.tables[table].keys
     found = read_choices(file, table=table, keys=keys)
     rows = ({f"{table}.{key}": value for key, value in row.items()} for row in found.rows)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ringbalance.export.blocks import law_facts
 from ringbalance.export.compact import Answer, CompactLaw
+from ringbalance.export.hosts import plain_name
 from ringbalance.scene.arrays import FloatArray
 
 COLUMNS: Final = (
@@ -47,6 +48,7 @@ def _header(law: CompactLaw, errors: tuple[FloatArray, float]) -> list[str]:
     return [
         f"# {line.strip()}"
         for line in (
+            f"Flow law of a liquid-ring balancer, made by ringbalance from {plain_name(law.scene)}.",
             *law_facts(law).splitlines(),
             "units: fill ratios in 1, gauge pressures in Pa, velocities in m/s; uncertainty expanded (95 %)",
             "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse, 4 siphon or separated",

@@ -180,7 +180,7 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     written = _TEXT[language]
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
-        title=f"{block.title}, made by ringbalance from {_named(block)}.",
+        title=f"{block.title}, made by ringbalance from {plain_name(block.scene)}.",
         facts=block.facts,
         name=name,
         upper=name.upper(),
@@ -197,9 +197,9 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     )
 
 
-def _named(block: Block) -> str:
-    """The scene's file without what could end a comment."""
-    return re.sub(r"[^\w./ -]", "_", block.scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
+def plain_name(scene: str) -> str:
+    """A scene's file without what could end a comment."""
+    return re.sub(r"[^\w./ -]", "_", scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 
 def _lines(texts: Sequence[str], per_line: int = 4) -> str:

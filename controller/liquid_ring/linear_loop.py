@@ -58,7 +58,7 @@ class StateSpace:
         return make(self.a, self.b, self.c, self.d, self.dt, **names)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class LinearLoop:
     """Plant and controller about the balanced state.
 
@@ -79,6 +79,17 @@ class LinearLoop:
     """i = dt/Ti."""
     derivative: float
     """q = Td/dt."""
+
+    def __repr__(self) -> str:
+        """What it says of the loop, without its matrices."""
+        plant = self.plant
+        lines = [
+            f"Linear loop, {'stable' if self.stable else 'unstable'}, sampled every {plant.dt:g} s",
+            f"  disk margin {self.disk_margin:.3g} of 2",
+            f"  peak of the sensitivity {self.sensitivity_peak:.3g}, zone {self.zone}",
+            f"  plant: {', '.join(plant.inputs)} -> {', '.join(plant.outputs)}; the controller the other way",
+        ]
+        return "\n".join(lines)
 
     @property
     def stable(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Final
 
 import numpy as np
@@ -97,11 +98,23 @@ class LiquidRing:
 
     def _corners(self, least_fill: float | None) -> ComplexArray:
         """Of the moments that the disc can form: every pair fully to one side or the other, kg m."""
-        n = self.chambers
-        axes = chamber_directions(n)[: n // 2]
-        seen_from = np.exp(1j * np.pi * (2 * np.arange(n) + 1) / n + 0.5j * np.pi)
-        signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)
-        return np.asarray(self.largest_pair_moment(least_fill=least_fill) * (signs @ axes))
+        if least_fill not in self._corners_found:
+            moment = self.largest_pair_moment(least_fill=least_fill)
+            self._corners_found[least_fill] = moment * _corner_directions(self.chambers)
+        return self._corners_found[least_fill]
+
+    @cached_property
+    def _corners_found(self) -> dict[float | None, ComplexArray]:
+        return {}
+
+
+@cache
+def _corner_directions(chambers: int) -> ComplexArray:
+    """Of the moments that a disc can form, for a pair's moment of one."""
+    axes = chamber_directions(chambers)[: chambers // 2]
+    seen_from = np.exp(1j * np.pi * (2 * np.arange(chambers) + 1) / chambers + 0.5j * np.pi)
+    signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)
+    return np.asarray(signs @ axes)
 
 
 def starting_pressure(

@@ -63,6 +63,8 @@ _OPENINGS: Final = 42
 """Valve-open times that are tried at most to leave a chamber its residual fill."""
 SPARE: Final = 3
 """Motions that these are tried on."""
+_LEFT_OVER: Final = 1e-4
+"""Fill ratio that may be left above the residual one, over the error allowed to a step."""
 _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 
 
@@ -114,24 +116,38 @@ def opening_within(
         `duration` leaves, not a number where it is not known.
     Returns: zero where the chamber is already there.
     """
-    y, residual = motions[pair].state, motions[pair].residual
+    y, residual, opened, way = motions[pair].state, motions[pair].residual, spare + 2, spare + 1
     low, high, near, stays = 0.0, duration, 1e-9 * duration, 0
+    spared = _LEFT_OVER * plant.relative_error
+    if lowest >= residual:
+        return duration
+    motions[opened] = motions[pair]
+    _open(plant, motions[opened], chamber, w)
+    motions[way] = motions[opened]
+    _march(plant, motions[way], duration, w, 0, 0, w, False)
+    passes = motions[way].least_fill < residual
+    if passes:
+        high = motions[way].now
+    pace = abs(motions[way].state[U]) * plant.tube_area / plant.chamber_volume
     # How far the driven chamber falls below its residual fill, with either time.
     before = residual - (plant.total - y[X] if chamber else y[X])
-    motions[spare + 2] = motions[pair]
-    _open(plant, motions[spare + 2], chamber, w)
-    after = residual - (_least_after(plant, motions, spare, duration, w) if math.isnan(lowest) else lowest)
+    known = not (passes or math.isnan(lowest))
+    after = residual - (lowest if known else _least_after(plant, motions, spare, high, w))
     if after <= 0.0:
         return duration
+    if after < pace * high:
+        # Its tail is much the same for a somewhat shorter time.
+        before = after - pace * high
     for step in range(_OPENINGS):
-        middle = _look_at(low, high, before, after, step, near)
+        middle = _look_at(low, high, before + spared / 2.0, after + spared / 2.0, step, near)
+        motions[way] = motions[opened]
         found = residual - _least_after(plant, motions, spare, middle, w)
         if found > 0.0:
             high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1
         else:
             low, before, after, stays = middle, found, after * (0.5 if stays > 0 else 1.0), 1
-            motions[spare + 2] = motions[spare + 1]
-        if high - low <= near:
+            motions[opened] = motions[way]
+        if high - low <= near or -spared <= found <= 0.0:
             break
     return low
 
@@ -161,10 +177,9 @@ def _open(plant: Record, motion: Record, chamber: int, w: FloatArray) -> None:
 def _least_after(plant: Record, motions: Record, spare: int, duration: float, w: FloatArray) -> float:
     """Lowest fill of the driven chamber until an injection and its tail are over.
 
-    `motions[spare + 2]` is on the way, its valve open, and `motions[spare + 1]` will be as far on it as steps
-    have nothing to do with its end.
+    `motions[spare + 1]` is on the way, its valve open, and goes as far on it as steps have nothing to do with
+    its end.
     """
-    motions[spare + 1] = motions[spare + 2]
     left = duration - motions[spare + 1].now
     _march(plant, motions[spare + 1], left, w, 0, 0, w, False)
     motions[spare] = motions[spare + 1]
@@ -200,7 +215,8 @@ def _march(
 ) -> None:
     """Steps and their events, with the valves as they are.
 
-    Args: `to_end`: whether the last step is shortened to what is left, or not taken.
+    Args: `to_end`: whether the last step is shortened to what is left, or not taken; then a chamber that
+        passes its residual fill ends them too.
     """
     left, goes_on = duration, False
     while left > 0.0:
@@ -216,11 +232,18 @@ def _march(
             _rest_gases(plant, motion)
             _pass(plant, motion, left, notes, row, count)
             return
-        if not to_end and motion.length >= left and not in_closed_form(plant, motion):
+        if not to_end and _goes_no_further(plant, motion, left):
             return
         h, goes_on = _step(plant, motion, left, notes, row, count, w)
         _pass(plant, motion, left if h >= left else h, notes, row, count)
         left = 0.0 if h >= left else left - h
+
+
+@in_place
+def _goes_no_further(plant: Record, motion: Record, left: float) -> bool:
+    """Whether the next step would be shortened, or the driven chamber is below its residual fill."""
+    shortened = motion.length >= left and not in_closed_form(plant, motion)
+    return bool(shortened or motion.least_fill < motion.residual)
 
 
 @in_place

@@ -13,7 +13,12 @@ from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_rad
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
-from ringbalance.reduced_model.chamber.values import RingValues, share_across
+from ringbalance.reduced_model.chamber.values import (
+    RingValues,
+    chamber_closed_forms,
+    chamber_pressure,
+    share_across,
+)
 from ringbalance.reduced_model.law.calibrated_law import (
     WIDTH,
     CalibratedLaw,
@@ -124,14 +129,11 @@ def nominal_laws(scenes: Sequence[Scene], *, gravity: bool) -> tuple[CalibratedL
 
 def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLaw]:
     """Of scenes that are alike."""
-    fills = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0]
-    heads = TubeHeads.nominal(Designs.stacked(scenes))
-    rings = [RingValues.of(scene, fill_ratio=fills, gravity=gravity) for scene in scenes]
-    moments = [
-        scene.disc.moment_factor * ring.moment.value for scene, ring in zip(scenes, rings, strict=True)
-    ]
-    levels = pressure_tables(scenes, fills, [ring.hydrostatic_pressure.value for ring in rings])
-    curves = smooth_tables(fills, np.stack(moments, axis=1))
+    fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
+    heads = TubeHeads.nominal(designs)
+    pressures, moments = _chambers(designs, scenes, fills, gravity=gravity)
+    levels = pressure_tables(scenes, fills, pressures)
+    curves = smooth_tables(fills, designs.scene.disc.moment_factor * moments)
     for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):
         yield _put_together(
             scene,
@@ -140,6 +142,20 @@ def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLa
             inputs=DriveUncertainty(),
             moment=CalibratedMoment(along=moment.with_column(WIDTH, 0.0), across=_across_table(scene, fills)),
         )
+
+
+def _chambers(
+    designs: Designs, scenes: Sequence[Scene], fills: FloatArray, *, gravity: bool
+) -> tuple[list[FloatArray], FloatArray]:
+    """Hydrostatic pressures, Pa, shape (fills,) each, and moments, kg m, shape (fills, designs)."""
+    if gravity:
+        rings = [RingValues.of(scene, fill_ratio=fills, gravity=True) for scene in scenes]
+        moments = np.stack([ring.moment.value for ring in rings], axis=1)
+        return [ring.hydrostatic_pressure.value for ring in rings], moments
+    scene, shape = designs.scene, (fills.size, designs.size)
+    pressure = chamber_pressure(scene=scene, fill_ratio=fills[:, None])
+    _, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=fills[:, None])
+    return list(np.broadcast_to(pressure, shape).T), np.broadcast_to(moment, shape)
 
 
 def _put_together(

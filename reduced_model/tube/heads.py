@@ -86,7 +86,7 @@ class TubeHeads:
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
         exact = _Widths(*([np.zeros(log_u.size)] * 4))
         return tuple(
-            cls._tabled([each.of_design(i) for each in lost], exact, shortest=0)[0]
+            cls._tabled([each.of_design(i) for each in lost], exact, shortest=0)
             for i in range(lost[0].root.shape[1])
         )
 
@@ -112,19 +112,16 @@ class TubeHeads:
         """Of a scene's tube, with half-widths at the samples."""
         log_u = _places(2 * _SAMPLES - 1)
         lost = [_Lost.of(log_u, value[:, 0]) for value in _sampled(scene, log_u)]
-        heads, missed = cls._tabled(
-            lost, widths, shortest=2, allowed=_OF_TOLERANCE * max(scene.tolerance, _FINEST)
-        )
-        return replace(heads, interpolation_error=_OF_HEAD * missed)
+        allowed = _OF_TOLERANCE * max(scene.tolerance, _FINEST)
+        heads = cls._tabled(lost, widths, shortest=2, allowed=allowed)
+        missed = [
+            table.quintic(e.root) / e.over_root - 1.0 for e, table in zip(lost, heads.tables, strict=False)
+        ]
+        return replace(heads, interpolation_error=_OF_HEAD * float(np.max(np.abs(missed))))
 
     @classmethod
-    def _tabled(
-        cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float = 0.0
-    ) -> tuple[TubeHeads, float]:
-        """From losses and half-widths at samples; `shortest`: as `knots_of`, or 0 for a knot at each sample.
-
-        Returns: The heads, and the largest relative error of a velocity.
-        """
+    def _tabled(cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float = 0.0) -> TubeHeads:
+        """From losses and half-widths at samples; `shortest`: as `knots_of`, or 0 for a knot at each one."""
         whole, *ways = lost
         alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
         ways = ways[:1] if alike else ways
@@ -133,13 +130,12 @@ class TubeHeads:
             columns += [_half_width(widths.share), *(whole.share(way, allowed) for way in ways)]
         there = zip(ways, widths.ways, strict=False)
         tables = [(way, [way.ratio(allowed), _half_width(width)]) for way, width in there]
-        made, missed = [], 0.0
+        made = []
         for each, some in [(whole, columns), *tables]:
             knots = knots_of(each.root, some, shortest=shortest) if shortest else np.arange(each.root.size)
             made.append(table_at(each.root, knots, some))
-            missed = max(missed, float(np.max(np.abs(made[-1].quintic(each.root) / each.over_root - 1.0))))
         hump, back = (*made[1:], None, None)[:2]
-        return cls(siphon=made[0], hump=hump, return_hump=back), missed
+        return cls(siphon=made[0], hump=hump, return_hump=back)
 
     @property
     def tables(self) -> tuple[Table, ...]:
@@ -159,6 +155,15 @@ class TubeHeads:
     def uncertainty(self, velocity: npt.ArrayLike) -> FloatArray:
         """Expanded uncertainty (95 %) of k over k + 1 at velocities above zero, m/s."""
         return self.siphon.straight(roots_of(self.siphon, velocity), LOSS)
+
+    def uncertainty_of_models(self, velocity: float, *, scene: Scene) -> float:
+        """The same by models alone, as `without_inputs` has it, of one velocity."""
+        knots, root = self.siphon.knots, roots_of(self.siphon, velocity)
+        piece = self.siphon.place(root)[0]
+        ends = slice(int(piece), int(piece) + 2)
+        place = crest_end_uncertainty(scene.tube, 0.0)
+        widths = _widths(scene, velocities_of(self.siphon)[ends], place=place, by_inputs=False)
+        return float(np.interp(root, knots[ends], widths.whole))
 
     def without_inputs(self, *, scene: Scene) -> TubeHeads:
         """The heads with models' uncertainties alone."""

@@ -119,6 +119,16 @@ def test_zones_follow_the_peak(scene: Scene, law: CompleteLaw) -> None:
     assert loops[-1].disk_margin == 0.0
 
 
+def test_it_prints_its_margins_and_not_its_matrices(scene: Scene, law: CompleteLaw) -> None:
+    loop = rb.linear_loop(scene, flow_law=law)
+    text = repr(loop)
+    assert f"disk margin {loop.disk_margin:.3g}" in text
+    assert f"zone {loop.zone}" in text
+    assert "stable" in text
+    assert "array" not in text
+    assert len(text.splitlines()) == 4
+
+
 def test_python_control_takes_it(scene: Scene, law: CompleteLaw) -> None:
     control = pytest.importorskip("control")
     loop = rb.linear_loop(scene, flow_law=law)

@@ -6,6 +6,7 @@ import csv
 import re
 import shutil
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from io import BytesIO
 from pathlib import Path
@@ -30,6 +31,11 @@ MOST_OF_ALL_THREE = 76_000
 """Law, disc and controller in one, for six systems."""
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+STARTS = {
+    "law": {"fill_ratio": 0.3, "opposite_fill_ratio": 0.2, "gas_pressure": 4e5, "primed": 1.0},
+    "disc": {"open_time_a": 0.03, "open_time_b": 0.05},
+    "controller": {"vibration_x": 3e-6, "vibration_y": -2e-6},
+}
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
 
 
@@ -128,16 +134,38 @@ def _table(file: Path) -> list[dict[str, float]]:
 
 
 @needs_compiler
-def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both, version: Version) -> None:
+@pytest.mark.parametrize("kind", ["law", "disc", "controller", "law_based"])
+def test_fmpy_finds_no_fault_and_simulates_it(
+    tmp_path: Path, blocks: dict[str, Block], version: Version, kind: str
+) -> None:
+    """`make test-units` has it, and the next two."""
     fmpy = pytest.importorskip("fmpy")
     validation = pytest.importorskip("fmpy.validation")
-    file = tmp_path / "disc.fmu"
-    file.write_bytes(fmu_bytes(law_block(six[1]), "disc", version)[0])
+    block, file = blocks[kind], tmp_path / "disc.fmu"
+    file.write_bytes(fmu_bytes(block, "disc", version)[0])
     assert validation.validate_fmu(str(file)) == []
-    start = {"fill_ratio": 0.3, "opposite_fill_ratio": 0.2, "gas_pressure": 4e5, "primed": True}
-    rows = fmpy.simulate_fmu(str(file), start_values=start, stop_time=0.1)
-    right = six[1].answer(fill_ratio=0.3, opposite_fill_ratio=0.2, gas_pressure=4e5, primed=True)
-    assert rows["velocity"][-1] == right.velocity
+    values = dict.fromkeys((each.name for each in block.variables if each.input), 0.0)
+    values |= STARTS["controller" if kind == "law_based" else kind]
+    row, flags = list(block.start), {each.name for each in block.variables if each.kind == "Boolean"}
+    start = {name: bool(value) if name in flags else value for name, value in values.items()}
+    rows = fmpy.simulate_fmu(str(file), start_values=start, stop_time=0.1, output_interval=0.01)
+    for seen in rows[1:]:
+        right = block.run(row, 0.01, values)
+        told = {name: float(seen[name]) for name in rows.dtype.names if name in right}
+        # Steps of FMPy are differences of times.
+        assert told == pytest.approx(right, rel=1e-12)
+
+
+def test_fmutool_finds_no_fault(tmp_path: Path, blocks: dict[str, Block], version: Version) -> None:
+    pytest.importorskip("fmu_manipulation_toolbox")
+    for kind in ("law", "disc", "controller"):
+        file = tmp_path / f"{kind}.fmu"
+        file.write_bytes(fmu_bytes(blocks[kind], "disc", version)[0])
+        command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(file), "-check"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        told = done.stdout + done.stderr
+        assert f"compliant with FMI-{version[3]}.0" in told
+        assert f"No semantic error against the FMI-{version[3]} standard" in told
 
 
 @pytest.mark.parametrize("kind", ["law", "disc", "controller", "law_based"])

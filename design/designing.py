@@ -144,7 +144,8 @@ def run_design(
             settings = best.judgement.settings
             whole = partial(judged_design, scene, best.point, settings=settings, whole=True)
             effects, judgement = _effects(space, best, settings, crew, whole)
-    sized = best if space.sized else None
+        sized = best if space.sized else None
+        doubt = _doubt(races, sized) if sized else None
     return Design(
         presentation=presentation,
         given=scene,
@@ -156,7 +157,7 @@ def run_design(
         point=found.static.reach_point if best is None else best.point,
         judgement=judgement,
         smaller=_smaller(judged, sized) if sized else None,
-        doubt=_doubt(races, sized) if sized else None,
+        doubt=doubt,
         front=_front(races, asked, best),
         effects=effects,
         ranking=_ranked(scene, best, judgement),

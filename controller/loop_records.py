@@ -161,7 +161,7 @@ _RUN_WHOLE: Final = (
 _RUN_PAIRS: Final = (
     "fill",  # x of the chamber on the positive side
     "asked",  # valve-open time of the command, s, zero for none
-    "lowest",  # fill that the driven chamber comes to by it, not a number where this is not known
+    "lowest",  # fill that the driven chamber comes to by it
     "given",  # law-based: valve-open time of the last command, s
     "change",  # law-based: wanted of the pair's moment, kg m
     "least",  # law-based: bounds of that

@@ -139,11 +139,16 @@ class Column:
     derivatives: tuple[FloatArray, ...] = ()
     """Slope, or slope and curvature; none: straight between the knots."""
 
+    @property
+    def stored(self) -> tuple[FloatArray, ...]:
+        """What a table holds of it."""
+        return self.value, *self.derivatives
+
     def misses(self, x: FloatArray, inside: IntArray) -> BoolArray:
         """Whether pieces miss more than is allowed, shape (pieces,); `inside`: their samples, (pieces, n)."""
         first, last = inside[:, :1], inside[:, -1:]
         h = x[last] - x[first]
-        powers = polynomial(h, *((each[first], each[last]) for each in (self.value, *self.derivatives)))
+        powers = polynomial(h, *((each[first], each[last]) for each in self.stored))
         t, value = (x[inside] - x[last]) / h, powers.pop()
         while powers:
             value = powers.pop() + t * value
@@ -174,5 +179,5 @@ def knots_of(x: FloatArray, columns: Sequence[Column], *, shortest: int = 1) -> 
 
 def table_at(x: FloatArray, knots: IntArray, columns: Sequence[Column]) -> Table:
     """The columns at the knots."""
-    stored = [values[knots] for column in columns for values in (column.value, *column.derivatives)]
+    stored = [values[knots] for column in columns for values in column.stored]
     return Table(knots=x[knots], columns=np.concatenate(stored))

@@ -20,8 +20,9 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.chamber.contributions import chamber_status
-from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
+from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.injection.dynamics import Event
+from ringbalance.reduced_model.injection.line_answers import line_answers
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed

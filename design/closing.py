@@ -107,8 +107,10 @@ def _closed_in(races: Races, size: float) -> list[Judged]:
         least = min((each.size for each in judged if each.met), default=math.inf)
         options = _options(races, size, below=least / (1 + AS_SMALL))
         chosen = _chosen(races, options, size, least)
-        if not chosen or (judged and not any(each.gain > _WORTH for each in chosen)):
-            break
+        if not any(each.gain > _WORTH for each in chosen):
+            if judged:
+                break
+            chosen = _nearest(races)
         if turn == 0 and not races.space.sets_controller:
             races.told("settings of the designs that are judged")
             (settings,) = deal(races.executor, [partial(tuned_settings, races.space.hasty, chosen[0].point)])
@@ -148,6 +150,16 @@ def _chosen(races: Races, options: Sequence[_Option], size: float, least: float)
         for each in options
     ]
     return sorted(rated, key=lambda each: (-max(each.gain, _WORTH), -each.logit))[:2]
+
+
+def _nearest(races: Races) -> list[_Option]:
+    """The two whose devices come nearest to what is required, where none promises to meet it."""
+    points = races.points
+    order = sorted(range(len(points.points)), key=lambda at: races.candidates[at].race.order)[:2]
+    return [
+        _Option(points=points.some([at]), size=races.candidates[at].size, logit=-math.inf, spread=0.0)
+        for at in order
+    ]
 
 
 def _judged(races: Races, options: Sequence[_Option], settings: Settings | None) -> list[Judged]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Demand
+from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.tuning import (
     causes_of,
@@ -139,12 +139,13 @@ def _findings(design: Design) -> Iterator[Finding]:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
         yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
     yield Finding(code="design_looked", values=counted)
-    yield from _sharpness(design)
-    if judgement.verdict != MET:
+    if design.succeeded:
+        yield from _sharpness(design)
+    else:
         yield from _misses(design, judgement)
     for path, end in _edges(design):
-        name = VALVE if path == VALVE else path
-        yield Finding(code="design_edge", values={"path": name, "end": end})
+        code = "design_edge" if design.succeeded else "design_edge_missed"
+        yield Finding(code=code, values={"path": path, "end": end})
 
 
 def _sharpness(design: Design) -> Iterator[Finding]:
@@ -160,12 +161,14 @@ def _sharpness(design: Design) -> Iterator[Finding]:
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
     """What stands against it, and by how much."""
     worst = min(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
-    reached = _reached(judgement, worst)
+    parts = (judgement.asked, 0.5)
+    part = next((each for each in parts if math.isfinite(_reached(judgement, worst, each))), parts[0])
+    reached = _reached(judgement, worst, part)
     values: dict[str, Value] = {
         "what": worst.code.replace("_", " "),
         "required": f"{worst.sense} {given(worst.required, worst.unit, digits=4)}",
         "share": judgement.fraction_of(worst).value,
-        "asked": judgement.asked,
+        "asked": part,
         "reached": given(reached, worst.unit, digits=3) if math.isfinite(reached) else MISSING,
     }
     yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
@@ -174,10 +177,10 @@ def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
     yield from design.ranking.findings()
 
 
-def _reached(judgement: Judgement, demand: Demand) -> float:
-    """What the fraction asked for comes to."""
+def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:
+    """What a fraction of the devices comes to."""
     values = np.sort(getattr(judgement.outcomes, demand.outcome))
-    count = max(math.ceil(judgement.asked * values.size), 1)
+    count = max(math.ceil(fraction * values.size), 1)
     return float(values[-count] if demand.sense == AT_LEAST else values[count - 1])
 
 
@@ -239,11 +242,12 @@ def _effect_text(design: Design, effect: Effect) -> str:
 
 
 def _front_table(design: Design) -> Table:
+    asked = REQUIRED_FRACTION if design.judgement is None else design.judgement.asked
     paths = [path for path in design.space.paths if path not in design.space.valve_paths]
     rows = [
         (
             given(each.size, "m^3", digits=4),
-            given(finite(each.race.time(0.9)), "s", digits=3),
+            given(finite(each.race.time(asked)), "s", digits=3),
             given(finite(each.race.gas), "J", digits=3),
             *([design.space.valve(each.point)] if design.space.valves else []),
             *(setting_text(path, each.point.get(path)) for path in paths),
@@ -252,9 +256,9 @@ def _front_table(design: Design) -> Table:
     ]
     valve = (VALVE,) if design.space.valves else ()
     columns = (path.rpartition(".")[2].replace("_", " ") for path in paths)
-    heads = ("size", "90 % within", "gas, median", *valve, *columns)
+    heads = ("size", f"{percent(asked)} within", "gas, median", *valve, *columns)
     return Table(
-        caption="Others, none of which is better in everything; on the devices of the search",
+        caption="Others, none of which is better in everything; times and gas of few devices",
         heads=heads,
         rows=rows,
     )

@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
+from scipy.special import logit
 
 from ringbalance.controller.balancer import Draws, Settings, balancer_of
 from ringbalance.controller.judging.judge import FRESH, Judgement
@@ -88,7 +89,7 @@ class Design(PresentedResult):
     """By how much other drawn devices would move the size, relative (95 %); None: the fraction of devices
     does not grow with the size, or that does not vary."""
     front: tuple[Candidate, ...]
-    """Of those that meet it on the devices of the search, none better than another in size, time and gas."""
+    """Others that should meet what is required, none better than another in size, time and gas."""
     effects: tuple[Effect, ...]
     ranking: Ranking
 
@@ -143,7 +144,8 @@ def run_design(
             settings = best.judgement.settings
             whole = partial(judged_design, scene, best.point, settings=settings, whole=True)
             effects, judgement = _effects(space, best, settings, crew, whole)
-    sized = best if space.sized else None
+        sized = best if space.sized else None
+        doubt = _doubt(races, sized) if sized else None
     return Design(
         presentation=presentation,
         given=scene,
@@ -155,8 +157,8 @@ def run_design(
         point=found.static.reach_point if best is None else best.point,
         judgement=judgement,
         smaller=_smaller(judged, sized) if sized else None,
-        doubt=_doubt(races, sized) if sized else None,
-        front=_front(races, asked, least=0.0 if best is None else best.size),
+        doubt=doubt,
+        front=_front(races, asked, best),
         effects=effects,
         ranking=_ranked(scene, best, judgement),
     )
@@ -238,15 +240,18 @@ def _moves(axis: Axis, point: Point) -> Sequence[tuple[str, dict[str, Any]]]:
     ]
 
 
-def _front(races: Races, asked: float, *, least: float) -> tuple[Candidate, ...]:
+def _front(races: Races, asked: float, best: Judged | None) -> tuple[Candidate, ...]:
     """The smallest first; of those that are nearly alike the first.
 
-    Args: `least`: size of the design, m^3: smaller ones met what is required on few devices alone.
+    Args: `best`: the design itself: smaller ones met what is required on few devices alone.
     """
+    if best is None:
+        return ()
+    promises = races.surface().logits(races.coordinates(races.points))[0]
     passing = [
         each
-        for each in sorted(races.candidates, key=lambda each: each.size)
-        if each.size >= least and each.race.meets.size >= DEVICES and each.race.fraction >= races.threshold
+        for each, promise in sorted(zip(races.candidates, promises, strict=True), key=lambda row: row[0].size)
+        if each.size >= best.size and each.race.meets.size >= DEVICES and promise >= logit(races.threshold)
     ]
 
     def of(each: Candidate) -> tuple[float, float, float]:
@@ -263,5 +268,6 @@ def _front(races: Races, asked: float, *, least: float) -> tuple[Candidate, ...]
         )
         if not beaten and not alike:
             kept.append(each)
+    kept = [each for each in kept if each.point != best.point]
     places = {round(i * (len(kept) - 1) / max(_FRONT - 1, 1)) for i in range(_FRONT)} if kept else set()
     return tuple(each for i, each in enumerate(kept) if i in places)

@@ -37,6 +37,8 @@ _SMALLEST, _SPREAD = 12, 14
 """Of the points that can work: the smallest, and as many over all sizes, that race at first."""
 _STEPS: Final = (0.15, 0.15, 0.12, 0.1, 0.08, 0.06)
 """Standard deviations of the steps in the unit cube, round by round."""
+_FEWEST: Final = 2
+"""Rounds, and one more for every axis, up to all."""
 _SIZES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.1), (0.85, 1.1), (0.88, 1.08), (0.9, 1.06))
 """Times the size that is looked for: between which points are tried."""
 _ANYWHERE: Final = (0.5, 0.5, 0.3, 0.3, 0.3, 0.3)
@@ -115,11 +117,17 @@ def hunt(
     )
     static, whole = _first(races)
     size = _size_at_first(races) if races.candidates else math.nan
-    for number in range(0 if whole or not races.candidates else len(_STEPS)):
+    rounds = [] if whole or not races.candidates else _rounds(len(space.axes))
+    for place, number in enumerate(rounds):
         about = f", about {1e6 * size:.4g} ml" if space.sized else ""
-        told(f"round {number + 1} of {len(_STEPS)}{about}")
+        told(f"round {place + 1} of {len(rounds)}{about}")
         size = _round(races, size, number)
     return Hunt(static=static, races=races, whole=whole, size=size)
+
+
+def _rounds(axes: int) -> list[int]:
+    """Places of the rounds among `_STEPS`: fewer where little varies."""
+    return [round(at) for at in np.linspace(0, len(_STEPS) - 1, min(_FEWEST + axes, len(_STEPS)))]
 
 
 def _first(races: Races) -> tuple[Static, bool]:

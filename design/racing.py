@@ -86,9 +86,14 @@ class Race:
         return float(np.sort(self.times)[max(math.ceil(fraction * self.times.size), 1) - 1])
 
     @property
+    def settled(self) -> float:
+        """Fraction of the devices that settle at all."""
+        return float(np.mean(np.isfinite(self.times))) if self.times.size else 0.0
+
+    @property
     def order(self) -> tuple[float, ...]:
-        """Most devices first, then soonest."""
-        return (-float(self.met), self.time(0.9), self.gas)
+        """Most devices first that meet what is required, then that settle, then soonest."""
+        return (-self.fraction, -self.settled, self.time(0.9), self.time(0.5), self.gas)
 
     def joined(self, other: Race) -> Race:
         """With the outcomes of further devices."""

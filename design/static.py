@@ -19,16 +19,16 @@ from ringbalance.design.axes import Point
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of, nameless
-from ringbalance.scene.designs import Designs, in_batches
+from ringbalance.scene.designs import Designs, in_batches, input_effects
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.uncertain import combined, input_sides
 
 Record = dict[str, Any]
 
@@ -146,31 +146,19 @@ def _plain(value: float) -> float | None:
 
 def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
     """Regimes, values and half-widths (95 %, of the inputs) of designs, (1 + 2 k, n); NaN: not known."""
-    answers = Answers.of(designs)
-    values = _values(answers)
-    widths = np.full(values.shape, np.nan)
-    if intervals:
-        moved = {
-            name: _moved(values, [_values(Answers.of(_like(designs, side))) for side in sides])
-            for name, sides in input_sides(designs.scene).items()
-        }
-        squares = [np.square(np.nan_to_num(each)) for each in combined(moved).values()]
-        widths = np.where(np.isnan(values), np.nan, np.sqrt(sum(squares, np.zeros(values.shape))))
-    return np.concatenate([answers.regime[np.newaxis].astype(np.float64), values, widths])
+    if not intervals:
+        values = _values(designs)
+        return np.concatenate([values, np.full(values[1:].shape, np.nan)])
+    function = partial(_values, near=TubeFlow.of(designs))
+    values, effects = input_effects(designs.scene, function, each=designs.size)
+    variance = sum((np.square(np.nan_to_num(each)) for each in effects.values()), np.zeros(values.shape))
+    return np.concatenate([values, np.where(np.isnan(values), np.nan, np.sqrt(variance))[1:]])
 
 
-def _values(answers: Answers) -> FloatArray:
-    return np.array([getattr(answers, _FIELDS.get(name, name)) for name in UNITS])
-
-
-def _like(designs: Designs, scene: Scene) -> Designs:
-    return Designs(scene=scene, size=designs.size)
-
-
-def _moved(values: FloatArray, sides: Sequence[FloatArray]) -> FloatArray:
-    """The larger change to either side."""
-    lower, higher = (np.abs(side - values) for side in sides)
-    return np.asarray(np.fmax(lower, higher))
+def _values(designs: Designs, *, near: TubeFlow | None = None) -> FloatArray:
+    """Regime, and what `UNITS` names. Args: `near`: as for `Answers.of`."""
+    answers = Answers.of(designs, near=near)
+    return np.array([answers.regime, *(getattr(answers, _FIELDS.get(name, name)) for name in UNITS)])
 
 
 def _of_balancer(scene: SceneFile) -> Record:

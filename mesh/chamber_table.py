@@ -19,6 +19,7 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from ringbalance.mesh.wall_integrals import (
     COLUMNS,
@@ -31,7 +32,6 @@ from ringbalance.mesh.wall_integrals import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
-from ringbalance.scene.splines import Pieces
 
 TOLERANCE: Final = 1e-9
 """Of a table between its nodes: of the whole volume and of the whole moment."""
@@ -80,15 +80,15 @@ class ChamberTable:
         """Columns and their derivatives by L, each of shape (4, ...); held beyond the ends."""
         level = np.asarray(levels, dtype=np.float64)
         held = np.clip(level, self.nodes[0], self.nodes[-1])
-        values, slopes = (np.moveaxis(each(held), -1, 0) for each in (self._pieces, self._slopes))
+        values, slopes = self._pieces(held), self._slopes(held)
         return np.where(held >= self.nodes[-1] * _EMPTY, 0.0, values), np.asarray(slopes)
 
     @cached_property
-    def _pieces(self) -> Pieces:
+    def _pieces(self) -> CubicHermiteSpline:
         return _hermite(self.nodes, self.columns)
 
     @cached_property
-    def _slopes(self) -> Pieces:
+    def _slopes(self) -> PPoly:
         return self._pieces.derivative()
 
     def at_radius(self, radius: npt.ArrayLike, column: int) -> FloatArray:
@@ -135,9 +135,9 @@ _SETTLED: Final = 1e-15
 """Of the largest level: a few times the round-off, below which a step changes nothing."""
 
 
-def _hermite(nodes: FloatArray, columns: FloatArray) -> Pieces:
+def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:
     """Args: `columns`: values and, behind them, slopes at the nodes."""
-    return Pieces.hermite(nodes, *np.split(columns.T, 2, axis=1))
+    return CubicHermiteSpline(nodes, *np.split(columns, 2), axis=1)
 
 
 @lru_cache(maxsize=32)
@@ -193,7 +193,7 @@ def _refined(
         middle = (nodes[cell] + nodes[cell + 1]) / 2
         result = exact(middle)
         pieces = _hermite(nodes, columns)
-        guess = np.concatenate([pieces(middle), pieces.derivative()(middle)], axis=1).T
+        guess = np.concatenate([pieces(middle), pieces(middle, 1)])
         error[:, cell] = np.abs(result - guess)
         nodes = np.insert(nodes, cell + 1, middle)
         columns = np.insert(columns, cell + 1, result, axis=1)

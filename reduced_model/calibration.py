@@ -14,7 +14,6 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, ca
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.gas_line import line_answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel
@@ -52,7 +51,6 @@ def calibrate(scene: AnyScene) -> Calibration:
         operating_point=point,
         residual=ResidualLiquid.of(scene, law=law),
         tube_liquid=TubeLiquid.of(scene, law=law),
-        gas_line=line_answers(scene, BalancerModel.of(law)),
         instability=AsynchronousInstability.of(scene),
         models_used=models_used(scene),
         statistics={

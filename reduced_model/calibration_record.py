@@ -30,6 +30,7 @@ from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import HumpGas, Scene
+from ringbalance.scene.registry import registered
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 UNITS: Final = {
@@ -353,8 +354,6 @@ class Calibration(PresentedResult):
     """Of a chamber emptied under the scene's gas pressure, and what a pair can use."""
     tube_liquid: TubeLiquid
     """In the tube of a pair around its first injection, and what it does to the vibration."""
-    gas_line: tuple[LineAnswer, ...]
-    """What the gas line can deliver, or both ends of a default range of lines."""
     instability: AsynchronousInstability | None
     """Whirl that surface waves lock to; None where there is no such wave."""
     models_used: tuple[ModelUsed, ...]
@@ -366,6 +365,13 @@ class Calibration(PresentedResult):
     def budgets(self) -> Mapping[str, Budget]:
         """Uncertainty budget of every main quantity, made when it is first asked for."""
         return _budgets(self)
+
+    @cached_property
+    def gas_line(self) -> tuple[LineAnswer, ...]:
+        """What the gas line can deliver, or both ends of a default range of lines; found when asked for."""
+        # The march is compiled: what needs no answer of it loads no compiler.
+        answers: tuple[LineAnswer, ...] = registered("function", "line_answers")(self.scene, self.model)
+        return answers
 
     @property
     def holding(self) -> Holding:

@@ -175,7 +175,7 @@ def _kept_file() -> Path:
 
 
 _PACKAGES: Final = (
-    *("numpy", "scipy", "scikit-fem", "pyamg", "meshio"),
+    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "meshio"),
     *("matplotlib", "pyvista", "vtk", "jinja2"),
 )
 _ROOT: Final = Path(__file__).resolve().parents[1]

@@ -15,7 +15,7 @@ from ringbalance.design.axes import unit_of_path
 from ringbalance.design.sweep import Sweep
 from ringbalance.reports.figure import FIFTH, FOUND, INK, MAP, MUTED, Axis, Drawing, draw
 from ringbalance.results.numbers import given
-from ringbalance.scene.arrays import BoolArray
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.platform.files import write_whole
 
 _SHOWN: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor")
@@ -96,23 +96,22 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
     best = np.flatnonzero(view.shown) == sweep.best
     over = [*keys, shown][:2]
 
-    def points(panel: Axes, mask: Any, look: dict[str, Any]) -> None:
+    def points(panel: Axes, mask: BoolArray, **look: Any) -> None:
         if mask.any():
-            mine = {key: each[mask] if isinstance(each, np.ndarray) else each for key, each in look.items()}
-            panel.scatter(*(each[mask] for each in over), zorder=3, **mine)
+            panel.scatter(*(each[mask] for each in over), zorder=3, **look)
 
     def paint(panel: Axes) -> None:
-        look: dict[str, Any] = {"color": FOUND}
+        shades = [(FOUND, feasible)]
         if len(keys) == 1:
             order = np.argsort(over[0], kind="stable")
             panel.plot(over[0][order], over[1][order], color=MUTED, linewidth=1)
             _noted(panel, view.note)
         else:
-            look = _coloured(panel, view, keys, shown, feasible, title, unit)
-        if look:
-            points(panel, feasible, {"s": 14, "label": "feasible", **look})
-        points(panel, ~feasible, {"s": 12, "label": "not feasible", **_OUTSIDE})
-        points(panel, best, {"s": 90, "label": "best", **_BEST})
+            shades = _coloured(panel, view, keys, shown, feasible, title, unit)
+        for place, (shade, mask) in enumerate(shades):
+            points(panel, mask, s=14, color=shade, label="" if place else "feasible")
+        points(panel, ~feasible, s=12, label="not feasible", **_OUTSIDE)
+        points(panel, best, s=90, label="best", **_BEST)
 
     y = axes[1] if len(axes) > 1 else (title, unit)
     return draw(f"sweep-{name.replace('_', '-')}", paint, x=axes[0], y=y, columns=3, wide=True, height=3.6)
@@ -125,18 +124,26 @@ def _noted(panel: Axes, *parts: str) -> None:
 
 def _coloured(
     panel: Axes, view: _View, keys: list[Any], shown: Any, feasible: Any, title: str, unit: str
-) -> dict[str, Any]:
-    """Shades over a grid of two keys with the boundary of what is feasible; else a look of the points."""
+) -> list[tuple[str, BoolArray]]:
+    """Shades over a grid of two keys with the boundary of what is feasible; else those of feasible points."""
     known = shown[np.isfinite(shown)]
     low, high = float(known.min()), float(known.max())
-    span: dict[str, Any] = {"cmap": ListedColormap(list(MAP)), "vmin": low, "vmax": high}
     ends = f"{title}: {given(low, unit, digits=3)} (light) to {given(high, unit, digits=3)} (dark)"
     _noted(panel, view.note, ends)
     sizes = [len(np.unique(each)) for each in keys]
     if view.sweep.plan.sample or min(sizes) < 2 or math.prod(sizes) != shown.size:
-        return {"c": shown, **span}
+        return _shades(shown, low, high, feasible)
     x, y, z, inside = (np.reshape(each, sizes) for each in (*keys, shown, feasible))
-    panel.pcolormesh(x, y, z, shading="nearest", edgecolors="none", **span)
+    colours = ListedColormap(list(MAP))
+    panel.pcolormesh(x, y, z, shading="nearest", edgecolors="none", cmap=colours, vmin=low, vmax=high)
     if inside.any() and not inside.all():
         panel.contour(x, y, inside.astype(float), levels=[0.5], colors=INK, linewidths=1.2)
-    return {}
+    return []
+
+
+def _shades(shown: FloatArray, low: float, high: float, among: BoolArray) -> list[tuple[str, BoolArray]]:
+    """Shades that points have, the darkest first, each with its points: one colour is written at a time."""
+    share = np.nan_to_num((shown - low) / ((high - low) or 1.0))
+    place = np.minimum(share * len(MAP), len(MAP) - 1).astype(int)
+    masks = [(shade, among & np.isfinite(shown) & (place == number)) for number, shade in enumerate(MAP)]
+    return [(shade, mask) for shade, mask in reversed(masks) if mask.any()]

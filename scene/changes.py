@@ -76,8 +76,7 @@ def nameless(scene: Kind, values: Mapping[str, object]) -> tuple[Kind, str]:
 
 
 def _digest(document: Mapping[str, Any], known: CheckedValues) -> str:
-    alike = {name: text for name, text in known.texts.items() if document.get(name) is known.document[name]}
-    return hashlib.sha256(toml_bytes(document, alike)).hexdigest()
+    return hashlib.sha256(toml_bytes(document, known.texts)).hexdigest()
 
 
 def _changed_document(
@@ -226,13 +225,15 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
 
 def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None:
     """Of a changed value; what stood there was said of the value before."""
-    stated = dict(table.get(ORIGIN, {})) if isinstance(table.get(ORIGIN, {}), Mapping) else {}
-    stated.pop(key, None)
+    before = table.pop(ORIGIN, {})
+    stated = (
+        {name: each for name, each in before.items() if name != key} if isinstance(before, Mapping) else {}
+    )
     if origin is not None and origin != "given":
         stated[key] = origin
-    table.pop(ORIGIN, None)
     if stated:
-        table[ORIGIN] = stated
+        # The same object, where nothing was said of the value, need not be read again.
+        table[ORIGIN] = before if stated == before else stated
 
 
 def _plain(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> tuple[Any, float]:

@@ -43,9 +43,12 @@ class Designs:
         return cls(scene=replace(scene, **changed), size=size[0])
 
     @classmethod
-    def stacked(cls, scenes: Sequence[Scene]) -> Designs:
-        """The designs of scenes that differ in numbers alone."""
-        return cls(scene=_stacked(scenes), size=len(scenes))
+    def stacked(cls, scenes: Sequence[Scene], *, each: int = 1) -> Designs:
+        """The designs of scenes that differ in numbers alone.
+
+        Args: `each`: n of every scene whose own numbers are arrays of shape (n,), one behind the other.
+        """
+        return cls(scene=_stacked(scenes, each), size=each * len(scenes))
 
     def take(self, rows: IntArray) -> Designs:
         """Some of the designs, by number."""
@@ -69,19 +72,22 @@ class Designs:
         return {table: keys for table, keys in tables.items() if keys}
 
 
-def _stacked(values: Sequence[Any]) -> Any:
+def _stacked(values: Sequence[Any], each: int) -> Any:
     first = values[0]
-    if all(value is first for value in values):
+    if all(value is first for value in values) and (each == 1 or not _varies(first)):
         return first
     if isinstance(first, ChamberGeometry):
         return first
     if is_dataclass(first):
-        each = {f.name: _stacked([getattr(value, f.name) for value in values]) for f in fields(first)}
-        return replace(first, **each)  # type: ignore[type-var]
+        names = [f.name for f in fields(first)]
+        parts = {name: _stacked([getattr(value, name) for value in values], each) for name in names}
+        return replace(first, **parts)  # type: ignore[type-var]
     if isinstance(first, tuple):
-        return tuple(_stacked(parts) for parts in zip(*values, strict=True))
-    if isinstance(first, float):
-        return first if all(value == first for value in values) else np.array(values, dtype=np.float64)
+        return tuple(_stacked(parts, each) for parts in zip(*values, strict=True))
+    if isinstance(first, float | np.ndarray):
+        if all(isinstance(value, float) and value == first for value in values):
+            return first
+        return np.concatenate([np.broadcast_to(value, each) for value in values])
     return first
 
 
@@ -108,12 +114,10 @@ def _taken(value: Any, rows: IntArray) -> Any:
 
 def _alike(first: Any, second: Any) -> bool:
     """Whether two records differ in numbers alone."""
-    if first is second:
+    if first is second or all(isinstance(value, float | np.ndarray) for value in (first, second)):
         return True
     if type(first) is not type(second):
         return False
-    if isinstance(first, float):
-        return True
     if is_dataclass(first) and not isinstance(first, ChamberGeometry):
         return all(_alike(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
     if isinstance(first, tuple):
@@ -133,19 +137,24 @@ def alike(scenes: Sequence[Scene]) -> list[list[int]]:
     return batches
 
 
-def in_batches(scenes: Sequence[Scene], function: Callable[[Designs], FloatArray]) -> FloatArray:
+def in_batches(
+    scenes: Sequence[Scene], function: Callable[[Designs], FloatArray], *, each: int | None = None
+) -> FloatArray:
     """Values of a function of designs for scenes that may differ in more than numbers, kind by kind.
 
-    Args: `function`: returns an array whose last axis runs over the designs.
-    Returns: The same over the scenes, in their order.
+    Args: `function`: returns an array whose last axis runs over the designs. `each`: n where numbers of every
+        scene are arrays of shape (n,).
+    Returns: The same over the scenes, in their order; with n on a last axis of its own.
     """
     parts, batches = [], alike(scenes)
     for rows in batches:
-        value = function(Designs.stacked([scenes[i] for i in rows]))
+        value = function(Designs.stacked([scenes[i] for i in rows], each=each or 1))
         # Where no number of the batch differs, or none that the function knows, one value is that of all.
-        parts.append(np.broadcast_to(value, (*value.shape[:-1], len(rows))))
+        whole = np.broadcast_to(value, (*value.shape[:-1], len(rows) * (each or 1)))
+        parts.append(whole.reshape(*value.shape[:-1], len(rows), -1))
     order = np.argsort(np.concatenate(batches))
-    return np.concatenate(parts, axis=-1)[..., order]
+    found = np.concatenate(parts, axis=-2)[..., order, :]
+    return found[..., 0] if each is None else found
 
 
 def input_effects(
@@ -154,6 +163,7 @@ def input_effects(
     *,
     among: Collection[str] = UNCERTAIN_QUANTITIES,
     errors: bool = True,
+    each: int | None = None,
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Values of a scene, and what each uncertain input does to them: all sides in one batch of 2 m + 1 rows.
 
@@ -161,13 +171,17 @@ def input_effects(
     a sensitivity at the value itself misses what bends within the interval.  All that follows from an input
     follows, such as the velocity at which k is asked for, unless the function holds it.
     Args: `function`: as for `in_batches`. `among`: inputs that count. `errors`: whether fitted errors of
-        models count too.
+        models count too. `each`: as for `in_batches`.
     Returns: The scene's values, and expanded uncertainties (95 %) by input, "fitted" for all that were fitted
         together; NaN where neither side has the quantity.
     Source: ASME V&V 20-2009, one input at a time.
     """
     sides = input_sides(scene, among=among, errors=errors)
-    values = in_batches([scene, *(side for both in sides.values() for side in both)], function)
-    here, moved = values[..., 0], np.abs(values[..., 1:] - values[..., :1])
-    larger = np.fmax(moved[..., ::2], moved[..., 1::2])
-    return here, combined({name: larger[..., place] for place, name in enumerate(sides)})
+    scenes = [scene, *(side for both in sides.values() for side in both)]
+    values = in_batches(scenes, function, each=each or 1)
+    here, moved = values[..., 0, :], np.abs(values[..., 1:, :] - values[..., :1, :])
+    larger = np.fmax(moved[..., ::2, :], moved[..., 1::2, :])
+    effects = {name: larger[..., place, :] for place, name in enumerate(sides)}
+    if each is None:
+        here, effects = here[..., 0], {name: effect[..., 0] for name, effect in effects.items()}
+    return here, combined(effects)

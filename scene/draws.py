@@ -15,6 +15,7 @@ from typing import Final
 from zlib import crc32
 
 import numpy as np
+from scipy.special import ndtri
 
 from ringbalance.scene.arrays import FloatArray
 
@@ -37,6 +38,11 @@ def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
         here = block == each
         drawn[here] = _column(name, int(each), seed)[place[here]]
     return np.clip(drawn, _LAST, 1.0 - _LAST)
+
+
+def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
+    """The same of a standard normal distribution."""
+    return np.asarray(ndtri(quantiles(name, numbers, seed=seed)))
 
 
 def run_noise(seed: int, number: int) -> np.random.Generator:

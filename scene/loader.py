@@ -229,8 +229,9 @@ def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
     """One error for each origin of a value that does not stand in the file, unless the value has one."""
     told = {(fault.table, fault.key) for fault in found}
     for name in reading.schema.tables:
+        content = reading.tables[name].content
         for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
-            if not reading.given(f"{name}.{key}") and (name, key) not in told:
+            if key not in content and (name, key) not in told:
                 yield Fault(
                     file=reading.file,
                     table=name,

@@ -17,7 +17,7 @@ from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, 
 from ringbalance.scene.keys.fields import Bounds, OneLine, each_of, number, whole
 from ringbalance.scene.loop_models import RunSettings
 from ringbalance.scene.registry import registered
-from ringbalance.scene.toml import table_text
+from ringbalance.scene.toml import TableText
 
 Number = Annotated[float, number(Bounds())]
 Numbers = Annotated[tuple[float, ...], each_of(number(Bounds()), example="[1.4, 1.5, 1.6]")]
@@ -129,11 +129,10 @@ class CheckedValues:
     """The document's tables by name, see `keys.reading.TableRead`."""
 
     @cached_property
-    def texts(self) -> Mapping[str, str]:
+    def texts(self) -> Mapping[str, TableText]:
         """The document's tables as TOML, by name."""
-        return {
-            name: table_text(name, each) for name, each in self.document.items() if isinstance(each, dict)
-        }
+        tables = {name: table for name, table in self.document.items() if isinstance(table, dict)}
+        return {name: TableText(name=name, content=table) for name, table in tables.items()}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,8 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -33,57 +34,58 @@ def read_toml(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def toml_bytes(document: Mapping[str, Any], known: Mapping[str, str] = MappingProxyType({})) -> bytes:
+@dataclass(frozen=True, kw_only=True)
+class TableText:
+    """A table as it is written, from which others that have most of its values in common are written."""
+
+    name: str
+    content: Mapping[str, Any]
+
+    @cached_property
+    def _lines(self) -> Mapping[str, str]:
+        return {key: _line(key, value) for key, value in self.content.items()}
+
+    @cached_property
+    def _text(self) -> str:
+        return self._changed(self.content)
+
+    def changed(self, content: Mapping[str, Any]) -> str:
+        """The text of another content; what is the same object in both is not written again."""
+        return self._text if content is self.content else self._changed(content)
+
+    def _changed(self, content: Mapping[str, Any]) -> str:
+        lines, before = self._lines, self.content
+        return f"\n[{toml_key(self.name)}]\n" + "".join(
+            lines[key] if key in lines and before[key] is value else _line(key, value)
+            for key, value in content.items()
+        )
+
+
+def toml_bytes(document: Mapping[str, Any], known: Mapping[str, TableText] = MappingProxyType({})) -> bytes:
     """A document of texts, numbers, truth values, lists and tables, which `tomllib` reads back as it was.
 
-    Args: `known`: texts of some of its tables.
+    Args: `known`: tables of a document that has most values in common with this one.
     """
-    tables = {name: value for name, value in document.items() if isinstance(value, Mapping)}
-    top = {key: value for key, value in document.items() if key not in tables}
-    parts = (known.get(name) or table_text(name, table) for name, table in tables.items())
-    return (_lines(top) + "".join(parts) or "\n").encode()
-
-
-def table_text(name: str, table: Mapping[str, Any]) -> str:
-    """One table of a document."""
-    return f"\n[{toml_key(name)}]\n{_lines(table)}"
-
-
-def _lines(table: Mapping[str, Any]) -> str:
-    return "".join(_kept_line(key, value) for key, value in table.items())
-
-
-def _kept_line(key: str, value: Any) -> str:
-    """Thousands of scenes that differ in few keys have most lines of texts and of origins alike."""
-    if isinstance(value, str):
-        return _text_line(key, value)
-    if isinstance(value, dict) and all(isinstance(each, str) for each in value.values()):
-        return _texts_line(key, tuple(value.items()))
-    return _line(key, value)
+    tables = {name: value for name, value in document.items() if isinstance(value, dict)}
+    top = "".join(_line(key, value) for key, value in document.items() if key not in tables)
+    parts = (
+        (known.get(name) or TableText(name=name, content={})).changed(table) for name, table in tables.items()
+    )
+    return (top + "".join(parts) or "\n").encode()
 
 
 def _line(key: str, value: Any) -> str:
     return f"{toml_key(key)} = {_value_text(value, indent='  ')}\n"
 
 
-@lru_cache(maxsize=1024)
-def _text_line(key: str, value: str) -> str:
-    return _line(key, value)
-
-
-@lru_cache(maxsize=1024)
-def _texts_line(key: str, items: tuple[tuple[str, str], ...]) -> str:
-    return _line(key, dict(items))
-
-
 def _value_text(value: Any, *, indent: str = "") -> str:
     """One value; a list of tables that stands by itself has a line for each."""
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         inside = ", ".join(f"{toml_key(key)} = {_value_text(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if isinstance(value, list | tuple):
         items = [_value_text(item) for item in value]
-        if indent and items and isinstance(value[0], Mapping):
+        if indent and items and isinstance(value[0], dict):
             return "[\n" + "".join(f"{indent}{item},\n" for item in items) + "]"
         return "[" + ", ".join(items) + "]"
     # JSON's escapes are TOML's, but TOML asks for one more.

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
 from types import MappingProxyType
@@ -270,11 +271,14 @@ def _not_a_number(text: str) -> str:
 
 
 def _respelled(text: str) -> str:
+    if text.isascii():
+        return text
     for spelling, standard in _SPELLINGS.items():
         text = text.replace(spelling, standard)
     return text
 
 
+@lru_cache(1024)
 def _canonical(unit: str) -> str:
     """Spaces around operators go, a space between factors is a product, and m2 means m^2."""
     tight = re.sub(r"\s*([*/()^])\s*", r"\1", unit)
@@ -290,8 +294,11 @@ def _in_si(number: str, unit: _Unit, kind: _Dimension) -> float:
         raise FieldError(_too_large(kind), _allowed(kind))
     value = rough + 0.0  # no negative zero
     if unit.factor != 1 or unit.offset != 0:
-        exact = Fraction(number) if rough != 0 else Fraction(0)
-        value = float((exact + unit.offset) * unit.factor)
+        top, bottom = Decimal(number).as_integer_ratio() if rough != 0 else (0, 1)
+        up, down = unit.offset.numerator, unit.offset.denominator
+        # A quotient of whole numbers is rounded once, and much sooner there than one of fractions.
+        exact = (top * down + up * bottom) * unit.factor.numerator
+        value = exact / (bottom * down * unit.factor.denominator)
     value *= math.pi if unit.pi else 1.0
     if abs(value) > kind.largest:
         raise FieldError(_too_large(kind), _allowed(kind))

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from ringbalance.controller.deviates import deviates
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.controller.rotor import CommonRotor, Rotors
-from ringbalance.scene.draws import quantiles
+from ringbalance.scene.draws import deviates, quantiles
 from ringbalance.scene.origins import InputUncertainty, moved_at
 from ringbalance.scene.uncertain import NORMAL_95
 

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.deviates import deviates
 from ringbalance.controller.loop_records import MomentTable
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
@@ -20,7 +19,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.making import nominal_laws
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.draws import quantiles
+from ringbalance.scene.draws import deviates, quantiles
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (

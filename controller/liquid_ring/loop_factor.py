@@ -28,7 +28,8 @@ from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import Information
-from ringbalance.reduced_model.gas_line import line_answers, line_document, line_text
+from ringbalance.reduced_model.gas_line import line_document, line_text
+from ringbalance.reduced_model.injection.line_answers import line_answers
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.reduced_model.terms import neglected_in_injections

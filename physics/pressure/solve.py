@@ -18,7 +18,6 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-import pyamg
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import cg, splu
 from skfem import Basis, DiscreteField, ElementTetP2, LinearForm
@@ -28,6 +27,7 @@ from skfem.quadrature import get_quadrature
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.registry import registered
 
 MULTIGRID_FROM: Final = 10_000
 """Unknowns in three dimensions above which multigrid costs less than a factorisation."""
@@ -177,7 +177,7 @@ def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, in
     steps: list[None] = []
     # No part needs a spectral radius, which pyamg would estimate from random vectors.
     sweeps = ("gauss_seidel", {"sweep": "symmetric"})
-    hierarchy = pyamg.smoothed_aggregation_solver(
+    hierarchy = registered("function", "multigrid")(
         matrix.sorted_indices(),  # in any other order its aggregates differ from run to run
         symmetry="symmetric",
         strength=("symmetric", {"theta": 0.1}),

@@ -20,6 +20,8 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from fluids.fittings import entrance_distance, entrance_rounded, entrance_sharp
+from scipy.interpolate import CubicSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.tube.friction import turbulent_share
@@ -27,7 +29,6 @@ from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import BoolArray, FloatArray, clipped, plain
 from ringbalance.scene.models import Bend, Tube
 from ringbalance.scene.platform.files import packaged_rows
-from ringbalance.scene.splines import Pieces
 
 LAMINAR_ENTRY_LENGTH: Final = 0.056
 """Entry length of laminar flow in diameters per Re."""
@@ -38,9 +39,6 @@ _TURBULENT_KINETIC_FACTOR: Final = 1.06
 _CREEPING: Final = 6 * np.pi
 _OTHER_ENTRANCE: Final = 0.15
 """Spread of the laminar loss of an entrance that is not sharp: published excesses run from 0.2 to 0.33."""
-_SHARP: Final = (0.57, 0.08)
-_PROJECTING: Final = (0.78, 0.3)
-"""K of entrances at high Re, and its half-width."""
 _SCALE, _LIMIT = 5.0, 2000.0
 _DOMAIN = 1e-3
 """Relative: reservoir and tube are cut off at a distance, the edge is resolved down to 1e-4 of the bore."""
@@ -54,7 +52,7 @@ _FULL: Final = 2500.0
 class _EndTable:
     """Interpolants of one end over a = ln(1 + Re/5)."""
 
-    scaled: Pieces
+    scaled: CubicSpline
     """Spline of K Re/(1 + Re/5)^n, n = 1 for the entrance, 0 for the exit: slowly varying."""
     numerical: FloatArray
     """Discretisation uncertainty of K Re at the nodes."""
@@ -72,7 +70,7 @@ def _end_table(end: str) -> _EndTable:
     power = 1 if end == "entrance" else 0
     nodes = [row for row in rows if row["kind"] == "node"]
     a, y = (np.array([float(row[name]) for row in nodes]) for name in ("a", "fine"))
-    spline = Pieces.spline(a, y * np.exp(-power * a))
+    spline = CubicSpline(a, y * np.exp(-power * a))
     checks = [row for row in rows if row["kind"] == "check"]
     at, solved = (np.array([float(row[name]) for row in checks]) for name in ("a", "fine"))
     gaps = np.abs(spline(at) * np.exp(power * at) - solved) * np.exp(-at)
@@ -162,15 +160,11 @@ def _laminar_kinetic_factor(friction_ratio: FloatArray) -> FloatArray:
     return np.asarray(1.2 + 0.8 * friction_ratio**-1.5)
 
 
-def _rounded(radius_ratio: npt.ArrayLike) -> FloatArray:
-    """K of an entrance rounded with a radius of so many bores; one and more are as one.
+def _rounded(bore: float, radius: float) -> float:
+    return float(entrance_rounded(Di=bore, rc=radius, method="Rennels"))
 
-    0.0696 (1 - 0.569 x) m^2 + (m - 1)^2, m = 1 + 0.622 (1 - 0.30 sqrt(x) - 0.70 x)^4.
-    """
-    x = np.minimum(radius_ratio, 1.0)
-    contracted = 1 + 0.622 * (1 - 0.30 * np.sqrt(x) - 0.70 * x) ** 4
-    loss = 0.0696 * (1 - 0.569 * x) * contracted**2 + (contracted - 1) ** 2
-    return np.where(np.greater(radius_ratio, 1.0), 0.03, loss)
+
+_ROUNDED: Final = np.vectorize(_rounded, otypes=[np.float64])
 
 
 def _turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
@@ -179,13 +173,15 @@ def _turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
     Args: `tube`: the tube; `entrance` is "sharp", "rounded" (with `entrance_radius`) or "projecting".
     Returns: K and its half-width: the spread of the published methods, 0.5 to 0.57 for a sharp edge and,
         because the wall thickness of a projecting tube is not known, 0.5 to 1.1 there.
-    Source: Rennels and Hudson, Pipe Flow (2012), for sharp and rounded, Crane TP-410 for projecting; a test
-        compares them with `fluids.fittings`.
+    Source: Rennels and Hudson, Pipe Flow (2012), for sharp and rounded, Crane TP-410 for projecting, through
+        `fluids.fittings`.
     """
+    if tube.entrance == "sharp":
+        return float(entrance_sharp(method="Rennels")), 0.08
     if tube.entrance == "rounded":
-        loss: float = plain(_rounded(np.divide(tube.entrance_radius, tube.bore)))
+        loss: float = plain(_ROUNDED(tube.bore, tube.entrance_radius))
         return loss, 0.03 + 0.2 * loss
-    return _SHARP if tube.entrance == "sharp" else _PROJECTING
+    return float(entrance_distance(Di=tube.bore, method="Crane")), 0.3
 
 
 def entrance_loss(*, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0) -> FloatArray:

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import RectBivariateSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.scene.arrays import BoolArray, FloatArray, clipped
 from ringbalance.scene.platform.files import packaged_rows
-from ringbalance.scene.splines import GridPieces
 
 Rows = Sequence[Mapping[str, str]]
 
@@ -67,9 +67,9 @@ class Rectangle:
 
     table: str
     """"slow" or "fast"."""
-    difference: GridPieces
+    difference: RectBivariateSpline
     """Spline of ln F - ln F_base over (a, b)."""
-    numerical: GridPieces
+    numerical: RectBivariateSpline
     """Bilinear interpolant of the relative discretisation uncertainty."""
     a_limit: float
     b_limit: float
@@ -121,8 +121,8 @@ def _rectangle(table: str, rows: Rows) -> Rectangle:
     mirrored = np.concatenate([-nodes[3:0:-1], nodes])
     return Rectangle(
         table=table,
-        difference=GridPieces.spline(mirrored, second, np.concatenate([gap[3:0:-1], gap])),
-        numerical=GridPieces.straight(nodes, second, uncertainty_95),
+        difference=RectBivariateSpline(mirrored, second, np.concatenate([gap[3:0:-1], gap])),
+        numerical=RectBivariateSpline(nodes, second, uncertainty_95, kx=1, ky=1),
         a_limit=float(nodes[-1]),
         b_limit=float(second[-1]),
     )
@@ -132,14 +132,14 @@ def _logarithm(rectangle: Rectangle, a: FloatArray, b: FloatArray, *, where: Boo
     """ln F at the nearest point of the rectangle; zero without rotation, and where it does not count."""
     logarithm, here = np.zeros(a.shape), where & (a > 0.0)
     a, b = clipped(a[here], 0.0, rectangle.a_limit), clipped(b[here], 0.0, rectangle.b_limit)
-    logarithm[here] = _base_at(rectangle.table, a, b) + rectangle.difference(a, b)
+    logarithm[here] = _base_at(rectangle.table, a, b) + rectangle.difference.ev(a, b)
     return logarithm
 
 
 def _discretisation(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
     """Relative discretisation uncertainty there."""
     return np.asarray(
-        rectangle.numerical(clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit))
+        rectangle.numerical.ev(clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit))
     )
 
 

@@ -234,6 +234,9 @@ def check_ring(scene: Scene) -> None:
     Source: the free surface |r + g/omega^2| = const of a liquid at rest in the rotating frame.
     """
     gravity = scene.environment.gravity if scene.environment.shaft == "horizontal" else 0.0
+    if abs(scene.rotor.speed) > math.sqrt(gravity / scene.disc.inner_radius):
+        # As fast as a surface at the inner radius asks for, further in than which none lies.
+        return
     radius = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
     lowest = math.sqrt(gravity / radius)
     if abs(scene.rotor.speed) > lowest:

@@ -24,12 +24,12 @@ from ringbalance.reduced_model.law.flow_law import (
     save_record,
 )
 from ringbalance.reduced_model.pieces import point
-from ringbalance.reduced_model.pieces.compiled_point import answer_each
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of, velocities_of
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ringbalance.scene.registry import registered
 
 WIDTH: Final = 3
 """Column of a half-width over the fill ratio."""
@@ -239,6 +239,7 @@ class CalibratedLaw:
         n = asked[0].size
         answers = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
         if n > _FEW:
+            answer_each = registered("function", "answer_each")
             answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers, margins)
             return answers
         each = [self._answer(*query) for query in zip(*(values.tolist() for values in asked), strict=True)]

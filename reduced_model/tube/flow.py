@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, TypeVar
 
@@ -33,6 +33,8 @@ _LEAST, _MOST = np.log(1e-9), np.log(1e6)
 """ln u between which velocities are looked for, u in m/s."""
 _NODES: Final = np.linspace(-8.0, 0.2, 22)
 """ln u of the nodes from which roots start, from that of a loss of all the pressure in one velocity head."""
+_COMMON: Final = 18
+"""Of the node about which most velocities lie."""
 _SLOPES: Final = (0.3, 5.0)
 """d ln(head)/d ln u, between which steps are taken."""
 _STEEPEST: Final = 50.0
@@ -102,6 +104,10 @@ class _Inverse:
     def take(self, rows: IntArray) -> _Inverse:
         return _Inverse(**{name: table[:, rows] for name, table in vars(self).items()})
 
+    def through_head(self, node: int, log_head: FloatArray) -> _Inverse:
+        """Every head times what gives another one at a node."""
+        return replace(self, log_head=self.log_head + (log_head - self.log_head[node]))
+
     def __call__(self, log_head: FloatArray) -> tuple[FloatArray, FloatArray]:
         """ln u, and the slope of ln of the head there."""
         last = self.log_head.shape[0] - 2
@@ -122,7 +128,17 @@ class _Inverse:
         return x + (t - inside) * width / slope, slope
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+def _log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
+    """ln of the head between the chambers and, with a crest, of that up to it, over ln u."""
+    u = np.exp(log_velocity)
+    state = corrected_state(scene, u)
+    heads = [np.asarray(np.log((state.k + 1) / 2) + 2 * log_velocity)]
+    if scene.tube.hump_radius is not None:
+        heads.append(np.log(crest_head(scene=scene, tube=scene.tube, state=state, velocity=u)))
+    return heads
+
+
+@dataclass(frozen=True, eq=False)
 class TubeFlow:
     """The tubes of designs; arrays of shape (n,)."""
 
@@ -131,7 +147,7 @@ class TubeFlow:
     gas_factor: FloatArray | float
     between: _Inverse
     """Of the head between the chambers."""
-    to_crest: _Inverse | None
+    to_crest: _Inverse | None = None
     """Of that from the driven chamber to the lowest pressure at the crest; None without one."""
 
     @classmethod
@@ -143,26 +159,25 @@ class TubeFlow:
         )
         fastest = np.log(2 * np.maximum(highest, 1.0) / path.density * np.ones(designs.size)) / 2
         log_velocity = fastest + _NODES[:, None]
-        state, u = corrected_state(scene, np.exp(log_velocity)), np.exp(log_velocity)
-        to_crest = None
-        if path.crest:
-            head = crest_head(scene=scene, tube=scene.tube, state=state, velocity=u)
-            to_crest = _Inverse.through(log_velocity, np.log(head))
-        between = _Inverse.through(log_velocity, np.log((state.k + 1) / 2) + 2 * log_velocity)
-        return cls(designs=designs, path=path, gas_factor=factor, between=between, to_crest=to_crest)
+        heads = [_Inverse.through(log_velocity, head) for head in _log_heads(scene, log_velocity)]
+        return cls(designs, path, factor, *heads)
+
+    def of_neighbours(self, designs: Designs, rows: IntArray) -> TubeFlow:
+        """Those of designs that differ little from some of these: roots start from tables of these."""
+        log_velocity = self.between.log_velocity[_COMMON, rows]
+        tables = (self.between, self.to_crest) if self.to_crest else (self.between,)
+        pairs = zip(tables, _log_heads(designs.scene, log_velocity), strict=True)
+        heads = [table.take(rows).through_head(_COMMON, head) for table, head in pairs]
+        return TubeFlow(designs, tube_path(designs.scene), pressure_factor(designs.scene), *heads)
 
     def take(self, rows: IntArray) -> TubeFlow:
         """Those of some of the designs."""
         if rows.size == self.designs.size:
             return self
         part = self.designs.take(rows)
-        return TubeFlow(
-            designs=part,
-            path=tube_path(part.scene),
-            gas_factor=pressure_factor(part.scene),
-            between=self.between.take(rows),
-            to_crest=None if self.to_crest is None else self.to_crest.take(rows),
-        )
+        tables = (self.between, self.to_crest) if self.to_crest else (self.between,)
+        heads = [table.take(rows) for table in tables]
+        return TubeFlow(part, tube_path(part.scene), pressure_factor(part.scene), *heads)
 
     def ends(self, own: FloatArray, other: FloatArray, *, driven: bool = True) -> TubeEnds:
         """For levels of the two chambers, Pa. Args: `driven`: with the gas on."""

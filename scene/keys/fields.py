@@ -247,11 +247,11 @@ def one_of(words: Callable[[], tuple[str, ...]]) -> Reader:
         return " or ".join(f'"{option}"' for option in words())
 
     def read(value: object) -> str:
-        options, allowed = words(), quoted()
+        options = words()
         if not isinstance(value, str):
-            raise FieldError("it is not text", allowed)
+            raise FieldError("it is not text", quoted())
         if value not in options:
-            raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", allowed)
+            raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", quoted())
         return value
 
     return Reader(read=read, allowed=quoted(), summary=quoted())

@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-_PACKAGES: Final = ("numpy", "scipy", "numba", "scikit-fem", "pyamg", "meshio")
+_PACKAGES: Final = ("numpy", "scipy", "numba", "fluids", "scikit-fem", "pyamg", "meshio")
 """Whose versions may change a number."""
 _ROOMS: Final = (
     *("scene", "results", "mesh", "physics", "reduced_model", "controller", "identification"),

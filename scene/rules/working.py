@@ -206,11 +206,12 @@ CHECKS: tuple[Check, ...] = (
 
 def uncertainty_faults(reading: Reading) -> Iterator[Fault]:
     """One error for each uncertainty of a quantity that the scene lacks, or that is larger than it."""
-    for key, table in UNCERTAIN_QUANTITIES.items():
-        path, quantity = f"uncertainty.{key}", f"{table}.{key}"
-        if not reading.known(path):
+    for path in reading.tables["uncertainty"].values:
+        key = path.removeprefix("uncertainty.")
+        if key not in UNCERTAIN_QUANTITIES or not reading.known(path):
             continue
-        width, relative = reading.values[path]
+        table = UNCERTAIN_QUANTITIES[key]
+        quantity, (width, relative) = f"{table}.{key}", reading.values[path]
         if quantity == "disc.plate_thickness" and quantity in reading.derived:
             problem = "the mesh has the plates in its shape, and no thickness of its own"
             yield reading.fault(path, problem=problem, allowed="central_angle's uncertainty in its place")

@@ -16,11 +16,9 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import GasUse, Injection
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.gas_line import (
-    line_answers,
-    line_text,
-)
+from ringbalance.reduced_model.gas_line import line_text
 from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
+from ringbalance.reduced_model.injection.line_answers import line_answers
 from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span

@@ -70,6 +70,8 @@ def test_executors_make_no_difference(found: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
         other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
     assert other.to_dict() == found.to_dict()
+    of_its_own = rb.find_design(open_scene(requirement__fraction=0.7), workers=2)
+    assert of_its_own.to_dict() == found.to_dict()
 
 
 def test_an_unbalance_that_no_design_cancels_is_named() -> None:

@@ -9,12 +9,12 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 import pytest
-from fluids.fittings import bend_rounded, entrance_distance, entrance_rounded, entrance_sharp
+from fluids.fittings import bend_rounded, entrance_sharp
 from hypothesis import given
 from hypothesis import strategies as st
 
 import ringbalance
-from ringbalance.physics.tube.local_losses import _turbulent_entrance_loss, bend_loss, bend_uncertainty
+from ringbalance.physics.tube.local_losses import bend_loss, bend_uncertainty
 from ringbalance.physics.tube.loss import MODEL_CAUSES, TubeLoss, model_parts, tube_loss, with_errors
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.fitted import ModelError
@@ -87,21 +87,6 @@ def test_terms_add_up_and_the_turbulent_exit_is_not_counted_twice() -> None:
     np.testing.assert_allclose(sum(found.terms.values()), found.k.value, rtol=1e-14)
     assert float(found.terms["exit"][0]) < 1e-3
     assert float(found.terms["entrance"][0]) == pytest.approx(entrance_sharp(), abs=1e-3)
-
-
-def test_turbulent_entrances_are_those_of_the_handbooks() -> None:
-    radius = TUBE.bore * np.array([1e-6, 0.1, 0.5, 1.0, 1.5])
-    rounded, _ = _turbulent_entrance_loss(
-        tube=dataclasses.replace(TUBE, entrance="rounded", entrance_radius=radius)  # type: ignore[arg-type]
-    )
-    expected = [entrance_rounded(Di=TUBE.bore, rc=each, method="Rennels") for each in radius]
-    assert rounded == pytest.approx(expected, rel=1e-12)
-    sharp, projecting = (
-        _turbulent_entrance_loss(tube=dataclasses.replace(TUBE, entrance=entrance))[0]
-        for entrance in ("sharp", "projecting")
-    )
-    assert sharp == entrance_sharp(method="Rennels")
-    assert projecting == entrance_distance(Di=TUBE.bore, method="Crane")
 
 
 def test_both_laminar_ends_together_cost_about_2_3_with_the_plus_one() -> None:

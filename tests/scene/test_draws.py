@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.deviates import deviates
-from ringbalance.scene.draws import BLOCK, quantiles
+from ringbalance.scene.draws import BLOCK, deviates, quantiles
 
 
 def test_every_block_takes_each_part_once() -> None:

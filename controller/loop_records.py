@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from ringbalance.controller.algorithms.law_steps import FIRST_CHANGE, PER_CHANGE
 from ringbalance.controller.rotor import MAX_CHAMBERS
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import ComplexArray
@@ -22,6 +23,8 @@ TAIL_POINTS: Final = 12
 MOMENT_NODES: Final = 513
 """Of the table of a pair's moment."""
 PAIRS: Final = MAX_CHAMBERS // 2
+MEMORY: Final = FIRST_CHANGE + PER_CHANGE * PAIRS
+"""Numbers that the law-based algorithm remembers."""
 TARGET_VECTOR: Final = 0
 TRIAL: Final = 1
 LAW_BASED: Final = 2
@@ -130,7 +133,6 @@ _RUN_REAL: Final = (
     "before_time",  # of its last sample above the limit, s, infinite for none; law-based: last sample
     "before_amplitude",  # m
     "before_phase",  # rad
-    "variance",  # law-based: mean square of the error of its influence coefficient, (m/(kg m))^2
     "gas",  # what vented chambers have released, above ambient pressure, Pa m^3
 )
 _RUN_WHOLE: Final = (
@@ -163,29 +165,26 @@ _RUN_PAIRS: Final = (
     "asked",  # valve-open time of the command, s, zero for none
     "lowest",  # fill that the driven chamber comes to by it
     "given",  # law-based: valve-open time of the last command, s
-    "change",  # law-based: wanted of the pair's moment, kg m
-    "least",  # law-based: bounds of that
-    "most",
 )
 _RUN_FLAGS: Final = (
     "side",  # which chamber is driven: 0 the positive one, 1 the other
     "given_side",
     "runs_back",  # whether liquid still ran back as the last wait ended
-    "fixed",  # law-based: whether a pair is at a bound
 )
 RUN: Final = np.dtype(
     [(name, np.float64) for name in _RUN_REAL]
     + [(name, np.int64) for name in _RUN_WHOLE]
-    + [(name, np.complex128) for name in ("gain", "vibration", "influence")]
+    + [(name, np.complex128) for name in ("gain", "vibration")]
     + [(name, np.float64, (PAIRS,)) for name in _RUN_PAIRS]
     + [(name, np.int64, (PAIRS,)) for name in _RUN_FLAGS]
     + [(name, np.int64, (MAX_CHAMBERS,)) for name in ("at_residual", "refused")]
+    + [("memory", np.float64, (MEMORY,))]
 )
 """One run: what differs between runs, its state and what its algorithm remembers.
 
 `gain`: vibration per balancing moment, m/(kg m). `at_residual`: of every chamber, whether its last injection
 was shortened to keep its residual fill, and none has filled it since; `refused`: the same of the last command
-alone.
+alone. `memory`: law-based, see `law_steps`.
 """
 INJECTION: Final = np.dtype(
     [

@@ -16,6 +16,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from ringbalance.controller.algorithms import law_steps
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.loop_records import LOOP, RUN
@@ -296,15 +297,17 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         float(loop["assumed_phase_noise"]) ** 2,
         *loop["offset"][:chambers].tolist(),
     )
-    first_chamber = r + law_based.FIRST_CHANGE + law_based.PER_CHANGE * half
-    row += [0.0] * (first_chamber - r + law_based.PER_CHAMBER * chambers)
-    row[r + law_based.LEARNT_X], row[r + law_based.LEARNT_Y] = _parts(complex(run["influence"]))
-    row[r + law_based.VARIANCE] = float(run["variance"])
-    names = {"VIBRATION_X": "SEEN_X", "VIBRATION_Y": "SEEN_Y", "RESTING": "RESTS"}
+    beside = law_steps.change_of(r, half)
+    row += [*run["memory"][: beside - r].tolist(), *[0.0] * law_based.FIRST_CHAMBER]
+    first_chamber = len(row)
+    row += [0.0] * (law_based.PER_CHAMBER * chambers)
+    places = {"VIBRATION_X": r + law_steps.SEEN_X, "VIBRATION_Y": r + law_steps.SEEN_Y}
+    places |= {name: beside + getattr(law_based, name) for name in ("RESTS", "SAMPLES", "WAIT")}
 
     def place(offset: str, chamber: int | None) -> int:
-        value = int(getattr(law_based, names.get(offset, offset)))
-        return r + value if chamber is None else first_chamber + law_based.PER_CHAMBER * chamber + value
+        if chamber is None:
+            return places["RESTS" if offset == "RESTING" else offset]
+        return first_chamber + law_based.PER_CHAMBER * chamber + int(getattr(law_based, offset))
 
     return Block(
         kind="controller",
@@ -314,7 +317,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         constants=tuple(constants),
         pieces=compact.pieces,
         start=tuple(row),
-        modules=(point, chamber, disc, law_based),
+        modules=(point, chamber, disc, law_steps, law_based),
         steps="control",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),

@@ -8,6 +8,26 @@ memory behind its pairs.  It samples as `controller` does.  Source: `controller.
 
 from math import sqrt
 
+from ringbalance.controller.algorithms.law_steps import (
+    AXIS_X,
+    AXIS_Y,
+    CHANGE,
+    HIGHEST_CHANGE,
+    LAST_MOMENT_X,
+    LAST_MOMENT_Y,
+    LAST_X,
+    LAST_Y,
+    LEARNT_X,
+    LEARNT_Y,
+    LOWEST_CHANGE,
+    NOW_X,
+    NOW_Y,
+    SEEN_X,
+    SEEN_Y,
+    change_of,
+    learn,
+    split,
+)
 from ringbalance.export.chamber import moment
 from ringbalance.export.disc import (
     ASKED,
@@ -54,16 +74,12 @@ from ringbalance.reduced_model.pieces.point import (
 LIMIT, LEAST_TIME, LONGEST_TIME, PERIOD, LEAST_FILL, ASSUMED = 0, 1, 2, 3, 4, 5
 LAW_SQUARE, AMPLITUDE_SQUARE, PHASE_SQUARE, OFFSETS = 6, 7, 8, 9
 
-# Behind the pairs: what a host sees, the sample before with the disc's moment then, and what was learnt.
-SEEN_X, SEEN_Y, RESTS, SAMPLES, WAIT, OPENED, LAST_X, LAST_Y = 0, 1, 2, 3, 4, 5, 6, 7
-LAST_MOMENT_X, LAST_MOMENT_Y, NOW_X, NOW_Y = 8, 9, 10, 11
-LEARNT_X, LEARNT_Y, VARIANCE, FLOW_PRIMED = 12, 13, 14, 15
-# Of each pair change of its moment, bounds of that, and whether it is at one; of each chamber.
-FIRST_CHANGE, PER_CHANGE, CHANGE, LOWEST_CHANGE, HIGHEST_CHANGE, FIXED = 16, 4, 0, 1, 2, 3
+# Behind the pairs the algorithm's own memory (`law_steps`), what a host sees beside, and of each chamber.
+RESTS, SAMPLES, WAIT, OPENED, FLOW_PRIMED, FIRST_CHAMBER = 0, 1, 2, 3, 4, 5
 PER_CHAMBER, OPEN_TIME, AT_RESIDUAL = 2, 0, 1
 # fmt: on
 
-GREATEST, INSTANT, NEARLY, RANGE = 1e6, 1e-9, 1e-12, 10.0
+GREATEST, INSTANT, SLOWEST_FALL = 1e6, 1e-9, 1e-12
 HALVINGS, PARTS, GAUSS, END_STEP, SHORTEST_PART = 60, 64.0, 0.28867513459481287, 1e-3, 1e-9
 
 
@@ -78,14 +94,14 @@ def memory(c: Law) -> int:
     return FIRST_PAIR + PER_PAIR * int(c[int(c[BLOCK]) + PAIRS])
 
 
-def change_of(c: Law, pair: int) -> int:
-    """Place of what is asked of a pair's moment."""
-    return memory(c) + FIRST_CHANGE + PER_CHANGE * pair
+def beside(c: Law) -> int:
+    """Place of what a host sees beside the vibration."""
+    return change_of(memory(c), int(c[int(c[BLOCK]) + PAIRS]))
 
 
 def chamber_of(c: Law, chamber: int) -> int:
     """Place of what belongs to a chamber."""
-    return change_of(c, int(c[int(c[BLOCK]) + PAIRS])) + PER_CHAMBER * chamber
+    return beside(c) + FIRST_CHAMBER + PER_CHAMBER * chamber
 
 
 def along(c: Law, p: Pieces, fill: float) -> float:
@@ -102,149 +118,8 @@ def set_moment(c: Law, p: Pieces, w: Query) -> None:
     pair = 0
     while pair < int(c[d + PAIRS]):
         value = along(c, p, w[FIRST_PAIR + PER_PAIR * pair + X])
-        w[r + NOW_X] = w[r + NOW_X] + value * c[d + DIRECTIONS + 2 * pair]
-        w[r + NOW_Y] = w[r + NOW_Y] + value * c[d + DIRECTIONS + 2 * pair + 1]
-        pair = pair + 1
-
-
-def learn(c: Law, w: Query) -> None:
-    """The influence coefficient from one response, by a Kalman filter of one complex number."""
-    e = settings(c)
-    r = memory(c)
-    x = w[r + SEEN_X]
-    y = w[r + SEEN_Y]
-    ux = w[r + NOW_X] - w[r + LAST_MOMENT_X]
-    uy = w[r + NOW_Y] - w[r + LAST_MOMENT_Y]
-    kx = w[r + LEARNT_X]
-    ky = w[r + LEARNT_Y]
-    expected = (ux * ux + uy * uy) * w[r + VARIANCE]
-    if expected == 0.0:
-        return
-    seen = x * x + y * y + w[r + LAST_X] * w[r + LAST_X] + w[r + LAST_Y] * w[r + LAST_Y]
-    px = kx * ux - ky * uy
-    py = kx * uy + ky * ux
-    rest = 2.0 * c[e + AMPLITUDE_SQUARE] + c[e + PHASE_SQUARE] * seen
-    rest = rest + c[e + LAW_SQUARE] * (px * px + py * py)
-    gain = w[r + VARIANCE] / (expected + rest)
-    dx = x - w[r + LAST_X] - px
-    dy = y - w[r + LAST_Y] - py
-    vx = kx + gain * (ux * dx + uy * dy)
-    vy = ky + gain * (ux * dy - uy * dx)
-    magnitude = sqrt(vx * vx + vy * vy)
-    kept = smaller(larger(magnitude, c[e + ASSUMED] / RANGE), c[e + ASSUMED] * RANGE)
-    if magnitude == 0.0:
-        vx = kx
-        vy = ky
-        magnitude = sqrt(kx * kx + ky * ky)
-    w[r + LEARNT_X] = vx * (kept / magnitude)
-    w[r + LEARNT_Y] = vy * (kept / magnitude)
-    w[r + VARIANCE] = larger(w[r + VARIANCE] * rest / (expected + rest), c[e + LAW_SQUARE] * kept * kept)
-
-
-def lies_between(
-    c: Law, w: Query, before: int, sign: float, after: int, here: float, x: float, y: float
-) -> bool:
-    """Whether a vector lies between two pairs' axes, each taken with a sign; they then share it."""
-    axis = int(c[BLOCK]) + DIRECTIONS + 2 * before
-    ax = sign * c[axis]
-    ay = sign * c[axis + 1]
-    axis = int(c[BLOCK]) + DIRECTIONS + 2 * after
-    bx = here * c[axis]
-    by = here * c[axis + 1]
-    between = ax * by - ay * bx
-    one = (x * by - y * bx) / between
-    two = (ax * y - ay * x) / between
-    slack = -NEARLY * sqrt(x * x + y * y)
-    if one < slack or two < slack:
-        return False
-    w[change_of(c, before) + CHANGE] = sign * larger(one, 0.0)
-    w[change_of(c, after) + CHANGE] = here * larger(two, 0.0)
-    return True
-
-
-def share(c: Law, w: Query, x: float, y: float) -> None:
-    """Components along the two free neighbouring directions; along the axis when only one is free."""
-    half = int(c[int(c[BLOCK]) + PAIRS])
-    free = 0
-    last = 0
-    pair = 0
-    while pair < half:
-        if w[change_of(c, pair) + FIXED] == 0.0:
-            w[change_of(c, pair) + CHANGE] = 0.0
-            free = free + 1
-            last = pair
-        pair = pair + 1
-    axis = int(c[BLOCK]) + DIRECTIONS + 2 * last
-    if free == 1:
-        w[change_of(c, last) + CHANGE] = x * c[axis] + y * c[axis + 1]
-    if free < 2:
-        return
-    # Once round: from the last free axis, seen backwards, to the first one, and over the next to the last.
-    sign = -1.0
-    turn = 0
-    while turn < 2 * half:
-        pair = turn
-        here = 1.0
-        if turn >= half:
-            pair = turn - half
-            here = -1.0
-        if w[change_of(c, pair) + FIXED] == 0.0:
-            if lies_between(c, w, last, sign, pair, here, x, y):
-                return
-            last = pair
-            sign = here
-        turn = turn + 1
-
-
-def held(w: Query, at: int) -> bool:
-    """Whether the change of a free pair is beyond a bound, to which it is then taken."""
-    kept = smaller(larger(w[at + CHANGE], w[at + LOWEST_CHANGE]), w[at + HIGHEST_CHANGE])
-    if w[at + FIXED] != 0.0 or kept == w[at + CHANGE]:
-        return False
-    w[at + FIXED] = -1.0
-    if w[at + CHANGE] > kept:
-        w[at + FIXED] = 1.0
-    w[at + CHANGE] = kept
-    return True
-
-
-def split(c: Law, w: Query, x: float, y: float) -> None:
-    """A change of the disc's moment, kg m, over its pairs, each within its bounds as far as it goes."""
-    d = int(c[BLOCK])
-    half = int(c[d + PAIRS])
-    rounds = 0
-    over = True
-    while over and rounds < half:
-        left_x = x
-        left_y = y
-        pair = 0
-        while pair < half:
-            if w[change_of(c, pair) + FIXED] != 0.0:
-                left_x = left_x - w[change_of(c, pair) + CHANGE] * c[d + DIRECTIONS + 2 * pair]
-                left_y = left_y - w[change_of(c, pair) + CHANGE] * c[d + DIRECTIONS + 2 * pair + 1]
-            pair = pair + 1
-        share(c, w, left_x, left_y)
-        over = False
-        pair = 0
-        while pair < half:
-            if held(w, change_of(c, pair)):
-                over = True
-            pair = pair + 1
-        rounds = rounds + 1
-    left_x = x
-    left_y = y
-    pair = 0
-    while pair < half:
-        left_x = left_x - w[change_of(c, pair) + CHANGE] * c[d + DIRECTIONS + 2 * pair]
-        left_y = left_y - w[change_of(c, pair) + CHANGE] * c[d + DIRECTIONS + 2 * pair + 1]
-        pair = pair + 1
-    pair = 0
-    while pair < half:
-        at = change_of(c, pair)
-        more = left_x * c[d + DIRECTIONS + 2 * pair] + left_y * c[d + DIRECTIONS + 2 * pair + 1]
-        # Only in the sense in which the pair was asked for more than it has: the fills are assumed.
-        if w[at + FIXED] * more > 0.0:
-            w[at + CHANGE] = w[at + CHANGE] + more
+        w[r + NOW_X] = w[r + NOW_X] + value * w[change_of(r, pair) + AXIS_X]
+        w[r + NOW_Y] = w[r + NOW_Y] + value * w[change_of(r, pair) + AXIS_Y]
         pair = pair + 1
 
 
@@ -275,7 +150,7 @@ def fill_for(c: Law, p: Pieces, wanted: float, lowest: float, highest: float) ->
 def falling(c: Law, p: Pieces, w: Query, fill: float) -> float:
     """How fast the fill of a driven chamber falls, 1/s, after the tube was as the last query left it."""
     d = int(c[BLOCK])
-    r = memory(c)
+    r = beside(c)
     set_levels(c, p, w, within(c, fill), within(c, c[d + TOTAL] - fill))
     w[UP_GAS] = c[GAS_FACTOR] * (c[d + SUPPLY] - c[AMBIENT])
     w[DOWN_GAS] = 0.0
@@ -293,7 +168,7 @@ def falling(c: Law, p: Pieces, w: Query, fill: float) -> float:
 def flow_time(c: Law, p: Pieces, w: Query, fill: float, target: float, longest: float) -> float:
     """Valve-open time, s, in which a driven chamber comes from a fill to a lower one, or the flow stalls."""
     d = int(c[BLOCK])
-    r = memory(c)
+    r = beside(c)
     end = larger(target, larger(0.0, c[d + TOTAL] - c[LARGEST_FILL]))
     x = fill
     part = larger(fill - end, 0.0) / PARTS
@@ -311,7 +186,7 @@ def flow_time(c: Law, p: Pieces, w: Query, fill: float, target: float, longest: 
             part = part / 2.0
             w[r + FLOW_PRIMED] = primed
     if x <= end and target < end:
-        time = time + (end - target) / larger(falling(c, p, w, end), NEARLY)
+        time = time + (end - target) / larger(falling(c, p, w, end), SLOWEST_FALL)
     return smaller(time, longest)
 
 
@@ -325,7 +200,7 @@ def gas_time(c: Law, p: Pieces, w: Query, pair: int, wanted: float) -> float:
     if wanted > fill:
         fill = total - fill
         target = total - wanted
-    w[memory(c) + FLOW_PRIMED] = w[at + IS_PRIMED]
+    w[beside(c) + FLOW_PRIMED] = w[at + IS_PRIMED]
     first = falling(c, p, w, fill)
     if first == 0.0:
         return c[e + PERIOD]
@@ -346,7 +221,7 @@ def open_valve(c: Law, w: Query, pair: int, side: int, time: float) -> None:
         w[at + ASKED + side] = larger(opened - c[e + OFFSETS + chamber], 0.0)
         command(c, w, at)
         w[at + ASKED + side] = 0.0
-        w[memory(c) + OPENED] = 1.0
+        w[beside(c) + OPENED] = 1.0
 
 
 def aim(c: Law, p: Pieces, w: Query) -> None:
@@ -359,10 +234,8 @@ def aim(c: Law, p: Pieces, w: Query) -> None:
     highest = c[d + TOTAL] - lowest
     pair = 0
     while pair < half:
-        at = change_of(c, pair)
+        at = change_of(r, pair)
         now = along(c, p, w[FIRST_PAIR + PER_PAIR * pair + X])
-        w[at + CHANGE] = 0.0
-        w[at + FIXED] = 0.0
         w[at + LOWEST_CHANGE] = along(c, p, lowest) - now
         w[at + HIGHEST_CHANGE] = along(c, p, highest) - now
         pair = pair + 1
@@ -371,10 +244,10 @@ def aim(c: Law, p: Pieces, w: Query) -> None:
     square = kx * kx + ky * ky
     x = w[r + SEEN_X]
     y = w[r + SEEN_Y]
-    split(c, w, -(x * kx + y * ky) / square, -(y * kx - x * ky) / square)
+    split(w, r, half, -(x * kx + y * ky) / square, -(y * kx - x * ky) / square)
     pair = 0
     while pair < half:
-        change = w[change_of(c, pair) + CHANGE]
+        change = w[change_of(r, pair) + CHANGE]
         if change != 0.0:
             fill = w[FIRST_PAIR + PER_PAIR * pair + X]
             wanted = fill_for(c, p, along(c, p, fill) + change, lowest, highest)
@@ -402,22 +275,24 @@ def shut(c: Law, w: Query) -> None:
 
 def sample(c: Law, p: Pieces, w: Query) -> None:
     """React to the vibration as it is; one that is not a number changes nothing."""
+    e = settings(c)
     r = memory(c)
+    b = beside(c)
     amplitude = sqrt(w[r + SEEN_X] * w[r + SEEN_X] + w[r + SEEN_Y] * w[r + SEEN_Y])
-    w[r + RESTS] = 0.0
+    w[b + RESTS] = 0.0
     if not amplitude <= GREATEST:
         return
     shut(c, w)
     set_moment(c, p, w)
-    if w[r + OPENED] != 0.0:
-        learn(c, w)
-    w[r + OPENED] = 0.0
+    if w[b + OPENED] != 0.0:
+        learn(w, r, c[e + AMPLITUDE_SQUARE], c[e + PHASE_SQUARE], c[e + LAW_SQUARE], c[e + ASSUMED])
+    w[b + OPENED] = 0.0
     w[r + LAST_X] = w[r + SEEN_X]
     w[r + LAST_Y] = w[r + SEEN_Y]
     w[r + LAST_MOMENT_X] = w[r + NOW_X]
     w[r + LAST_MOMENT_Y] = w[r + NOW_Y]
-    if amplitude <= c[settings(c) + LIMIT]:
-        w[r + RESTS] = 1.0
+    if amplitude <= c[e + LIMIT]:
+        w[b + RESTS] = 1.0
         return
     aim(c, p, w)
 
@@ -429,13 +304,13 @@ def set_wait(c: Law, w: Query) -> None:
     while chamber < 2 * int(c[int(c[BLOCK]) + PAIRS]):
         longest = larger(longest, w[chamber_of(c, chamber) + OPEN_TIME])
         chamber = chamber + 1
-    w[memory(c) + WAIT] = longest + c[settings(c) + PERIOD]
+    w[beside(c) + WAIT] = longest + c[settings(c) + PERIOD]
 
 
 def pass_time(c: Law, p: Pieces, w: Query, time: float) -> None:
     """Liquid moves, valves stay open for less, and those of chambers with no more liquid no longer."""
     half = int(c[int(c[BLOCK]) + PAIRS])
-    r = memory(c)
+    r = beside(c)
     w[r + WAIT] = w[r + WAIT] - time
     pair = 0
     while pair < half:
@@ -459,7 +334,7 @@ def pass_time(c: Law, p: Pieces, w: Query, time: float) -> None:
 def control(c: Law, p: Pieces, w: Query, time: float) -> None:
     """Let a time pass, s, and sample the vibration if it is time to."""
     pass_time(c, p, w, time)
-    r = memory(c)
+    r = beside(c)
     if w[r + WAIT] > INSTANT:
         return
     w[r + SAMPLES] = w[r + SAMPLES] + 1.0

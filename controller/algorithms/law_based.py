@@ -10,8 +10,29 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector, Trial, open_valve
+from ringbalance.controller.algorithms.law_steps import (
+    AXIS_X,
+    AXIS_Y,
+    CHANGE,
+    HIGHEST_CHANGE,
+    LAST_MOMENT_X,
+    LAST_MOMENT_Y,
+    LAST_X,
+    LAST_Y,
+    LEARNT_X,
+    LEARNT_Y,
+    LOWEST_CHANGE,
+    NOW_X,
+    NOW_Y,
+    SEEN_X,
+    SEEN_Y,
+    VARIANCE,
+    change_of,
+    learn,
+    split,
+)
 from ringbalance.controller.liquid_ring.plant import LiquidRing
-from ringbalance.controller.loop_records import LAW_BASED, MomentTable, pair_moment
+from ringbalance.controller.loop_records import LAW_BASED, MEMORY, MomentTable, pair_moment
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.injection.column import steady
@@ -30,8 +51,6 @@ PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""
 LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 """Standard deviation, relative, below which no flow law's velocity is trusted."""
-MAGNITUDE_RANGE: Final = 10.0
-"""Factor around the assumed magnitude that the estimate keeps to: no response proves no coefficient."""
 FILL_ERROR: Final = 1e-3
 """Error in fill ratio, over that allowed to a step, at which a valve-open time is good enough."""
 _HALVINGS: Final = 60
@@ -49,7 +68,7 @@ class LawBased(BuiltIn):
 
     The residual unbalance V/K asks for a change of the disc's moment; the moment curve turns it into fill
     ratios of the pairs, the flow law into valve-open times, with the chambers' fills followed by the same law
-    since the start.  After each operation K is re-estimated from what the vibration did (`learnt`), so a
+    since the start.  After each operation K is re-estimated from what the vibration did (`learn`), so a
     wrong influence coefficient, lag angle or speed of the flow spoils only the first operation.  There is no
     gain to tune.
 
@@ -113,8 +132,10 @@ class LawBased(BuiltIn):
         loop["assumed_lowest"], loop["assumed_step"], loop["assumed_moment"] = self._moments
         lowest = total - self.ring.model.flow.max_fill_ratio
         loop["least_fill"] = max(min(self.ring.residual_fill, total / 2), lowest)
-        run["influence"], run["before_time"] = influence, math.inf
-        run["variance"] = abs(PRIOR_STANDARD_DEVIATION * influence) ** 2
+        run["before_time"] = math.inf
+        run["memory"] = first_memory(loop["axis"][: chambers // 2])
+        run["memory"][[LEARNT_X, LEARNT_Y]] = influence.real, influence.imag
+        run["memory"][VARIANCE] = abs(PRIOR_STANDARD_DEVIATION * influence) ** 2
 
     def liquid(self) -> Records:
         """As `BuiltIn.liquid`."""
@@ -124,6 +145,14 @@ class LawBased(BuiltIn):
     def _liquid(self) -> Records:
         level = at_rest(self.plant, fill=self.ring.total / 2)
         return np.repeat(level, self.ring.chambers // 2 + 1)
+
+
+def first_memory(axes: ComplexArray) -> FloatArray:
+    """A row for `law_steps` with the directions of pairs and nothing else."""
+    row = np.zeros(MEMORY)
+    for pair, axis in enumerate(axes):
+        row[change_of(0, pair) + AXIS_X], row[change_of(0, pair) + AXIS_Y] = axis.real, axis.imag
+    return row
 
 
 def controller_of(scene: Scene, model: BalancerModel, *, relative_error: float = RELATIVE_ERROR) -> BuiltIn:
@@ -185,74 +214,38 @@ def _follow(
         liquid[i].steps = 0
         advance(plant, liquid[i], interval, notes, 1, 0, w)
     if opened:
-        change = _vector(run.seen_amplitude, run.seen_phase) - _vector(run.before_amplitude, run.before_phase)
-        noise = 2.0 * loop.assumed_amplitude_noise**2 + loop.assumed_phase_noise**2 * (
-            run.seen_amplitude**2 + run.before_amplitude**2
+        seen, last = (
+            _vector(run.seen_amplitude, run.seen_phase),
+            _vector(run.before_amplitude, run.before_phase),
         )
-        run.influence, run.variance = learnt(
-            run.influence,
-            run.variance,
-            _disc_moment(loop, plant, liquid) - before,
-            change,
-            noise,
-            loop.law_deviation,
-            abs(loop.influence),
-        )
-
-
-@in_place
-def learnt(
-    influence: complex,
-    variance: float,
-    moment_change: complex,
-    vibration_change: complex,
-    noise_variance: float,
-    law_deviation: float,
-    assumed_magnitude: float,
-) -> tuple[complex, float]:
-    """Learn K from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
-
-    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
-    `noise_variance` + (s |K dU|)^2, s = `law_deviation` (relative): a response that noise could have made
-    moves K little, and no moment counts as better known than by s. P never falls below (s |K|)^2, so the
-    estimate keeps following. All SI; variances are of both components together.
-    Returns: K, m/(kg m), and P.
-    Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
-    """
-    expected = abs(moment_change) ** 2 * variance
-    if expected == 0.0:
-        return influence, variance
-    rest = noise_variance + abs(law_deviation * influence * moment_change) ** 2
-    gain = variance * moment_change.conjugate() / (expected + rest)
-    value = influence + gain * (vibration_change - influence * moment_change)
-    magnitude = abs(value)
-    if magnitude == 0.0:
-        value = influence / abs(influence) * assumed_magnitude / MAGNITUDE_RANGE
-    else:
-        bounded = max(magnitude, assumed_magnitude / MAGNITUDE_RANGE)
-        value = value * (min(bounded, assumed_magnitude * MAGNITUDE_RANGE) / magnitude)
-    left = variance * rest / (expected + rest)
-    return value, max(left, abs(law_deviation * value) ** 2)
+        after, m = _disc_moment(loop, plant, liquid), run.memory
+        m[SEEN_X], m[SEEN_Y], m[LAST_X], m[LAST_Y] = seen.real, seen.imag, last.real, last.imag
+        m[NOW_X], m[NOW_Y] = after.real, after.imag
+        m[LAST_MOMENT_X], m[LAST_MOMENT_Y] = before.real, before.imag
+        noise = loop.assumed_amplitude_noise**2, loop.assumed_phase_noise**2
+        learn(m, 0, noise[0], noise[1], loop.law_deviation**2, abs(loop.influence))
 
 
 @in_place
 def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray) -> None:
     """Command the valve-open times that take the residual away."""
-    half, lowest = loop.chambers // 2, loop.least_fill
+    half, lowest, m = loop.chambers // 2, loop.least_fill, run.memory
     highest = loop.total - lowest
     least, most = _along(loop, lowest), _along(loop, highest)
     for i in range(half):
         now = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
-        run.least[i], run.most[i] = least - now, most - now
-    split_change(-_vector(run.seen_amplitude, run.seen_phase) / run.influence, run, loop.axis, half)
+        m[change_of(0, i) + LOWEST_CHANGE], m[change_of(0, i) + HIGHEST_CHANGE] = least - now, most - now
+    wanted_moment = -_vector(run.seen_amplitude, run.seen_phase) / complex(m[LEARNT_X], m[LEARNT_Y])
+    split(m, 0, half, wanted_moment.real, wanted_moment.imag)
     for i in range(half):
-        if run.change[i] != 0.0:
+        change = m[change_of(0, i) + CHANGE]
+        if change != 0.0:
             fill = shown(plant, liquid[i], liquid[i].state[X])
             wanted = fill_for_moment(
                 loop.assumed_moment,
                 loop.assumed_lowest,
                 loop.assumed_step,
-                _along(loop, fill) + run.change[i],
+                _along(loop, fill) + change,
                 lowest,
                 highest,
             )
@@ -383,63 +376,3 @@ def fill_for_moment(
         else:
             lowest = middle
     return highest
-
-
-@in_place
-def split_change(wanted: complex, run: Record, axis: ComplexArray, half: int) -> None:
-    """Split a change of the disc's moment over its pairs, kg m, each within its bounds `least` and `most`.
-
-    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs that
-    are left; what no pair can give is asked, by its component, of those already at their ends, for the fills
-    are only assumed.  The result is in `change`.
-    Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
-    """
-    for i in range(half):
-        run.fixed[i], run.change[i] = 0, 0.0
-    for _ in range(half):
-        left = wanted
-        for i in range(half):
-            left -= run.change[i] * axis[i] if run.fixed[i] != 0 else 0.0
-        _share(left, run, axis, half)
-        over = False
-        for i in range(half):
-            held = min(max(run.change[i], run.least[i]), run.most[i])
-            if run.fixed[i] == 0 and held != run.change[i]:
-                run.fixed[i], run.change[i], over = 1 if run.change[i] > held else -1, held, True
-        if not over:
-            break
-    missing = wanted
-    for i in range(half):
-        missing -= run.change[i] * axis[i]
-    for i in range(half):
-        component = (missing * axis[i].conjugate()).real
-        # Only in the sense in which the pair was asked for more than it has.
-        if run.fixed[i] * component > 0.0:
-            run.change[i] += component
-
-
-@in_place
-def _share(wanted: complex, run: Record, axis: ComplexArray, half: int) -> None:
-    """Components along the two free neighbouring directions; along the axis when only one is free."""
-    first, last, free = -1, -1, 0
-    for i in range(half):
-        if run.fixed[i] == 0:
-            run.change[i], free, last = 0.0, free + 1, i
-            first = i if first < 0 else first
-    if free == 1:
-        run.change[last] = (wanted * axis[last].conjugate()).real
-    if free < 2:
-        return
-    before, sign, slack = last, -1.0, -1e-12 * abs(wanted)
-    # Round once: from the last free axis, seen backwards, to the first one, and over the next to the last.
-    for turn in range(2 * half):
-        i, here = turn % half, 1.0 if turn < half else -1.0
-        if run.fixed[i] != 0:
-            continue
-        a, b = sign * axis[before], here * axis[i]
-        between = (a.conjugate() * b).imag
-        one, two = (wanted.conjugate() * b).imag / between, (a.conjugate() * wanted).imag / between
-        if min(one, two) >= slack:
-            run.change[before], run.change[i] = sign * max(one, 0.0), here * max(two, 0.0)
-            return
-        before, sign = i, here

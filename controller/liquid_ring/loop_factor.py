@@ -23,8 +23,20 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector
-from ringbalance.controller.algorithms.law_based import LawBased, controller_of, fill_for_moment, split_change
-from ringbalance.controller.loop_records import RUN, MomentTable
+from ringbalance.controller.algorithms.law_based import (
+    LawBased,
+    controller_of,
+    fill_for_moment,
+    first_memory,
+)
+from ringbalance.controller.algorithms.law_steps import (
+    CHANGE,
+    HIGHEST_CHANGE,
+    LOWEST_CHANGE,
+    change_of,
+    split,
+)
+from ringbalance.controller.loop_records import MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import Information
@@ -119,13 +131,16 @@ def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     ends = np.array([scene.disc.initial_fill, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
     pairs = scene.disc.chambers // 2
-    run, axes = np.zeros(1, dtype=RUN), chamber_directions(scene.disc.chambers)[:pairs]
-    run["least"], run["most"] = low - now, high - now
-    split_change(-scene.rotor.initial_unbalance, run[0], axes, pairs)
+    row = first_memory(chamber_directions(scene.disc.chambers)[:pairs]).tolist()
+    places = [change_of(0, pair) for pair in range(pairs)]
+    for at in places:
+        row[at + LOWEST_CHANGE], row[at + HIGHEST_CHANGE] = float(low - now), float(high - now)
+    unbalance = scene.rotor.initial_unbalance
+    split(row, 0, pairs, -unbalance.real, -unbalance.imag)
     table = MomentTable.of(model=model, total=total)
     fills = [
-        fill_for_moment(table.nodes, table.lowest, table.step, float(now) + change, lowest, highest)
-        for change in run["change"][0, :pairs].tolist()
+        fill_for_moment(table.nodes, table.lowest, table.step, float(now) + row[at + CHANGE], lowest, highest)
+        for at in places
     ]
     return np.asarray(np.clip(np.array(fills), lowest, highest), dtype=np.float64)
 

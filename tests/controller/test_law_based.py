@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ringbalance.controller.algorithms import law_steps as steps
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.algorithms.law_based import (
@@ -21,12 +22,11 @@ from ringbalance.controller.algorithms.law_based import (
     _gas_time,
     controller_of,
     fill_for_moment,
-    learnt,
-    split_change,
+    first_memory,
 )
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN
+from ringbalance.controller.loop_records import LOOP, MOMENT_NODES
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.stepped import Stepped
@@ -133,11 +133,13 @@ def test_the_fill_for_a_moment_goes_on_straight_beyond_the_ends() -> None:
 
 
 def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
-    """What `split_change` asks of each pair, kg m."""
-    run, half = np.zeros(1, dtype=RUN), len(bounds)
-    run["least"][0, :half], run["most"][0, :half] = np.transpose(bounds)
-    split_change(wanted, run[0], np.array(chamber_directions(2 * half)[:half]), half)
-    return tuple(run["change"][0, :half].tolist())
+    """What `split` asks of each pair, kg m."""
+    row = first_memory(chamber_directions(2 * len(bounds))[: len(bounds)]).tolist()
+    places = [steps.change_of(0, pair) for pair in range(len(bounds))]
+    for at, (least, most) in zip(places, bounds, strict=True):
+        row[at + steps.LOWEST_CHANGE], row[at + steps.HIGHEST_CHANGE] = least, most
+    steps.split(row, 0, len(bounds), wanted.real, wanted.imag)
+    return tuple(row[at + steps.CHANGE] for at in places)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -185,13 +187,23 @@ class Estimate(NamedTuple):
     variance: float
 
 
+def learnt(
+    known: Estimate, change: complex, seen: complex, noise: float, deviation: float, assumed: float
+) -> Estimate:
+    row = [0.0] * steps.FIRST_CHANGE
+    row[steps.NOW_X], row[steps.NOW_Y], row[steps.SEEN_X], row[steps.SEEN_Y] = (
+        *(change.real, change.imag),
+        *(seen.real, seen.imag),
+    )
+    row[steps.LEARNT_X :] = known.value.real, known.value.imag, known.variance
+    steps.learn(row, 0, noise / 2, 0.0, deviation**2, assumed)
+    return Estimate(complex(row[steps.LEARNT_X], row[steps.LEARNT_Y]), row[steps.VARIANCE])
+
+
 def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> Estimate:
     moment = 2e-4 + 1e-4j
-    return Estimate(
-        *learnt(
-            complex(k), abs(0.5 * k) ** 2, moment, complex(seen) * moment, noise, standard_deviation, abs(k)
-        )
-    )
+    known = Estimate(complex(k), abs(0.5 * k) ** 2)
+    return learnt(known, moment, complex(seen) * moment, noise, standard_deviation, abs(k))
 
 
 def test_an_exact_response_is_believed_at_once() -> None:
@@ -224,7 +236,7 @@ def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
         change = complex(*random.standard_normal(2)) * 1e-4
         noise = complex(*random.standard_normal(2)) * 1e-6
         seen = true * change + noise
-        estimate = Estimate(*learnt(*estimate, change, seen, 2e-12, 0.0, abs(K)))
+        estimate = learnt(estimate, change, seen, 2e-12, 0.0, abs(K))
     assert abs(estimate.value / true - 1) < 0.06
     # The filter's own account of its error: sigma^2/sum |dU|^2.
     assert estimate.variance == pytest.approx(2e-12 / (400 * 2e-8), rel=0.15)

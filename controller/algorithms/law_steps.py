@@ -1,0 +1,187 @@
+"""What the law-based algorithm learns, and how it splits a correction, in + - * / sqrt and comparisons alone.
+
+The program's loop compiles these functions and an export translates them, see `reduced_model.pieces.point`.
+`m` is a row of numbers that has the algorithm's memory from the place `r` on; the names below are places in
+it, all SI.
+"""
+
+from math import sqrt
+
+from ringbalance.reduced_model.pieces.point import Query, larger, smaller
+from ringbalance.scene.platform.both_ways import both_ways
+
+# fmt: off
+# Vibration of this sample and the one before, the disc's moment at both, and the influence coefficient
+# with the mean square of its error, of both components together.
+SEEN_X, SEEN_Y, LAST_X, LAST_Y, NOW_X, NOW_Y, LAST_MOMENT_X, LAST_MOMENT_Y = 0, 1, 2, 3, 4, 5, 6, 7
+LEARNT_X, LEARNT_Y, VARIANCE, FIRST_CHANGE, PER_CHANGE = 8, 9, 10, 11, 6
+# Of each pair what is asked of its moment, bounds of that, at which of them it is, and its direction.
+CHANGE, LOWEST_CHANGE, HIGHEST_CHANGE, FIXED, AXIS_X, AXIS_Y = 0, 1, 2, 3, 4, 5
+# fmt: on
+
+MAGNITUDE_RANGE, NEARLY = 10.0, 1e-12
+
+
+@both_ways
+def change_of(r: int, pair: int) -> int:
+    """Place of what is asked of a pair."""
+    return r + FIRST_CHANGE + PER_CHANGE * pair
+
+
+@both_ways
+def learn(
+    m: Query, r: int, amplitude_square: float, phase_square: float, law_square: float, assumed: float
+) -> None:
+    """Learn K from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
+
+    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R the variance of
+    the noise and of (s |K dU|)^2: a response that noise could have made moves K little, and no moment counts
+    as better known than by s, the relative standard deviation of the law.  P never falls below (s |K|)^2, so
+    the estimate keeps following; |K| stays within `MAGNITUDE_RANGE` of the assumed one, for no response
+    proves no coefficient.  Variances of amplitude, phase and s are given.
+    Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
+    """
+    x = m[r + SEEN_X]
+    y = m[r + SEEN_Y]
+    ux = m[r + NOW_X] - m[r + LAST_MOMENT_X]
+    uy = m[r + NOW_Y] - m[r + LAST_MOMENT_Y]
+    kx = m[r + LEARNT_X]
+    ky = m[r + LEARNT_Y]
+    expected = (ux * ux + uy * uy) * m[r + VARIANCE]
+    if expected == 0.0:
+        return
+    seen = x * x + y * y + m[r + LAST_X] * m[r + LAST_X] + m[r + LAST_Y] * m[r + LAST_Y]
+    px = kx * ux - ky * uy
+    py = kx * uy + ky * ux
+    rest = 2.0 * amplitude_square + phase_square * seen + law_square * (px * px + py * py)
+    gain = m[r + VARIANCE] / (expected + rest)
+    dx = x - m[r + LAST_X] - px
+    dy = y - m[r + LAST_Y] - py
+    vx = kx + gain * (ux * dx + uy * dy)
+    vy = ky + gain * (ux * dy - uy * dx)
+    magnitude = sqrt(vx * vx + vy * vy)
+    kept = smaller(larger(magnitude, assumed / MAGNITUDE_RANGE), assumed * MAGNITUDE_RANGE)
+    if magnitude == 0.0:
+        vx = kx
+        vy = ky
+        magnitude = sqrt(kx * kx + ky * ky)
+    m[r + LEARNT_X] = vx * (kept / magnitude)
+    m[r + LEARNT_Y] = vy * (kept / magnitude)
+    m[r + VARIANCE] = larger(m[r + VARIANCE] * rest / (expected + rest), law_square * kept * kept)
+
+
+@both_ways
+def shared(m: Query, before: int, sign: float, after: int, here: float, x: float, y: float) -> bool:
+    """Whether a vector lies between two pairs' directions, each taken with a sign; they then share it."""
+    ax = sign * m[before + AXIS_X]
+    ay = sign * m[before + AXIS_Y]
+    bx = here * m[after + AXIS_X]
+    by = here * m[after + AXIS_Y]
+    between = ax * by - ay * bx
+    one = (x * by - y * bx) / between
+    two = (ax * y - ay * x) / between
+    slack = -NEARLY * sqrt(x * x + y * y)
+    if one < slack or two < slack:
+        return False
+    m[before + CHANGE] = sign * larger(one, 0.0)
+    m[after + CHANGE] = here * larger(two, 0.0)
+    return True
+
+
+@both_ways
+def share(m: Query, r: int, half: int, x: float, y: float) -> None:
+    """Components along the two free neighbouring directions; along the axis when only one is free."""
+    free = 0
+    last = r
+    pair = 0
+    while pair < half:
+        at = change_of(r, pair)
+        if m[at + FIXED] == 0.0:
+            free = free + 1
+            last = at
+        pair = pair + 1
+    if free == 1:
+        m[last + CHANGE] = x * m[last + AXIS_X] + y * m[last + AXIS_Y]
+    if free < 2:
+        return
+    # Once round: from the last free axis, seen backwards, to the first one, and over the next to the last.
+    sign = -1.0
+    turn = 0
+    while turn < 2 * half:
+        pair = turn
+        here = 1.0
+        if turn >= half:
+            pair = turn - half
+            here = -1.0
+        at = change_of(r, pair)
+        if m[at + FIXED] == 0.0:
+            if shared(m, last, sign, at, here, x, y):
+                return
+            last = at
+            sign = here
+        turn = turn + 1
+
+
+@both_ways
+def stopped(m: Query, at: int) -> bool:
+    """Whether the change of a free pair is beyond a bound, to which it is then taken."""
+    kept = smaller(larger(m[at + CHANGE], m[at + LOWEST_CHANGE]), m[at + HIGHEST_CHANGE])
+    if m[at + FIXED] != 0.0 or kept == m[at + CHANGE]:
+        return False
+    m[at + FIXED] = -1.0
+    if m[at + CHANGE] > kept:
+        m[at + FIXED] = 1.0
+    m[at + CHANGE] = kept
+    return True
+
+
+@both_ways
+def left_of(m: Query, r: int, half: int, value: float, axis: int) -> float:
+    """Component of a vector that is left behind the changes of all pairs."""
+    left = value
+    pair = 0
+    while pair < half:
+        left = left - m[change_of(r, pair) + CHANGE] * m[change_of(r, pair) + axis]
+        pair = pair + 1
+    return left
+
+
+@both_ways
+def split(m: Query, r: int, half: int, x: float, y: float) -> None:
+    """Split a change of the disc's moment over its pairs, kg m, each within its bounds.
+
+    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs that
+    are left; what no pair can give is asked, by its component, of those already at their ends, for the fills
+    are only assumed.
+    Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
+    """
+    pair = 0
+    while pair < half:
+        m[change_of(r, pair) + FIXED] = 0.0
+        pair = pair + 1
+    rounds = 0
+    over = True
+    while over and rounds < half:
+        pair = 0
+        while pair < half:
+            if m[change_of(r, pair) + FIXED] == 0.0:
+                m[change_of(r, pair) + CHANGE] = 0.0
+            pair = pair + 1
+        share(m, r, half, left_of(m, r, half, x, AXIS_X), left_of(m, r, half, y, AXIS_Y))
+        over = False
+        pair = 0
+        while pair < half:
+            if stopped(m, change_of(r, pair)):
+                over = True
+            pair = pair + 1
+        rounds = rounds + 1
+    left_x = left_of(m, r, half, x, AXIS_X)
+    left_y = left_of(m, r, half, y, AXIS_Y)
+    pair = 0
+    while pair < half:
+        at = change_of(r, pair)
+        more = left_x * m[at + AXIS_X] + left_y * m[at + AXIS_Y]
+        # Only in the sense in which the pair was asked for more than it has.
+        if m[at + FIXED] * more > 0.0:
+            m[at + CHANGE] = m[at + CHANGE] + more
+        pair = pair + 1

@@ -112,8 +112,8 @@ def opening_within(
     """Longest valve-open time, at most `duration`, that leaves the driven chamber its residual fill, s.
 
     All times that are tried have the steps of the shorter ones in common, which are taken once.
-    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: fill of the driven chamber that
-        `duration` leaves.
+    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: to which the whole
+        `duration` and its tail would empty it, a fill ratio.
     Returns: zero where the chamber is already there.
     """
     y, residual, opened, way = motions[pair].state, motions[pair].residual, spare + 2, spare + 1

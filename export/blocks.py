@@ -27,7 +27,7 @@ from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_l
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces import point, query
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import FILLING, LAG
 from ringbalance.scene.faults import SceneError
@@ -132,7 +132,7 @@ def law_block(law: CompactLaw) -> Block:
         constants=law.constants,
         tables=law.tables,
         start=tuple(row),
-        modules=(point, chamber),
+        modules=(point, query, chamber),
         steps="answer_all",
         timed=False,
         variables=_variables("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
@@ -178,7 +178,7 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
-        modules=(point, chamber, disc),
+        modules=(point, query, chamber, disc),
         steps="step",
         timed=True,
         variables=_variables("disc", place, most=law.max_fill_ratio, chambers=scene.disc.chambers),
@@ -316,7 +316,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
-        modules=(point, chamber, disc, law_steps, law_based),
+        modules=(point, query, chamber, disc, law_steps, law_based),
         steps="control",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),

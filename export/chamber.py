@@ -22,11 +22,11 @@ from ringbalance.reduced_model.pieces.point import (
     Levels,
     Pieces,
     Query,
-    answer,
     larger,
     piece,
     within,
 )
+from ringbalance.reduced_model.pieces.query import answer
 
 
 def chamber_piece(c: Law, k: Cells, p: Pieces, fill: float) -> int:

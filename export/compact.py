@@ -20,6 +20,7 @@ from numpy.polynomial.polynomial import polyval
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.query import answer
 from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
@@ -139,7 +140,7 @@ class CompactLaw:
         opposite = self.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         query = [0.0] * point.PLACES_OF_QUERY
         query[:4] = fill_ratio, opposite, gas_pressure, float(primed)
-        point.answer(self.constants, *self.tables, query, True)
+        answer(self.constants, *self.tables, query, True)
         velocity, width, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
         return Answer(
             velocity=velocity,

@@ -28,11 +28,11 @@ from ringbalance.reduced_model.pieces.point import (
     Pieces,
     Query,
     larger,
-    set_answer,
     set_levels,
     smaller,
     within,
 )
+from ringbalance.reduced_model.pieces.query import set_answer
 
 # fmt: off
 # Behind the place in c[BLOCK]; of each pair the direction of its positive chamber.

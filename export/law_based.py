@@ -65,11 +65,11 @@ from ringbalance.reduced_model.pieces.point import (
     Pieces,
     Query,
     larger,
-    set_answer,
     set_levels,
     smaller,
     within,
 )
+from ringbalance.reduced_model.pieces.query import set_answer
 
 # fmt: off
 # Behind the disc's numbers; then the offset of each chamber.

@@ -15,13 +15,10 @@ from typing import Final
 
 NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
 LAW, CELLS, PIECES, LEVELS, QUERY = "Law", "Cells", "Pieces", "Levels", "Query"
-"""Types of the subset, as Python's annotations name them; numbers, whole numbers of a byte, rows of numbers
-of single and of double precision that are only read, and numbers that change."""
+"""Types of the subset; all but the last are only read, cells are bytes, pieces of single precision."""
 PER_PIECE: Final = 9
 """Numbers in a row of `Pieces` and `Levels`."""
 _BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
-
-
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
 
 
@@ -347,10 +344,9 @@ class Writer:
                 return self.language.variable.format(name), self.types[name]
             case ast.Subscript(value=ast.Subscript(value=rows, slice=row), slice=place):
                 name, kind = self._expression(rows)
-                if kind not in (PIECES, LEVELS):
-                    raise self._refused(node)
-                at = (self._typed(row, WHOLE), self._typed(place, WHOLE))
-                return self.language.element[kind].format(name, *at), NUMBER
+                if kind in (PIECES, LEVELS):
+                    at = (self._typed(row, WHOLE), self._typed(place, WHOLE))
+                    return self.language.element[kind].format(name, *at), NUMBER
             case ast.Subscript(value=row, slice=place) if self._expression(row)[1] in (LAW, CELLS, QUERY):
                 name, kind = self._expression(row)
                 element = self.language.element[kind].format(name, self._typed(place, WHOLE))
@@ -401,11 +397,10 @@ class Writer:
         if name == "sqrt" and len(arguments) == 1:
             root = "sqrt({})" if self.language is C99 else "SQRT({})"
             return root.format(self._typed(arguments[0], NUMBER)), NUMBER
-        if name == "int" and self._expression(arguments[0])[1] == WHOLE:
-            # Of what another host has as a number.
-            return self._expression(arguments[0])
         if name == "int":
-            return self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
+            text, kind = self._expression(arguments[0])
+            whole = kind == WHOLE
+            return text if whole else self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
         if name == "float":
             return self.language.to_number.format(self._typed(arguments[0], WHOLE)), NUMBER
         if name not in self.source.functions:

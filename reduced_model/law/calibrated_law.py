@@ -24,6 +24,7 @@ from ringbalance.reduced_model.law.flow_law import (
     save_record,
 )
 from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.query import answer, turn
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import (
@@ -253,7 +254,7 @@ class CalibratedLaw:
         """A query of `point` with its answer."""
         query = [float(x), float(y), float(p), float(primed), *_REST_OF_QUERY]
         numbers, cells, pieces = self._lists
-        point.answer(numbers, cells, pieces, pieces, query, True)
+        answer(numbers, cells, pieces, pieces, query, True)
         return query
 
     def _answers(self, asked: _Asked, margins: FloatArray = _NO_MARGINS) -> _Answers:
@@ -348,7 +349,7 @@ class CalibratedLaw:
         point.set_levels(c, k, p, w, *fills)
         w[point.UP_GAS] = self.gas_factor * gas_pressure
         if reverse:
-            point.turn(w)
+            turn(w)
         point.set_drive(c, w)
         point.set_crest(c, w, w[point.DOWN_LEVEL] >= c[point.PORT])
         w[point.UP_SQUARE] = point.up_square(c, w)

@@ -16,8 +16,7 @@ from typing import Final
 NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
 LAW, CELLS, PIECES, LEVELS, QUERY = "Law", "Cells", "Pieces", "Levels", "Query"
 """Types of the subset; all but the last are only read, cells are bytes, pieces of single precision."""
-PER_PIECE: Final = 9
-"""Numbers in a row of `Pieces` and `Levels`."""
+PER_PIECE: Final = 9  # numbers in a row of `Pieces` or `Levels`
 _BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
 

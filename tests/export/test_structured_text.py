@@ -179,7 +179,7 @@ def test_structured_text_has_the_bits_of_python(six: Both) -> None:
             state = "blocked" if row[point.REGIME] == point.BLOCKED else "flows"
             # Part of the gas over the crest is carried out, which takes a third velocity.
             state = "carries" if row[point.SLOWER] > 0 else state
-            outside = 0 if query.is_usual(compact.constants, query) else OUTSIDE
+            outside = 0 if is_usual(compact.constants, query) else OUTSIDE
             operations.append((state, widths, machine.operations - before - outside))
             if widths:
                 found = row[point.VELOCITY : point.PRIMED_AFTER + 1]

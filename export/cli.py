@@ -145,6 +145,6 @@ def _checked_name(name: str) -> str:
             option="--name",
             value=name,
             problem="it names functions in every language",
-            allowed="lower-case letters, digits and single underscores, a letter first",
+            allowed="lower-case letters, digits and single underscores, a letter first; no word of Python",
         )
     return name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from importlib.resources import files
 from string import Template
@@ -23,10 +24,14 @@ _OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
 _ST_TYPES: Final = {"Real": "LREAL", "Integer": "DINT", "Boolean": "BOOL"}
 
 
+_TAKEN: Final = frozenset(keyword.kwlist) | {"math", "collections"}
+"""Names that a Python module cannot have, or that hide one that it imports."""
+
+
 def identifier(text: str) -> str:
     """A name that every language takes."""
     name = re.sub(r"_+", "_", re.sub(r"[^0-9a-z]", "_", text.lower())).strip("_") or "law"
-    return f"law_{name}" if name[0].isdigit() else name
+    return f"law_{name}" if name[0].isdigit() or name in _TAKEN else name
 
 
 def c_files(block: Block, name: str) -> dict[str, str]:

@@ -38,6 +38,8 @@ def test_it_writes_the_files_it_names(
         ([OIL, "--to", "c", "--points", "5"], "--points = 5"),
         ([OIL, "--to", "csv", "--points", "1"], "--points = 1"),
         ([OIL, "--to", "c", "--name", "2 b"], '--name = "2 b"'),
+        ([OIL, "--to", "python", "--name", "class"], '--name = "class"'),
+        ([OIL, "--to", "python", "--name", "math"], '--name = "math"'),
         ([OIL, "--to", "rust"], "rust"),
         ([OIL, "--to", "c", "--all-systems"], "--all-systems = true"),
         ([str(rb.bundled_scene("driven_masses_small")), "--to", "c"], "eccentric_mass"),

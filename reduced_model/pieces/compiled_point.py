@@ -1,7 +1,8 @@
-"""The compact law at many points, compiled from `point`; the bits are those of plain Python."""
+"""The compact law at many points, and where its inverse looks, compiled; with the bits of plain Python."""
 
 from __future__ import annotations
 
+from ringbalance.reduced_model.pieces.inverse import set_roots
 from ringbalance.reduced_model.pieces.point import (
     FILL,
     MARGIN,
@@ -17,6 +18,13 @@ from ringbalance.reduced_model.pieces.point import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place
+
+
+@in_place
+def set_all_roots(c: FloatArray, p: FloatArray, ways: int, cells: FloatArray, roots: FloatArray) -> None:
+    """`set_roots` of each way. Args: `cells`: shape (ways, `ROOT_PLACES`)."""
+    for way in range(ways):
+        set_roots(c, p, way, cells[way], roots)
 
 
 @in_place

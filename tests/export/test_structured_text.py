@@ -19,6 +19,7 @@ from ringbalance.export.compact import CompactLaw
 from ringbalance.export.hosts import st_files
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.query import is_usual
 
 parse = pytest.importorskip("blark.parse")
 Both = tuple[CalibratedLaw, CompactLaw]

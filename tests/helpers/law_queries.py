@@ -9,6 +9,7 @@ import numpy as np
 from ringbalance.export.compact import CompactLaw
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.query import answer
 from ringbalance.scene.arrays import FloatArray
 
 

@@ -67,9 +67,9 @@ def move(
     if guarded:
         for i in range(half):
             motions[half + i] = motions[i]
-            run.lowest[i] = math.nan
-        if not _above_residual(loop, run):
-            guarded = _shorten(loop, plant, run, motions, w)
+            at_residual = _driven_fill(loop, run, i) <= run.residual_fill + NEAR_RESIDUAL
+            if run.asked[i] > 0.0 and at_residual:
+                _cut_short(loop, run, i, 0.0)
     drift = _pass(loop, plant, run, motions, notes, w)
     if guarded and not _keeps_residual(loop, plant, run, motions, w):
         for i in range(half):
@@ -81,17 +81,6 @@ def move(
     for i in range(half):
         count += 1 if run.asked[i] > 0.0 else 0
     return count
-
-
-@in_place
-def _above_residual(loop: Record, run: Record) -> bool:
-    """Whether every driven chamber is above its residual fill."""
-    found = True
-    for i in range(loop.chambers // 2):
-        found = found and (
-            run.asked[i] == 0.0 or _driven_fill(loop, run, i) > run.residual_fill + NEAR_RESIDUAL
-        )
-    return found
 
 
 @in_place
@@ -112,24 +101,24 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
 
 
 @in_place
-def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> bool:
-    """Shorten the valve-open times to what leaves the residual fill; those below the minimum are left out.
-
-    Returns: False, for there is nothing left to guard.
-    """
+def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> None:
+    """Shorten the valve-open times to what leaves the residual fill."""
     half = loop.chambers // 2
     for i in range(half):
         if run.asked[i] > 0.0:
-            asked, time = run.asked[i], 0.0
-            if _driven_fill(loop, run, i) > run.residual_fill + NEAR_RESIDUAL:
-                side, lowest = run.side[i], run.lowest[i]
-                time = opening_within(plant, motions, i, 2 * half, side, asked, lowest, w)
+            asked, side, lowest = run.asked[i], run.side[i], run.lowest[i]
+            time = opening_within(plant, motions, i, 2 * half, side, asked, lowest, w)
             if time != asked:
-                chamber = i + half * run.side[i]
-                run.shortened += 1
-                run.at_residual[chamber], run.refused[chamber] = 1, 1
-                run.asked[i] = time if time >= loop.shortest[chamber] else 0.0
-    return False
+                _cut_short(loop, run, i, time)
+
+
+@in_place
+def _cut_short(loop: Record, run: Record, pair: int, time: float) -> None:
+    """Give a pair less valve-open time than is asked for; none where it would be below the minimum."""
+    chamber = pair + loop.chambers // 2 * run.side[pair]
+    run.shortened += 1
+    run.at_residual[chamber], run.refused[chamber] = 1, 1
+    run.asked[pair] = time if time >= loop.shortest[chamber] else 0.0
 
 
 @in_place

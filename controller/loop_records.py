@@ -163,7 +163,7 @@ _RUN_WHOLE: Final = (
 _RUN_PAIRS: Final = (
     "fill",  # x of the chamber on the positive side
     "asked",  # valve-open time of the command, s, zero for none
-    "lowest",  # fill that the driven chamber comes to by it, not a number where this is not known
+    "lowest",  # fill that the driven chamber comes to by it
     "given",  # law-based: valve-open time of the last command, s
 )
 _RUN_FLAGS: Final = (

@@ -24,7 +24,8 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.pieces import point
-from ringbalance.reduced_model.pieces.inverse import ROOT_PLACES, WIDTH_OF_ROOT, root_cells, root_pieces
+from ringbalance.reduced_model.pieces.compiled_point import set_all_roots
+from ringbalance.reduced_model.pieces.inverse import ROOT_PLACES, WIDTH_OF_ROOT
 from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import entrance_fraction
@@ -376,7 +377,7 @@ def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
     head = Table(knots=_NO_HEADS, columns=np.repeat([ratio, 0.0, 0.0, 0.0], 2))
     rows = LawRows.of(1)
     rows.add_levels(level)
-    rows.add_way(point.SIPHON, head, law.density)
+    rows.add_way(point.SIPHON, head, law.density, error=0.0, more=())
     _fill_rows(plant, 1, *rows.arrays({point.LARGEST_FILL: law.max_fill_ratio}))
 
 
@@ -384,10 +385,7 @@ def _fill_rows(plant: npt.NDArray[np.void], ways: int, numbers: FloatArray, rows
     if numbers.size > NUMBERS or len(rows) > ROWS:
         raise ValueError(f"the law has {len(rows)} pieces, at most {ROWS} can be compiled")
     plant["numbers"][0, : numbers.size], plant["rows"][0, : len(rows)] = numbers, rows
-    for way in range(ways):
-        plant["root_cells"][0, way] = root_cells(numbers, rows, way)
-        first, roots = root_pieces(numbers, rows, way)
-        plant["roots"][0, first : first + len(roots)] = roots
+    set_all_roots(numbers, rows, ways, plant["root_cells"][0], plant["roots"][0])
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:

@@ -112,8 +112,8 @@ def opening_within(
     """Longest valve-open time, at most `duration`, that leaves the driven chamber its residual fill, s.
 
     All times that are tried have the steps of the shorter ones in common, which are taken once.
-    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: fill of the driven chamber that
-        `duration` leaves, not a number where it is not known.
+    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: to which the whole
+        `duration` and its tail would empty it, a fill ratio.
     Returns: zero where the chamber is already there.
     """
     y, residual, opened, way = motions[pair].state, motions[pair].residual, spare + 2, spare + 1
@@ -131,10 +131,7 @@ def opening_within(
     pace = abs(motions[way].state[U]) * plant.tube_area / plant.chamber_volume
     # How far the driven chamber falls below its residual fill, with either time.
     before = residual - (plant.total - y[X] if chamber else y[X])
-    known = not (passes or math.isnan(lowest))
-    after = residual - (lowest if known else _least_after(plant, motions, spare, high, w))
-    if after <= 0.0:
-        return duration
+    after = residual - (_least_after(plant, motions, spare, high, w) if passes else lowest)
     if after < pace * high:
         # Its tail is much the same for a somewhat shorter time.
         before = after - pace * high

@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from math import sqrt
 from typing import Final
 
-import numpy as np
-
 from ringbalance.reduced_model.pieces.point import (
     C0,
     C1,
@@ -23,8 +21,8 @@ from ringbalance.reduced_model.pieces.point import (
     END,
     LARGEST_FILL,
     LAST,
-    LEVEL_CELLS,
     LEVEL_SCALE,
+    PLACES,
     SCALE,
     SLOWEST,
     Law,
@@ -32,7 +30,6 @@ from ringbalance.reduced_model.pieces.point import (
     piece,
     quintic,
 )
-from ringbalance.reduced_model.pieces.table import polynomial
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.both_ways import both_ways
 
@@ -49,6 +46,7 @@ R0, R1, R2, R3, START = 1, 2, 3, 4, 5
 """In a piece of roots, behind its end: the polynomial, and the root at the start of the piece."""
 WIDTH_OF_ROOT: Final = START + 1
 Row = Sequence[float] | FloatArray
+Filled = list[float] | FloatArray
 
 
 @both_ways
@@ -63,7 +61,7 @@ def growth(p: Pieces, row: int, t: float) -> float:
 def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
     """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; it goes on straight beyond the fills."""
     x = max(0.0, min(fill, c[LARGEST_FILL]))
-    row = piece(p, c[int(x * c[LEVEL_SCALE] + c[LEVEL_CELLS])], x)
+    row = int(c[PLACES + int(x * c[LEVEL_SCALE])])
     t = x - p[row][END]
     slope = growth(p, row, t)
     return quintic(p, row, t) + (fill - x) * slope, slope
@@ -76,59 +74,52 @@ def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
         return pressure * p[way][CREEP]
     root = sqrt(sqrt(pressure))
     s = min(sqrt(root), p[way][LAST])
-    row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
+    row = piece(p, int(c[PLACES + int(s * p[way][SCALE] + p[way][CELLS])]), s)
     return root * root * quintic(p, row, s - p[row][END])
 
 
-def root_cells(numbers: FloatArray, rows: FloatArray, way: int) -> FloatArray:
-    """Where `root_of_velocity` looks: cells of equal length in the fourth root of the velocity.
+@both_ways
+def set_roots(c: Law, p: Pieces, way: int, cells: Filled, roots: Sequence[Filled] | FloatArray) -> None:
+    """Write where `root_of_velocity` looks on a way, and from what it begins.
 
-    Returns: Cells per fourth root, the place of zero, the smallest and the largest velocity, then the piece
-        at the start of each cell; shape (`ROOT_PLACES`,).
+    Args:
+        cells: cells of equal length in the fourth root of the velocity; cells per fourth root, the place of
+            zero, the smallest and the largest velocity, then the piece at the start of each cell; shape
+            (`ROOT_PLACES`,).
+        roots: by the rows of `p`, the eighth root of the pressure over the fourth root of the velocity,
+            cubic by the values and slopes at both ends of the piece; shape (rows, `WIDTH_OF_ROOT`).
     """
-    first, last = _span(numbers, rows, way)
-    ends, slowest = _fourth_roots(rows, first, last), rows[way, SLOWEST] * rows[way, CREEP]
-    edges = np.linspace(slowest**0.25, ends[-1], ROOT_CELLS + 1)
-    each = ROOT_CELLS / (edges[-1] - edges[0])
-    # The last edge, and what rounding brings before the first, belong to the piece beside them.
-    found = first + np.minimum(np.searchsorted(ends, edges * (1.0 - _EDGE)), last - first)
-    fastest = rows[last, END] ** 4 * rows[last, C0]
-    return np.concatenate([[each, ROOT_HEAD - edges[0] * each, slowest, fastest], found])
+    s = sqrt(sqrt(sqrt(p[way][SLOWEST])))
+    first = int(c[PLACES + int(s * p[way][SCALE] + p[way][CELLS])])
+    last = int(c[PLACES + int(p[way][LAST] * p[way][SCALE] + p[way][CELLS])])
+    slowest, t = p[way][SLOWEST] * p[way][CREEP], s - p[first][END]
+    fourth = sqrt(sqrt(slowest))
+    begin, slope = fourth, _root_slope(s, fourth, quintic(p, first, t), growth(p, first, t))
+    for row in range(first, last + 1):
+        before, start, steep = fourth, s, slope
+        s, ratio = p[row][END], p[row][C0]
+        fastest = s * s * s * s * ratio
+        fourth = sqrt(sqrt(fastest))
+        slope = _root_slope(s, fourth, ratio, p[row][C1])
+        h, fall = fourth - before, start - s
+        roots[row][END], roots[row][START] = fourth, start
+        roots[row][R0], roots[row][R1] = s, slope
+        roots[row][R2] = (3.0 * fall / h + steep + 2.0 * slope) / h
+        roots[row][R3] = (2.0 * fall / h + steep + slope) / (h * h)
+        cells[3] = fastest
+    length, row = (fourth - begin) / ROOT_CELLS, first
+    cells[0], cells[1], cells[2] = 1.0 / length, ROOT_HEAD - begin / length, slowest
+    for k in range(ROOT_CELLS + 1):
+        # The last edge, and what rounding brings before the first, belong to the piece beside them.
+        while row < last and roots[row][END] < (begin + k * length) * (1.0 - _EDGE):
+            row += 1
+        cells[ROOT_HEAD + k] = float(row)
 
 
-def root_pieces(numbers: FloatArray, rows: FloatArray, way: int) -> tuple[int, FloatArray]:
-    """For each piece of a way the eighth root of the pressure over the fourth root of the velocity.
-
-    Cubic, with the values and slopes at both ends of the piece: next to what `root_of_velocity` looks for.
-    Returns: The row of the first piece, and rows, shape (pieces, `WIDTH_OF_ROOT`).
-    """
-    first, last = _span(numbers, rows, way)
-    inside = rows[first : last + 1]
-    start = rows[way, SLOWEST] ** 0.125
-    s = np.concatenate([[start], inside[:, END]])
-    t = start - inside[0, END]
-    at_start = quintic(inside, 0, t), growth(inside, 0, t)
-    ratio, rise = np.concatenate([[at_start], inside[:, [C0, C1]]]).T
-    w = np.concatenate([[s[0] * at_start[0] ** 0.25], _fourth_roots(rows, first, last)])
-    slope = s / w / (1.0 + 0.25 * s * rise / ratio)
-    h = np.diff(w)
-    powers = polynomial(h, (s[:-1], s[1:]), (slope[:-1], slope[1:]))
-    return first, np.stack([w[1:], *(each / h**power for power, each in enumerate(powers)), s[:-1]], axis=1)
-
-
-def _span(numbers: FloatArray, rows: FloatArray, way: int) -> tuple[int, int]:
-    """First and last piece of a way."""
-    scale, place = rows[way, SCALE], rows[way, CELLS]
-    first, last = (
-        int(numbers[int(s * scale + place)]) for s in (rows[way, SLOWEST] ** 0.125, rows[way, LAST])
-    )
-    return first, last
-
-
-def _fourth_roots(rows: FloatArray, first: int, last: int) -> FloatArray:
-    """Of the velocities at the ends of pieces."""
-    inside = slice(first, last + 1)
-    return np.asarray(np.sqrt(np.sqrt(rows[inside, END] ** 4 * rows[inside, C0])))
+@both_ways
+def _root_slope(s: float, fourth: float, ratio: float, rise: float) -> float:
+    """Of the eighth root over the fourth root of the velocity, with the ratio of the piece and its slope."""
+    return s / fourth / (1.0 + 0.25 * s * rise / ratio)
 
 
 @both_ways
@@ -136,7 +127,7 @@ def root_of_velocity(cells: Row, roots: Pieces, p: Pieces, way: int, velocity: f
     """Eighth root of the pressure that a velocity above zero, m/s, takes, and d(velocity)/d(root).
 
     Below a table the pressure is proportional to the velocity, above it to its square.
-    Args: `cells`: `root_cells` of the way. `roots`: `root_pieces`, by the rows of `p`.
+    Args: `cells` of the way and `roots` by the rows of `p`, as `set_roots` writes them.
     """
     if velocity <= cells[2]:
         s = sqrt(sqrt(sqrt(velocity / p[way][CREEP])))
@@ -145,7 +136,7 @@ def root_of_velocity(cells: Row, roots: Pieces, p: Pieces, way: int, velocity: f
         s = p[way][LAST] * sqrt(sqrt(velocity / cells[3]))
         return s, 4.0 * velocity / s
     fourth = sqrt(sqrt(velocity))
-    row = piece(roots, cells[int(fourth * cells[0] + cells[1])], fourth)
+    row = piece(roots, int(cells[int(fourth * cells[0] + cells[1])]), fourth)
     t, end = fourth - roots[row][END], p[row][END]
     near = roots[row][R0] + t * (roots[row][R1] + t * (roots[row][R2] + t * roots[row][R3]))
     return _within(p, row, velocity, near - end, roots[row][START] - end)

@@ -56,13 +56,13 @@ class Table:
         """The first column, with its slopes and curvatures, in powers of x - end, shape (6, n - 1)."""
         h = np.diff(self.knots)
         ends = [(column[:-1], column[1:]) for column in map(self.column, range(3))]
-        return np.array(polynomial(h, *ends)) / h ** np.arange(6)[:, None]
+        return np.array(_polynomial(h, *ends)) / h ** np.arange(6)[:, None]
 
     def cubics(self, number: int) -> FloatArray:
         """A column with its slopes in powers of x - end, shape (4, n - 1)."""
         h = np.diff(self.knots)
         ends = [(column[:-1], column[1:]) for column in map(self.column, (number, number + 1))]
-        return np.array(polynomial(h, *ends)) / h ** np.arange(4)[:, None]
+        return np.array(_polynomial(h, *ends)) / h ** np.arange(4)[:, None]
 
     def lines(self, values: FloatArray) -> FloatArray:
         """Values at the knots, straight between them, in powers of x - end, shape (2, n - 1)."""
@@ -97,7 +97,7 @@ class Table:
         return np.asarray(np.interp(np.asarray(x, dtype=np.float64), self.knots, self.column(number)))
 
 
-def polynomial(h: Any, value: tuple[Any, Any], *derivatives: tuple[Any, Any]) -> list[Any]:
+def _polynomial(h: Any, value: tuple[Any, Any], *derivatives: tuple[Any, Any]) -> list[Any]:
     """Of a piece of length h from values, slopes and curvatures at both ends, in powers of (x - end)/h."""
     if not derivatives:
         return [value[1], value[1] - value[0]]
@@ -139,11 +139,16 @@ class Column:
     derivatives: tuple[FloatArray, ...] = ()
     """Slope, or slope and curvature; none: straight between the knots."""
 
+    @property
+    def stored(self) -> tuple[FloatArray, ...]:
+        """What a table holds of it."""
+        return self.value, *self.derivatives
+
     def misses(self, x: FloatArray, inside: IntArray) -> BoolArray:
         """Whether pieces miss more than is allowed, shape (pieces,); `inside`: their samples, (pieces, n)."""
         first, last = inside[:, :1], inside[:, -1:]
         h = x[last] - x[first]
-        powers = polynomial(h, *((each[first], each[last]) for each in (self.value, *self.derivatives)))
+        powers = _polynomial(h, *((each[first], each[last]) for each in self.stored))
         t, value = (x[inside] - x[last]) / h, powers.pop()
         while powers:
             value = powers.pop() + t * value
@@ -174,5 +179,5 @@ def knots_of(x: FloatArray, columns: Sequence[Column], *, shortest: int = 1) -> 
 
 def table_at(x: FloatArray, knots: IntArray, columns: Sequence[Column]) -> Table:
     """The columns at the knots."""
-    stored = [values[knots] for column in columns for values in (column.value, *column.derivatives)]
+    stored = [values[knots] for column in columns for values in column.stored]
     return Table(knots=x[knots], columns=np.concatenate(stored))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -84,11 +84,12 @@ class TubeHeads:
         """
         log_u = _places(_NOMINAL_KNOTS)
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
-        exact = _Widths(*([np.zeros(log_u.size)] * 4))
-        return tuple(
-            cls._tabled([each.of_design(i) for each in lost], exact, shortest=0)
-            for i in range(lost[0].root.shape[1])
-        )
+        exact, tables = _Widths(*([np.zeros((log_u.size, 1))] * 4)), []
+        for way, columns in _columns(lost, exact, 0.0):
+            stored = [np.broadcast_to(values, way.root.shape) for each in columns for values in each.stored]
+            rows = np.stack(stored).transpose(2, 0, 1).reshape(way.root.shape[1], -1)
+            tables.append([Table(knots=x, columns=row) for x, row in zip(way.root.T, rows, strict=True)])
+        return tuple(map(cls._of_tables, zip(*tables, strict=True)))
 
     @classmethod
     def bare(cls, scene: Scene) -> TubeHeads:
@@ -120,22 +121,19 @@ class TubeHeads:
         return replace(heads, interpolation_error=_OF_HEAD * float(np.max(np.abs(missed))))
 
     @classmethod
-    def _tabled(cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float = 0.0) -> TubeHeads:
-        """From losses and half-widths at samples; `shortest`: as `knots_of`, or 0 for a knot at each one."""
-        whole, *ways = lost
-        alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
-        ways = ways[:1] if alike else ways
-        columns = [whole.ratio(allowed), _half_width(widths.whole)]
-        if ways:
-            columns += [_half_width(widths.share), *(whole.share(way, allowed) for way in ways)]
-        there = zip(ways, widths.ways, strict=False)
-        tables = [(way, [way.ratio(allowed), _half_width(width)]) for way, width in there]
-        made = []
-        for each, some in [(whole, columns), *tables]:
-            knots = knots_of(each.root, some, shortest=shortest) if shortest else np.arange(each.root.size)
-            made.append(table_at(each.root, knots, some))
-        hump, back = (*made[1:], None, None)[:2]
-        return cls(siphon=made[0], hump=hump, return_hump=back)
+    def _tabled(cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float) -> TubeHeads:
+        """From losses and half-widths at samples; `shortest`: as `knots_of`."""
+        made = [
+            table_at(way.root, knots_of(way.root, columns, shortest=shortest), columns)
+            for way, columns in _columns(lost, widths, allowed)
+        ]
+        return cls._of_tables(made)
+
+    @classmethod
+    def _of_tables(cls, tables: Sequence[Table]) -> TubeHeads:
+        siphon, *ways = tables
+        hump, back = (*ways, None, None)[:2]
+        return cls(siphon=siphon, hump=hump, return_hump=back)
 
     @property
     def tables(self) -> tuple[Table, ...]:
@@ -250,10 +248,6 @@ class _Lost:
             curvature=np.where(falls, 0.0, curvature),
         )
 
-    def of_design(self, number: int) -> _Lost:
-        """One of many."""
-        return _Lost(**{name: value[:, number] for name, value in vars(self).items()})
-
     def ratio(self, allowed: float) -> Column:
         """u/s^4 over s, by the derivatives of ln u over ln s."""
         ratio, rise = self.over_root, 8 / self.slope - 4
@@ -266,6 +260,18 @@ class _Lost:
         share = np.exp(way.log_head - self.log_head)
         slope = share * (way.slope / self.slope - 1) * 8 / self.root
         return Column(value=share, allowed=_OF_SHARES * allowed * share, derivatives=(slope,))
+
+
+def _columns(lost: list[_Lost], widths: _Widths, allowed: float) -> list[tuple[_Lost, list[Column]]]:
+    """What the table of each way holds; there and back where they differ."""
+    whole, *ways = lost
+    alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
+    ways = ways[:1] if alike else ways
+    columns = [whole.ratio(allowed), _half_width(widths.whole)]
+    if ways:
+        columns += [_half_width(widths.share), *(whole.share(way, allowed) for way in ways)]
+    there = zip(ways, widths.ways, strict=False)
+    return [(whole, columns), *((way, [way.ratio(allowed), _half_width(width)]) for way, width in there)]
 
 
 def _half_width(value: FloatArray) -> Column:

@@ -22,6 +22,7 @@ from ringbalance.reduced_model.injection.march import SPARE, advance, least_late
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid, residual_fill_ratio
+from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths, nominal_value
 
@@ -159,13 +160,17 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
         begun = np.zeros((1, 2 * rest.pairs + SPARE), dtype=MOTION)
         rest._continued(runs, begun, rest.liquid[None], np.zeros((1, 0, 2)), np.zeros(NOTES), w, traced=False)
         motions[0] = begun[0, 0]
-        longest = opening_within(plant, motions, 0, 1, 0, 5.0, math.nan, w)
-        assert 0.0 < longest < 5.0
-        fills = []
-        for time in (longest, 1.000001 * longest):
+
+        def lowest(
+            time: float, plant: np.void = plant, motions: Records = motions, w: FloatArray = w
+        ) -> float:
             motions[1] = motions[0]
             command(plant, motions[1], 0, time)
             advance(plant, motions[1], plant["valve_lag"] + time, w, 0, 0, w)
-            fills.append(least_later(plant, motions, 1, w))
-        assert fills[0] >= under.residual > fills[1]
-        assert opening_within(plant, motions, 0, 1, 0, longest / 2, math.nan, w) == longest / 2
+            return least_later(plant, motions, 1, w)
+
+        longest = opening_within(plant, motions, 0, 1, 0, 5.0, lowest(5.0), w)
+        assert 0.0 < longest < 5.0
+        assert lowest(longest) >= under.residual > lowest(1.000001 * longest)
+        half = longest / 2
+        assert opening_within(plant, motions, 0, 1, 0, half, lowest(half), w) == half

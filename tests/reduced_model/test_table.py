@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from ringbalance.reduced_model.pieces.inverse import root_cells, root_of_velocity, root_pieces, velocity_under
+from ringbalance.reduced_model.pieces.compiled_point import set_all_roots
+from ringbalance.reduced_model.pieces.inverse import (
+    ROOT_PLACES,
+    WIDTH_OF_ROOT,
+    root_of_velocity,
+    set_roots,
+    velocity_under,
+)
 from ringbalance.reduced_model.pieces.point import SIPHON
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import (
@@ -81,12 +88,14 @@ def test_a_velocity_loses_the_head_that_drives_it(u: list[float]) -> None:
     ]
     table = Table(knots=s, columns=np.concatenate(columns))
     rows = LawRows.of(1)
-    rows.add_way(SIPHON, table, 1000.0)
+    rows.add_way(SIPHON, table, 1000.0, error=0.0, more=())
     whole = rows.arrays({})
-    cells = root_cells(*whole, SIPHON).tolist()
     numbers, pieces = (each.tolist() for each in whole)
-    first, near = root_pieces(*whole, SIPHON)
-    near_roots = [[0.0]] * first + near.tolist()
+    cells, near_roots = [0.0] * ROOT_PLACES, np.zeros((len(pieces), WIDTH_OF_ROOT)).tolist()
+    set_roots(numbers, pieces, SIPHON, cells, near_roots)
+    compiled = np.zeros((1, ROOT_PLACES)), np.zeros((len(pieces), WIDTH_OF_ROOT))
+    set_all_roots(*whole, 1, *compiled)
+    assert (compiled[0].tolist(), compiled[1].tolist()) == ([cells], near_roots)
     inside = (s[0] ** 8 / 2 < np.array(u)) & (np.array(u) < s[-1] ** 4 / 2)
     roots = roots_of(table, u)
     right = np.sqrt((np.array(u) + np.sqrt(np.array(u) ** 2 + 4 * np.array(u))) / 2) ** 0.5

@@ -73,7 +73,8 @@ def sweep(
     if tolerance is not None:
         told = told.with_values({"accuracy.tolerance": read_tolerance(tolerance)})
     planned = _plan(told, vary or [], plan, sample)
-    check_rows(write or [], len(planned.points()))
+    if write:
+        check_rows(write, len(planned.points()))
     check_file(out / TABLE)
     with activity("sweep", "points ...") as shown:
         found = run_sweep(

@@ -23,11 +23,11 @@ from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.export import chamber, controller, disc, law_based
-from ringbalance.export.compact import VELOCITIES, CompactLaw, compact_law
+from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces import point, query
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import FILLING, LAG
 from ringbalance.scene.faults import SceneError
@@ -85,8 +85,8 @@ class Block:
     facts: str
     """What it holds and how exact it is."""
     constants: Numbers
-    pieces: tuple[Numbers, ...]
-    """Rows of polynomials, likewise; none for a block without a law."""
+    tables: Tables | None
+    """Of its law, if it has one."""
     start: Numbers
     """The row before the first step."""
     modules: tuple[ModuleType, ...]
@@ -104,7 +104,7 @@ class Block:
     @property
     def size(self) -> int:
         """Of the constants, bytes."""
-        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
+        return 8 * len(self.constants) + (0 if self.tables is None else self.tables.size)
 
     def outputs(self, row: list[float]) -> dict[str, float]:
         """By name, of a row that is up to date."""
@@ -116,8 +116,7 @@ class Block:
         for name, value in inputs.items():
             row[places[name]] = float(value)
         step = getattr(self.modules[-1], self.steps)
-        rows = (self.constants, self.pieces) if self.pieces else (self.constants,)
-        step(*rows, row, *((time,) if self.timed else ()))
+        step(self.constants, *(self.tables or ()), row, *((time,) if self.timed else ()))
         return self.outputs(row)
 
 
@@ -131,9 +130,9 @@ def law_block(law: CompactLaw) -> Block:
         scene=law.scene,
         facts=law_facts(law),
         constants=law.constants,
-        pieces=law.pieces,
+        tables=law.tables,
         start=tuple(row),
-        modules=(point, chamber),
+        modules=(point, query, chamber),
         steps="answer_all",
         timed=False,
         variables=_variables("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
@@ -147,7 +146,7 @@ def law_facts(law: CompactLaw) -> str:
 
 def _tabulation(law: CompactLaw) -> str:
     return (
-        f"{law.size // 8} constants, {law.size} bytes; velocities {RANGE}, beyond\n"
+        f"Constants of {law.size} bytes; velocities {RANGE}, beyond\n"
         f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
         f"   {law.level_error:.1e} Pa of a chamber's level."
     )
@@ -163,7 +162,7 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
     given = {FILLING: gas.conductance, LAG: gas.valve_lag}
     modelled = [term for term, value in given.items() if value is not None]
     compact, constants, row = _disc(scene, law, modelled)
-    disc.show(constants, compact.pieces, row)
+    disc.show(constants, compact.tables.cells, compact.tables.pieces, row)
 
     def place(offset: str, chamber: int | None) -> int:
         value = int(getattr(disc, offset))
@@ -177,9 +176,9 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
         scene=scene.file,
         facts=_tabulation(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
         constants=tuple(constants),
-        pieces=compact.pieces,
+        tables=compact.tables,
         start=tuple(row),
-        modules=(point, chamber, disc),
+        modules=(point, query, chamber, disc),
         steps="step",
         timed=True,
         variables=_variables("disc", place, most=law.max_fill_ratio, chambers=scene.disc.chambers),
@@ -268,7 +267,7 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
         constants=_settings(scene),
-        pieces=(),
+        tables=None,
         start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
         modules=(point, controller),
         steps="step",
@@ -315,9 +314,9 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.\n   " + _tabulation(compact),
         constants=tuple(constants),
-        pieces=compact.pieces,
+        tables=compact.tables,
         start=tuple(row),
-        modules=(point, chamber, disc, law_steps, law_based),
+        modules=(point, query, chamber, disc, law_steps, law_based),
         steps="control",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),

@@ -11,15 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, carried_by
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
-from ringbalance.reduced_model.pieces.rows import LawRows
+from ringbalance.reduced_model.pieces.query import answer
+from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
 from ringbalance.scene.arrays import FloatArray, IntArray
@@ -30,15 +32,16 @@ VELOCITIES: Final = (1e-3, 100.0)
 """m/s, that heads are tabulated for."""
 TOLERANCE: Final = 1e-4
 """Of a velocity against the calibrated law."""
-_OF_HEADS: Final = 0.35 * TOLERANCE
+_OF_HEADS: Final = 0.25 * TOLERANCE
 """What of it a head takes."""
 _AT_CREST: Final = 2.0
 """Gas that the flow carries out from over the crest makes up to the double of it."""
-_OF_LEVELS: Final = 0.1 * TOLERANCE
+_OF_LEVELS: Final = 0.2 * TOLERANCE
 """Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 10
-"""Pieces; a level from a mesh that asks for more is less exact, and says so in its half-width."""
-_OF_SHARE: Final = 1e-3
+_MOST_LEVELS: Final = 16
+"""Pieces; a level that asks for more is less exact, and says so in its half-width."""
+_OF_SHARE: Final = 5e-4
+"""Where a share decides whether a column separates, `point` allows for more."""
 _OF_CHAMBER: Final = 2e-6
 """Of the largest squared radius and moment."""
 _OF_WIDTHS: Final = 0.08
@@ -50,11 +53,16 @@ _OF_ROUNDING: Final = 0.2
 """Of a piece's error, to which its coefficients are rounded: numbers with few bits make small libraries."""
 _BITS: Final = 18
 """Of a place at which pieces may meet, likewise."""
-_SAMPLES: Final = 2001
-_SHARES: Final = ((SHARE, 3), (BACK_SHARE, 2))
-"""Column of a share there and back, and the degree of its pieces."""
-_CELLS: Final = 12
-"""Of equal length, each of which knows at which piece to begin looking."""
+_CELLS: Final = (64, 128, 256)
+"""Of equal length, each of which knows at which piece to begin looking; pieces end where cells do, and where
+these are too long for the tolerance, the next number is taken."""
+_LEVEL_CELLS: Final = 160
+LARGEST: Final = 4096
+"""Of all numbers, bytes; levels take what the rest leaves."""
+_PER_CELL: Final = 10
+"""Samples."""
+_EDGE: Final = 1e-3
+"""Of a cell: more than rounding moves what lies next to its edge."""
 _DRAWN: Final = 4000
 """Conditions in which the finished law is compared with the calibrated one."""
 
@@ -75,6 +83,22 @@ class Answer:
     """Whether the tube holds a continuous column afterwards."""
 
 
+class Tables(NamedTuple):
+    """What a law's polynomials are made of, as `point` reads it."""
+
+    cells: tuple[int, ...]
+    """Rows at which to begin looking, each of a byte."""
+    pieces: tuple[tuple[float, ...], ...]
+    """Rows of nine numbers of single precision."""
+    levels: tuple[tuple[float, ...], ...]
+    """Rows of nine numbers of double precision: near a stall two levels next to cancel."""
+
+    @property
+    def size(self) -> int:
+        """Of all numbers, bytes."""
+        return len(self.cells) + 4 * sum(map(len, self.pieces)) + 8 * sum(map(len, self.levels))
+
+
 @dataclass(frozen=True, kw_only=True)
 class CompactLaw:
     """The law of one scene in numbers that `point` reads."""
@@ -83,8 +107,7 @@ class CompactLaw:
     """File that it was calibrated from."""
     constants: tuple[float, ...]
     """At the places that `point` names."""
-    pieces: tuple[tuple[float, ...], ...]
-    """Rows of nine numbers, likewise."""
+    tables: Tables
     head_error: float
     """Largest relative error of a velocity for a given head against the calibrated law."""
     level_error: float
@@ -95,7 +118,7 @@ class CompactLaw:
     @property
     def size(self) -> int:
         """Of all numbers, bytes."""
-        return 8 * (len(self.constants) + sum(map(len, self.pieces)))
+        return 8 * len(self.constants) + self.tables.size
 
     @property
     def max_fill_ratio(self) -> float:
@@ -117,7 +140,7 @@ class CompactLaw:
         opposite = self.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         query = [0.0] * point.PLACES_OF_QUERY
         query[:4] = fill_ratio, opposite, gas_pressure, float(primed)
-        point.answer(self.constants, self.pieces, query, True)
+        answer(self.constants, *self.tables, query, True)
         velocity, width, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
         return Answer(
             velocity=velocity,
@@ -141,27 +164,42 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
             "inputs were fitted together: the compact form of its law would miss their uncertainty",
             "a scene without [fitted]",
         )
-    tables = law.heads.tables
-    rows = LawRows.of(len(tables), cells=_CELLS)
-    slack = 1.0 if uncertainty else _ANYTHING
+    tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
+    rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
     missed = max(_add_way(rows, law, way, table, slack) for way, table in enumerate(tables))
-    level_error = _add_levels(rows, law, slack)
     _add_chamber(rows, scene, law, slack)
-    error = _AT_CREST * missed + law.heads.interpolation_error
-    scalars = law.scalars() | {
-        point.TABULATION: error**2,
-        point.LOWEST: VELOCITIES[0],
-        point.HIGHEST: VELOCITIES[1],
-    }
-    numbers, pieces = rows.arrays(scalars)
+    before, count = map(len, rows.arrays({}))
+    left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
+    level_error = _add_levels(level_rows, law, slack, most=min(_MOST_LEVELS, left // (8 * WIDTH_OF_ROW)))
+    level_numbers, levels = level_rows.arrays({})
+    numbers, pieces = rows.arrays(
+        law.scalars()
+        | {
+            point.LOWEST: VELOCITIES[0],
+            point.HIGHEST: VELOCITIES[1],
+            point.LEVEL_SCALE: level_numbers[point.LEVEL_SCALE],
+        }
+    )
+    constants, cells = np.split(numbers, [point.PLACES])
+    # Cells of the levels come first.
+    constants[point.CHAMBER_CELLS] += _LEVEL_CELLS + 1
+    pieces[: len(tables), point.CELLS] += _LEVEL_CELLS + 1
     made = CompactLaw(
         scene=scene.file,
-        constants=tuple(numbers.tolist()),
-        pieces=tuple(map(tuple, pieces.tolist())),
+        constants=tuple(constants.tolist()),
+        tables=Tables(
+            cells=tuple(map(int, (*level_numbers[point.PLACES :], *cells))),
+            pieces=_tuples(pieces.astype(np.float32)),
+            levels=_tuples(levels),
+        ),
         head_error=missed,
         level_error=level_error,
     )
     return replace(made, departure=_departure(made, law))
+
+
+def _tuples(rows: npt.NDArray[np.floating[Any]]) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, rows.tolist()))
 
 
 def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
@@ -216,65 +254,74 @@ class _Column:
         return np.transpose([self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())])
 
 
-def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float) -> float:
-    """The hydrostatic pressure over the fill ratio. Returns: its largest error, Pa."""
-    # Every knot of the law's table is a sample, so that a table with few knots is met exactly.
-    pieces = law.levels.knots.size - 1
-    x = np.linspace(0.0, law.max_fill_ratio, max(1, round(_SAMPLES / pieces)) * pieces + 1)
+def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -> float:
+    """The hydrostatic pressure over the fill ratio. Args: `most`: pieces. Returns: its largest error, Pa."""
+    x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
-    level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    value, allowed = law.hydrostatic_pressure(x), np.full_like(x, _OF_LEVELS * slowest)
+    level = _Column(value=value, allowed=allowed)
     width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
-    while (ends := _ends(x, [level, width])).size > _MOST_LEVELS + 1:
-        level = replace(level, allowed=2 * level.allowed)
-    error = level.largest(x, ends)
-    rows.numbers[0][[point.LEVEL_SCALE, point.LEVEL_CELLS]] = rows.add_cells(x[ends])
+    while (ends := _ends(x, [level, width])).size > most + 1:
+        level, width = (replace(each, allowed=1.5 * each.allowed) for each in (level, width))
+    error = np.zeros_like(x)
+    for first, last in pairwise(ends.tolist()):
+        error[first + (first > 0) : last + 1] = np.max(np.abs(level.errors(x, first, last)))
+    rows.numbers[0][point.LEVEL_SCALE] = rows.add_cells(x[ends], cells=_LEVEL_CELLS)[0]
     widened = replace(width, value=np.hypot(width.value, error))
     rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
-    return error
+    return float(np.max(error))
 
 
 def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
-    x = _rounded(np.linspace(0.0, law.max_fill_ratio, _SAMPLES))
+    cells = _CELLS[0]
+    x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _PER_CELL + 1))
+    # The last piece holds the largest fill, whichever way that is rounded.
+    x[-1] = np.nextafter(np.float32(law.max_fill_ratio), np.float32(1.0))
     columns = []
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
         allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
         columns.append(_Column(value=value, allowed=allowed, degree=2))
     columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
-    rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends])
+    rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends], cells=cells)
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
 def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float) -> float:
     """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
-    slowest, fastest = roots_of(table, VELOCITIES)
     root = law.density**0.125
-    x = _rounded(root * np.geomspace(slowest, fastest, _SAMPLES))
-    s = np.clip(x / root, slowest, fastest)
-    value = table.quintic(s) / law.density**0.5
-    ratio = _Column(value=value, allowed=_OF_HEADS * value)
-    loss = _half_width(table.straight(s, LOSS) ** 2, slack * _OF_WIDTHS)
-    beside = _shares(table, s, slack) if way == point.SIPHON else []
-    ends = _ends(x, [ratio, loss, *beside])
-    more = (*law.path.clearing_velocities, *carried_by(law.path)) if way else (ends.size - 1,)
-    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more)
+    slowest, fastest = roots_of(table, VELOCITIES)
+    for cells in _CELLS:
+        x = _rounded(np.linspace(root * slowest, root * fastest, cells * _PER_CELL + 1))
+        s = np.clip(x / root, slowest, fastest)
+        value = table.quintic(s) / law.density**0.5
+        ratio = _Column(value=value, allowed=_OF_HEADS * value)
+        squared = table.straight(s, LOSS) ** 2
+        beside = _shares(table, s, slack) if way == point.SIPHON else []
+        ends = _ends(x, [ratio, _half_width(squared, slack * _OF_WIDTHS), *beside])
+        missed = ratio.largest(x, ends, of=value)
+        if missed <= _OF_HEADS:
+            break
+    # The error of tabulation is part of the half-width, whatever is known of the loss.
+    error = _AT_CREST * missed + law.heads.interpolation_error
+    exponent = 0.5 + np.gradient(np.log(value), np.log(x)) / 8
+    loss = _half_width(squared + (error / exponent) ** 2, slack * _OF_WIDTHS)
+    more = (ends.size - 1, *law.carrying_pressures(table))
+    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more, cells=cells)
     if beside:
         rows.add(*(each.pieces(x, ends) for each in beside))
-    return ratio.largest(x, ends, of=value)
+    return missed
 
 
 def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[_Column]:
     """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
-    found = [_share(table.cubic(s, at), degree) for at, degree in _SHARES if at < table.count]
-    if found:
-        width = np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)
-        found.insert(1, _half_width(width, slack * _OF_WIDTHS))
-    return found
-
-
-def _share(value: FloatArray, degree: int) -> _Column:
-    return _Column(value=value, allowed=_OF_SHARE * value, degree=degree)
+    if table.count <= SHARE:
+        return []
+    ways = [table.cubic(s, at) for at in (SHARE, min(BACK_SHARE, table.count - 2))]
+    found = [_Column(value=value, allowed=_OF_SHARE * value, degree=2) for value in ways]
+    width = np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)
+    return [*found, _half_width(width, slack * _OF_WIDTHS)]
 
 
 def _half_width(value: FloatArray, of: float) -> _Column:
@@ -283,25 +330,25 @@ def _half_width(value: FloatArray, of: float) -> _Column:
 
 
 def _rounded(x: FloatArray) -> FloatArray:
-    """To `_BITS` binary places of the largest; its ends stay as they are."""
+    """To `_BITS` binary places of the largest."""
     step = 2.0 ** (np.ceil(np.log2(x[-1])) - _BITS)
-    return np.concatenate([x[:1], np.rint(x[1:-1] / step) * step, x[-1:]])
+    return np.asarray(np.rint(x / step) * step)
 
 
 def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:
-    """Samples at which pieces meet, each piece as long as its errors allow, and those at both ends."""
+    """Samples at which pieces meet, each piece as many cells long as its errors allow, and both ends."""
 
     def fits(first: int, last: int) -> bool:
-        inside = slice(first, last + 1)
+        inside = slice(first * _PER_CELL, last * _PER_CELL + 1)
         return all(
-            bool(np.all(np.abs(column.errors(x, first, last)) <= column.allowed[inside]))
+            bool(np.all(np.abs(column.errors(x, inside.start, inside.stop - 1)) <= column.allowed[inside]))
             for column in columns
         )
 
-    ends = [0]
-    while ends[-1] < x.size - 1:
-        ends.append(_furthest(partial(fits, ends[-1]), ends[-1] + 1, x.size - 1))
-    return np.array(ends)
+    cells, last = [0], (x.size - 1) // _PER_CELL
+    while cells[-1] < last:
+        cells.append(_furthest(partial(fits, cells[-1]), cells[-1] + 1, last))
+    return np.array(cells) * _PER_CELL
 
 
 def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:

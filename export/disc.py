@@ -1,10 +1,10 @@
 """The disc in time: fills and gas of every pair of chambers, in + - * / sqrt and comparisons alone.
 
 Liquid moves as the law says (`point`), without mass of its own; gas fills and vents at once, or through the
-scene's valve and line.  `c` and `p` are the law with the disc behind its numbers, `w` the disc's state with
-its inputs and outputs; the names below are places in them.  A step is cut where a valve moves and where a
-driven chamber comes to its residual fill, and then into parts of at most c[LONGEST], each of the classical
-Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and names these are.
+scene's valve and line.  `c`, `k`, `p` and `q` are the law with the disc behind its numbers, `w` the disc's
+state with its inputs and outputs; the names below are places in them.  A step is cut where a valve moves and
+where a driven chamber comes to its residual fill, and then into parts of at most c[LONGEST], each of the
+classical Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and names these are.
 """
 
 from math import sqrt
@@ -20,18 +20,19 @@ from ringbalance.reduced_model.pieces.point import (
     PRIMED,
     PRIMED_AFTER,
     REGIME,
-    REVERSE,
     UP_GAS,
     VELOCITY,
+    Cells,
     Law,
+    Levels,
     Pieces,
     Query,
     larger,
-    set_answer,
     set_levels,
     smaller,
     within,
 )
+from ringbalance.reduced_model.pieces.query import set_answer
 
 # fmt: off
 # Behind the place in c[BLOCK]; of each pair the direction of its positive chamber.
@@ -91,21 +92,20 @@ def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: flo
     w[RATES + CONTENT + side] = flow / warmth
 
 
-def set_tube(c: Law, p: Pieces, w: Query, at: int) -> None:
+def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Velocity out of a pair's positive chamber, by the law."""
-    set_levels(c, p, w, within(c, w[at + X]), within(c, c[int(c[BLOCK]) + TOTAL] - w[at + X]))
+    set_levels(c, k, q, w, within(c, w[at + X]), within(c, c[int(c[BLOCK]) + TOTAL] - w[at + X]))
     w[UP_GAS] = c[GAS_FACTOR] * (w[at + GAS] - c[AMBIENT])
     w[DOWN_GAS] = c[GAS_FACTOR] * (w[at + GAS + 1] - c[AMBIENT])
     w[PRIMED] = w[at + IS_PRIMED]
-    set_answer(c, p, w, False)
-    if w[REGIME] == REVERSE:
+    if set_answer(c, k, p, w, False):
         w[VELOCITY] = -w[VELOCITY]
 
 
-def set_rates(c: Law, p: Pieces, w: Query, at: int) -> None:
+def set_rates(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Of a pair's fill, 1/s, and of its gases."""
     d = int(c[BLOCK])
-    set_tube(c, p, w, at)
+    set_tube(c, k, p, q, w, at)
     x = w[at + X]
     total = c[d + TOTAL]
     rate = -c[d + PER_SECOND] * w[VELOCITY]
@@ -128,20 +128,20 @@ def take(w: Query, at: int, weight: float, time: float) -> None:
         i = i + 1
 
 
-def move(c: Law, p: Pieces, w: Query, at: int, time: float) -> None:
+def move(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: float) -> None:
     """One part of a step of a pair."""
     i = 0
     while i < STATES:
         w[BEFORE + i] = w[at + i]
         w[SUM + i] = 0.0
         i = i + 1
-    set_rates(c, p, w, at)
+    set_rates(c, k, p, q, w, at)
     take(w, at, 1.0, time / 2.0)
-    set_rates(c, p, w, at)
+    set_rates(c, k, p, q, w, at)
     take(w, at, 2.0, time / 2.0)
-    set_rates(c, p, w, at)
+    set_rates(c, k, p, q, w, at)
     take(w, at, 2.0, time)
-    set_rates(c, p, w, at)
+    set_rates(c, k, p, q, w, at)
     take(w, at, 1.0, time)
     i = 0
     while i < STATES:
@@ -168,7 +168,7 @@ def command(c: Law, w: Query, at: int) -> None:
         side = side + 1
 
 
-def settle(c: Law, p: Pieces, w: Query, at: int) -> None:
+def settle(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Before a part: valves close at the residual fill, gas may fill at once, the tube may be primed."""
     d = int(c[BLOCK])
     side = 0
@@ -185,7 +185,7 @@ def settle(c: Law, p: Pieces, w: Query, at: int) -> None:
                 w[at + GAS + side] = c[d + SUPPLY]
         fill = c[d + TOTAL] - w[at + X]
         side = side + 1
-    set_tube(c, p, w, at)
+    set_tube(c, k, p, q, w, at)
     if w[PRIMED_AFTER] != 0.0:
         w[at + IS_PRIMED] = 1.0
     elif w[REGIME] == BLOCKED:
@@ -229,7 +229,7 @@ def tick(w: Query, at: int, time: float) -> None:
         side = side + 1
 
 
-def show(c: Law, p: Pieces, w: Query) -> None:
+def show(c: Law, k: Cells, p: Pieces, w: Query) -> None:
     """Fills, the disc's moment, kg m, and the vibration with it, m."""
     d = int(c[BLOCK])
     w[MOMENT_X] = 0.0
@@ -240,7 +240,7 @@ def show(c: Law, p: Pieces, w: Query) -> None:
         axis = d + DIRECTIONS + 2 * pair
         w[at + LIQUID] = w[at + X]
         w[at + LIQUID + 1] = c[d + TOTAL] - w[at + X]
-        along = moment(c, p, w[at + LIQUID]) - moment(c, p, w[at + LIQUID + 1])
+        along = moment(c, k, p, w[at + LIQUID]) - moment(c, k, p, w[at + LIQUID + 1])
         w[MOMENT_X] = w[MOMENT_X] + along * c[axis]
         w[MOMENT_Y] = w[MOMENT_Y] + along * c[axis + 1]
         pair = pair + 1
@@ -250,23 +250,23 @@ def show(c: Law, p: Pieces, w: Query) -> None:
     w[VIBRATION_Y] = c[d + START_Y] + y
 
 
-def pass_pair(c: Law, p: Pieces, w: Query, at: int, time: float) -> None:
+def pass_pair(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: float) -> None:
     """Let a time pass, s, for one pair."""
     left = time
     while left > 0.0:
-        settle(c, p, w, at)
+        settle(c, k, p, q, w, at)
         part = length(c, w, at, left)
-        move(c, p, w, at, part)
+        move(c, k, p, q, w, at, part)
         tick(w, at, part)
         left = left - part
 
 
-def step(c: Law, p: Pieces, w: Query, time: float) -> None:
+def step(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
     """Let a time pass, s, with each valve open from its beginning on for as long as is asked."""
     pair = 0
     while pair < int(c[int(c[BLOCK]) + PAIRS]):
         at = FIRST_PAIR + PER_PAIR * pair
         command(c, w, at)
-        pass_pair(c, p, w, at, time)
+        pass_pair(c, k, p, q, w, at, time)
         pair = pair + 1
-    show(c, p, w)
+    show(c, k, p, w)

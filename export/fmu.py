@@ -159,7 +159,8 @@ def _xml(root: ET.Element) -> bytes:
 
 def guid_of(block: Block) -> str:
     """One for each block: other numbers make another unit."""
-    text = ",".join(number_text(value) for value in (*block.constants, *chain(*block.pieces), *block.start))
+    tables = () if block.tables is None else (block.tables.cells, *block.tables.pieces, *block.tables.levels)
+    text = ",".join(number_text(value) for value in (*block.constants, *chain(*tables), *block.start))
     return hashlib.sha256(f"{block.kind},{text}".encode()).hexdigest()[:32]
 
 

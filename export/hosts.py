@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import keyword
 import re
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from string import Template
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from ringbalance.export.blocks import RANGE, Block, Variable
 from ringbalance.export.translate import (
@@ -18,7 +21,6 @@ from ringbalance.export.translate import (
     st_functions,
 )
 
-_PER_LINE: Final = 4
 _OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
 """Functions of the law for one chamber, which a caller may ask for by themselves."""
 _ST_TYPES: Final = {"Real": "LREAL", "Integer": "DINT", "Boolean": "BOOL"}
@@ -50,7 +52,7 @@ def block_c_files(block: Block, name: str) -> dict[str, str]:
         f"    {upper}_{each.name.upper()} = {each.place}{',' * (each is not last)} /* {each.explained} */"
         for each in block.variables
     ]
-    run = f"{block.steps}({_rows(block)}, s->w{', time' if block.timed else ''});"
+    run = f"{block.steps}({_C_TABLES if block.tables else 'CONSTANTS'}, s->w{', time' * block.timed});"
     source = filled("block_c", block, name, head=_head(block, name), run=run)
     header = filled("block_h", block, name, places="\n".join(places))
     return {f"{name}.h": header, f"{name}.c": source}
@@ -63,10 +65,11 @@ def _head(block: Block, name: str, entries: tuple[str, ...] = ()) -> str:
 
 def st_files(block: Block, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
-    ends = {"Law": f"0..{len(block.constants) - 1}", "Query": f"0..{len(block.start) - 1}"}
-    sizes = {**ends, "Pieces": f"0..{len(block.pieces) - 1}, 0..{PER_PIECE - 1}"}
+    sizes = {"Law": len(block.constants), "Query": len(block.start)}
+    arrays = {kind: f"[0..{count - 1}] OF LREAL" for kind, count in sizes.items()}
+    arrays |= {kind: _st_array(kind, rows) for kind, rows in _tables_of(block)}
     entries = ("answer", *_OF_CHAMBER) if block.kind == "law" else ()
-    functions = st_functions(block.source(entries), prefix=name, sizes=sizes)
+    functions = st_functions(block.source(entries), prefix=name, sizes=arrays)
     if block.kind == "law":
         return {f"{name}.st": filled("st", block, name, functions=functions)}
     inputs, outputs = _sides(block)
@@ -79,13 +82,9 @@ def st_files(block: Block, name: str) -> dict[str, str]:
         outputs="\n".join(map(_st_declared, outputs)),
         set="\n".join(map(_st_set, inputs)),
         get="\n".join(map(_st_get, outputs)),
-        run=f"{block.steps}({'c, p' if block.pieces else 'c'}, w, elapsed)",
+        run=f"{block.steps}({'c, k, p, q' if block.tables else 'c'}, w, elapsed)",
     )
     return {f"{name}.st": text}
-
-
-def _rows(block: Block) -> str:
-    return "CONSTANTS, PIECES" if block.pieces else "CONSTANTS"
 
 
 def _sides(block: Block) -> tuple[list[Variable], list[Variable]]:
@@ -120,31 +119,58 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     inputs, outputs = (
         "\n".join(f'    "{v.name}": {v.place},  # {v.explained}' for v in side) for side in _sides(block)
     )
-    run = f"{block.steps}({_rows(block)}, self.w, time)"
+    run = f"{block.steps}({_C_TABLES if block.tables else 'CONSTANTS'}, self.w, time)"
     text = filled(
         "block_python", block, name, source=source, inputs=inputs, outputs=outputs, run=run, kind=block.kind
     )
     return {f"{name}.py": text}
 
 
-_DECLARED: Final = {
-    "c": ("static const double PIECES[{count}][{width}] = {{\n{rows}\n}};\n", "    {{{}}}"),
-    "st": ("    p : ARRAY[0..{last}, 0..{end}] OF LREAL := [\n{rows}\n    ];\n", "    {}"),
-    "python": ("PIECES = (\n{rows},\n)\n", "    ({})"),
-}
-"""How a language declares rows of polynomials, and one of them."""
-
-
-def _pieces(block: Block, language: str) -> str:
-    whole, one = _DECLARED[language]
-    rows = ",\n".join(one.format(", ".join(map(_TEXT[language], row))) for row in block.pieces)
-    count = len(block.pieces)
-    sizes = {"count": count, "last": count - 1, "width": PER_PIECE, "end": PER_PIECE - 1}
-    return whole.format(rows=rows, **sizes) if rows else ""
-
-
+_C_TABLES: Final = "CONSTANTS, CELL_ROWS, PIECES, LEVELS"
 _TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
 """How a language writes a number; C's hexadecimal ones are short and leave nothing to round."""
+_NUMBERS: Final = {
+    "Cells": {"c": "unsigned char", "st": "USINT", "st_name": "k"},
+    "Pieces": {"c": "float", "st": "REAL", "st_name": "p"},
+    "Levels": {"c": "double", "st": "LREAL", "st_name": "q"},
+}
+"""What the tables of a law are made of, by their types in `translate`."""
+_ROW: Final = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}
+
+
+def _tables_of(block: Block) -> Iterator[tuple[str, Sequence[Any]]]:
+    """Tables of a block's law with their types; none without a law."""
+    return zip(_NUMBERS, block.tables or (), strict=False)
+
+
+def _st_array(kind: str, rows: Sequence[Any]) -> str:
+    """What structured text declares a table as, behind ARRAY."""
+    width = "" if kind == "Cells" else f", 0..{PER_PIECE - 1}"
+    return f"[0..{len(rows) - 1}{width}] OF {_NUMBERS[kind]['st']}"
+
+
+def _declared(block: Block, language: str) -> Iterator[str]:
+    """Declarations of all tables."""
+    for kind, rows in _tables_of(block):
+        if kind == "Cells":
+            text, width = _lines([str(row) for row in rows], per_line=20), ""
+        else:
+            written = _single if (kind, language) == ("Pieces", "st") else _TEXT[language]
+            text = ",\n".join(_ROW[language].format(", ".join(map(written, row))) for row in rows)
+            width = f"[{PER_PIECE}]"
+        name = "CELL_ROWS" if kind == "Cells" else kind.upper()
+        if language == "c":
+            yield f"static const {_NUMBERS[kind]['c']} {name}[{len(rows)}]{width} = {{\n{text}\n}};\n"
+        elif language == "st":
+            name = _NUMBERS[kind]["st_name"]
+            yield f"    {name} : ARRAY{_st_array(kind, rows)} := [\n{text}\n    ];\n"
+        else:
+            yield f"{name} = (\n{text},\n)\n"
+
+
+def _single(value: float) -> str:
+    """The shortest decimal that is this number in single precision."""
+    return number_text(float(str(np.float32(value))))
 
 
 def template(name: str) -> str:
@@ -155,7 +181,8 @@ def template(name: str) -> str:
 def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     """A template with a block in it. Args: `parts`: further words of that template."""
     text = template(frame)
-    language = next((each for each in _DECLARED if frame.endswith(each)), "c")
+    language = next((each for each in ("st", "python") if frame.endswith(each)), "c")
+    written = _TEXT[language]
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
         title=f"{block.title}, made by ringbalance from {plain_name(block.scene)}.",
@@ -168,9 +195,9 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
         last=len(block.constants) - 1,
         row=len(block.start),
         last_of_row=len(block.start) - 1,
-        constants=_lines(block.constants, language),
-        pieces=_pieces(block, language),
-        start=_lines(block.start, language),
+        constants=_lines([written(value) for value in block.constants]),
+        tables="".join(_declared(block, language)),
+        start=_lines([written(value) for value in block.start]),
         **parts,
     )
 
@@ -180,7 +207,6 @@ def plain_name(scene: str) -> str:
     return re.sub(r"[^\w./ -]", "_", scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 
-def _lines(values: tuple[float, ...], language: str) -> str:
-    texts = [_TEXT[language](value) for value in values]
-    rows = [texts[at : at + _PER_LINE] for at in range(0, len(texts), _PER_LINE)]
+def _lines(texts: Sequence[str], per_line: int = 4) -> str:
+    rows = [texts[at : at + per_line] for at in range(0, len(texts), per_line)]
     return ",\n".join("    " + ", ".join(row) for row in rows)

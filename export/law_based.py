@@ -1,9 +1,10 @@
 """The law-based controller in time, in + - * / sqrt and comparisons alone.
 
-`c` and `p` are law and disc as the controller assumes them (`disc`, gas at once), with its settings behind;
-`w` is the disc's row, which follows the liquid from valve-open time to valve-open time, with the controller's
-memory behind its pairs.  It samples as `controller` does.  Source: `controller.algorithms.law_based`, whose
-`LawBased` this is; a valve-open time is t = (V/S) integral dx/u(x), by Gauss's rule on equal parts of x.
+`c`, `k`, `p` and `q` are law and disc as the controller assumes them (`disc`, gas at once), with its settings
+behind; `w` is the disc's row, which follows the liquid from valve-open time to valve-open time, with the
+controller's memory behind its pairs.  It samples as `controller` does.  Source: `LawBased` of
+`controller.algorithms.law_based`; a valve-open time is t = (V/S) integral dx/u(x), by Gauss's rule on equal
+parts of x.
 """
 
 from math import sqrt
@@ -56,18 +57,19 @@ from ringbalance.reduced_model.pieces.point import (
     PRIMED,
     PRIMED_AFTER,
     REGIME,
-    REVERSE,
     UP_GAS,
     VELOCITY,
+    Cells,
     Law,
+    Levels,
     Pieces,
     Query,
     larger,
-    set_answer,
     set_levels,
     smaller,
     within,
 )
+from ringbalance.reduced_model.pieces.query import set_answer
 
 # fmt: off
 # Behind the disc's numbers; then the offset of each chamber.
@@ -104,12 +106,12 @@ def chamber_of(c: Law, chamber: int) -> int:
     return beside(c) + FIRST_CHAMBER + PER_CHAMBER * chamber
 
 
-def along(c: Law, p: Pieces, fill: float) -> float:
+def along(c: Law, k: Cells, p: Pieces, fill: float) -> float:
     """Moment of a pair by the fill of its positive chamber, kg m."""
-    return moment(c, p, fill) - moment(c, p, c[int(c[BLOCK]) + TOTAL] - fill)
+    return moment(c, k, p, fill) - moment(c, k, p, c[int(c[BLOCK]) + TOTAL] - fill)
 
 
-def set_moment(c: Law, p: Pieces, w: Query) -> None:
+def set_moment(c: Law, k: Cells, p: Pieces, w: Query) -> None:
     """The disc's moment, kg m, with the liquid where it is followed to."""
     d = int(c[BLOCK])
     r = memory(c)
@@ -117,29 +119,29 @@ def set_moment(c: Law, p: Pieces, w: Query) -> None:
     w[r + NOW_Y] = 0.0
     pair = 0
     while pair < int(c[d + PAIRS]):
-        value = along(c, p, w[FIRST_PAIR + PER_PAIR * pair + X])
+        value = along(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
         w[r + NOW_X] = w[r + NOW_X] + value * w[change_of(r, pair) + AXIS_X]
         w[r + NOW_Y] = w[r + NOW_Y] + value * w[change_of(r, pair) + AXIS_Y]
         pair = pair + 1
 
 
-def fill_for(c: Law, p: Pieces, wanted: float, lowest: float, highest: float) -> float:
+def fill_for(c: Law, k: Cells, p: Pieces, wanted: float, lowest: float, highest: float) -> float:
     """Fill of a pair's positive chamber at a moment, kg m; straight on beyond the bounds."""
-    low = along(c, p, lowest)
-    high = along(c, p, highest)
+    low = along(c, k, p, lowest)
+    high = along(c, k, p, highest)
     if highest <= lowest:
         return lowest
     little = END_STEP * (highest - lowest)
     if wanted <= low:
-        return lowest + (wanted - low) / (along(c, p, lowest + little) - low) * little
+        return lowest + (wanted - low) / (along(c, k, p, lowest + little) - low) * little
     if wanted >= high:
-        return highest + (wanted - high) / (high - along(c, p, highest - little)) * little
+        return highest + (wanted - high) / (high - along(c, k, p, highest - little)) * little
     a = lowest
     b = highest
     tried = 0
     while tried < HALVINGS:
         middle = (a + b) / 2.0
-        if along(c, p, middle) >= wanted:
+        if along(c, k, p, middle) >= wanted:
             b = middle
         else:
             a = middle
@@ -147,25 +149,27 @@ def fill_for(c: Law, p: Pieces, wanted: float, lowest: float, highest: float) ->
     return b
 
 
-def falling(c: Law, p: Pieces, w: Query, fill: float) -> float:
+def falling(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float) -> float:
     """How fast the fill of a driven chamber falls, 1/s, after the tube was as the last query left it."""
     d = int(c[BLOCK])
     r = beside(c)
-    set_levels(c, p, w, within(c, fill), within(c, c[d + TOTAL] - fill))
+    set_levels(c, k, q, w, within(c, fill), within(c, c[d + TOTAL] - fill))
     w[UP_GAS] = c[GAS_FACTOR] * (c[d + SUPPLY] - c[AMBIENT])
     w[DOWN_GAS] = 0.0
     w[PRIMED] = w[r + FLOW_PRIMED]
-    set_answer(c, p, w, False)
+    back = set_answer(c, k, p, w, False)
     if w[PRIMED_AFTER] != 0.0:
         w[r + FLOW_PRIMED] = 1.0
     elif w[REGIME] == BLOCKED:
         w[r + FLOW_PRIMED] = 0.0
-    if w[REGIME] == REVERSE:
+    if back:
         return -c[d + PER_SECOND] * w[VELOCITY]
     return c[d + PER_SECOND] * w[VELOCITY]
 
 
-def flow_time(c: Law, p: Pieces, w: Query, fill: float, target: float, longest: float) -> float:
+def flow_time(
+    c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float, target: float, longest: float
+) -> float:
     """Valve-open time, s, in which a driven chamber comes from a fill to a lower one, or the flow stalls."""
     d = int(c[BLOCK])
     r = beside(c)
@@ -177,8 +181,8 @@ def flow_time(c: Law, p: Pieces, w: Query, fill: float, target: float, longest: 
     while x > end and part > least and time < longest:
         primed = w[r + FLOW_PRIMED]
         dx = smaller(part, x - end)
-        one = falling(c, p, w, x - dx * (0.5 - GAUSS))
-        two = falling(c, p, w, x - dx * (0.5 + GAUSS))
+        one = falling(c, k, p, q, w, x - dx * (0.5 - GAUSS))
+        two = falling(c, k, p, q, w, x - dx * (0.5 + GAUSS))
         if one > 0.0 and two > 0.0:
             time = time + dx * (0.5 / one + 0.5 / two)
             x = x - dx
@@ -186,11 +190,11 @@ def flow_time(c: Law, p: Pieces, w: Query, fill: float, target: float, longest: 
             part = part / 2.0
             w[r + FLOW_PRIMED] = primed
     if x <= end and target < end:
-        time = time + (end - target) / larger(falling(c, p, w, end), SLOWEST_FALL)
+        time = time + (end - target) / larger(falling(c, k, p, q, w, end), SLOWEST_FALL)
     return smaller(time, longest)
 
 
-def gas_time(c: Law, p: Pieces, w: Query, pair: int, wanted: float) -> float:
+def gas_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, pair: int, wanted: float) -> float:
     """Valve-open time of the chamber that has to give liquid, s; one period where nothing flows."""
     e = settings(c)
     at = FIRST_PAIR + PER_PAIR * pair
@@ -201,12 +205,12 @@ def gas_time(c: Law, p: Pieces, w: Query, pair: int, wanted: float) -> float:
         fill = total - fill
         target = total - wanted
     w[beside(c) + FLOW_PRIMED] = w[at + IS_PRIMED]
-    first = falling(c, p, w, fill)
+    first = falling(c, k, p, q, w, fill)
     if first == 0.0:
         return c[e + PERIOD]
     if first < 0.0:
         return c[e + LONGEST_TIME]
-    return flow_time(c, p, w, fill, target, c[e + LONGEST_TIME])
+    return flow_time(c, k, p, q, w, fill, target, c[e + LONGEST_TIME])
 
 
 def open_valve(c: Law, w: Query, pair: int, side: int, time: float) -> None:
@@ -224,7 +228,7 @@ def open_valve(c: Law, w: Query, pair: int, side: int, time: float) -> None:
         w[beside(c) + OPENED] = 1.0
 
 
-def aim(c: Law, p: Pieces, w: Query) -> None:
+def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     """Command the valve-open times that take the residual away."""
     d = int(c[BLOCK])
     e = settings(c)
@@ -235,9 +239,9 @@ def aim(c: Law, p: Pieces, w: Query) -> None:
     pair = 0
     while pair < half:
         at = change_of(r, pair)
-        now = along(c, p, w[FIRST_PAIR + PER_PAIR * pair + X])
-        w[at + LOWEST_CHANGE] = along(c, p, lowest) - now
-        w[at + HIGHEST_CHANGE] = along(c, p, highest) - now
+        now = along(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
+        w[at + LOWEST_CHANGE] = along(c, k, p, lowest) - now
+        w[at + HIGHEST_CHANGE] = along(c, k, p, highest) - now
         pair = pair + 1
     kx = w[r + LEARNT_X]
     ky = w[r + LEARNT_Y]
@@ -250,12 +254,12 @@ def aim(c: Law, p: Pieces, w: Query) -> None:
         change = w[change_of(r, pair) + CHANGE]
         if change != 0.0:
             fill = w[FIRST_PAIR + PER_PAIR * pair + X]
-            wanted = fill_for(c, p, along(c, p, fill) + change, lowest, highest)
+            wanted = fill_for(c, k, p, along(c, k, p, fill) + change, lowest, highest)
             side = 0
             if wanted >= fill:
                 side = 1
             if wanted != fill:
-                open_valve(c, w, pair, side, gas_time(c, p, w, pair, wanted))
+                open_valve(c, w, pair, side, gas_time(c, k, p, q, w, pair, wanted))
         pair = pair + 1
 
 
@@ -273,7 +277,7 @@ def shut(c: Law, w: Query) -> None:
         pair = pair + 1
 
 
-def sample(c: Law, p: Pieces, w: Query) -> None:
+def sample(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     """React to the vibration as it is; one that is not a number changes nothing."""
     e = settings(c)
     r = memory(c)
@@ -283,7 +287,7 @@ def sample(c: Law, p: Pieces, w: Query) -> None:
     if not amplitude <= GREATEST:
         return
     shut(c, w)
-    set_moment(c, p, w)
+    set_moment(c, k, p, w)
     if w[b + OPENED] != 0.0:
         learn(w, r, c[e + AMPLITUDE_SQUARE], c[e + PHASE_SQUARE], c[e + LAW_SQUARE], c[e + ASSUMED])
     w[b + OPENED] = 0.0
@@ -294,7 +298,7 @@ def sample(c: Law, p: Pieces, w: Query) -> None:
     if amplitude <= c[e + LIMIT]:
         w[b + RESTS] = 1.0
         return
-    aim(c, p, w)
+    aim(c, k, p, q, w)
 
 
 def set_wait(c: Law, w: Query) -> None:
@@ -307,14 +311,14 @@ def set_wait(c: Law, w: Query) -> None:
     w[beside(c) + WAIT] = longest + c[settings(c) + PERIOD]
 
 
-def pass_time(c: Law, p: Pieces, w: Query, time: float) -> None:
+def pass_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
     """Liquid moves, valves stay open for less, and those of chambers with no more liquid no longer."""
     half = int(c[int(c[BLOCK]) + PAIRS])
     r = beside(c)
     w[r + WAIT] = w[r + WAIT] - time
     pair = 0
     while pair < half:
-        pass_pair(c, p, w, FIRST_PAIR + PER_PAIR * pair, time)
+        pass_pair(c, k, p, q, w, FIRST_PAIR + PER_PAIR * pair, time)
         pair = pair + 1
     cut = False
     chamber = 0
@@ -331,12 +335,12 @@ def pass_time(c: Law, p: Pieces, w: Query, time: float) -> None:
         set_wait(c, w)
 
 
-def control(c: Law, p: Pieces, w: Query, time: float) -> None:
+def control(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
     """Let a time pass, s, and sample the vibration if it is time to."""
-    pass_time(c, p, w, time)
+    pass_time(c, k, p, q, w, time)
     r = beside(c)
     if w[r + WAIT] > INSTANT:
         return
     w[r + SAMPLES] = w[r + SAMPLES] + 1.0
-    sample(c, p, w)
+    sample(c, k, p, q, w)
     set_wait(c, w)

@@ -14,14 +14,10 @@ from types import ModuleType
 from typing import Final
 
 NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
-LAW, PIECES, QUERY = "Law", "Pieces", "Query"
-"""Types of the subset, as Python's annotations name them; numbers and rows of them that are only read, and
-numbers that change."""
-PER_PIECE: Final = 9
-"""Numbers in a row of `Pieces`."""
+LAW, CELLS, PIECES, LEVELS, QUERY = "Law", "Cells", "Pieces", "Levels", "Query"
+"""Types of the subset; all but the last are only read, cells are bytes, pieces of single precision."""
+PER_PIECE: Final = 9  # numbers in a row of `Pieces` or `Levels`
 _BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
-
-
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
 
 
@@ -170,8 +166,8 @@ class Language:
     close_if: str
     open_while: str
     close_while: str
-    in_row: str
-    """Format of a number in a row of rows, by row and column."""
+    element: Mapping[str, str]
+    """Format of what stands in rows, by their type, from their name and places."""
 
 
 C99: Final = Language(
@@ -181,7 +177,9 @@ C99: Final = Language(
         TRUTH: "int {}",
         NOTHING: "void {}",
         LAW: "const double *{}",
-        PIECES: f"const double (*{{}})[{PER_PIECE}]",
+        CELLS: "const unsigned char *{}",
+        PIECES: f"const float (*{{}})[{PER_PIECE}]",
+        LEVELS: f"const double (*{{}})[{PER_PIECE}]",
         QUERY: "double *{}",
     },
     operators={
@@ -208,7 +206,13 @@ C99: Final = Language(
     close_if="}",
     open_while="while ({}) {{",
     close_while="}",
-    in_row="{}[{}][{}]",
+    element={
+        LAW: "{}[{}]",
+        QUERY: "{}[{}]",
+        CELLS: "{}[{}]",
+        PIECES: "(double){}[{}][{}]",
+        LEVELS: "{}[{}][{}]",
+    },
 )
 
 
@@ -240,7 +244,13 @@ def structured_text(prefix: str) -> Language:
         close_if="END_IF;",
         open_while="WHILE {} DO",
         close_while="END_WHILE;",
-        in_row="{}[{}, {}]",
+        element={
+            LAW: "{}[{}]",
+            QUERY: "{}[{}]",
+            CELLS: "USINT_TO_DINT({}[{}])",
+            PIECES: "REAL_TO_LREAL({}[{}, {}])",
+            LEVELS: "{}[{}, {}]",
+        },
     )
 
 
@@ -333,12 +343,13 @@ class Writer:
                 return self.language.variable.format(name), self.types[name]
             case ast.Subscript(value=ast.Subscript(value=rows, slice=row), slice=place):
                 name, kind = self._expression(rows)
-                if kind != PIECES:
-                    raise self._refused(node)
-                at = (self._typed(row, WHOLE), self._typed(place, WHOLE))
-                return self.language.in_row.format(name, *at), NUMBER
-            case ast.Subscript(value=row, slice=place) if self._expression(row)[1] in (LAW, QUERY):
-                return f"{self._expression(row)[0]}[{self._typed(place, WHOLE)}]", NUMBER
+                if kind in (PIECES, LEVELS):
+                    at = (self._typed(row, WHOLE), self._typed(place, WHOLE))
+                    return self.language.element[kind].format(name, *at), NUMBER
+            case ast.Subscript(value=row, slice=place) if self._expression(row)[1] in (LAW, CELLS, QUERY):
+                name, kind = self._expression(row)
+                element = self.language.element[kind].format(name, self._typed(place, WHOLE))
+                return element, WHOLE if kind == CELLS else NUMBER
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 return self._call(node, name, arguments)
         return self._operation(node)
@@ -386,7 +397,9 @@ class Writer:
             root = "sqrt({})" if self.language is C99 else "SQRT({})"
             return root.format(self._typed(arguments[0], NUMBER)), NUMBER
         if name == "int":
-            return self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
+            text, kind = self._expression(arguments[0])
+            whole = kind == WHOLE
+            return text if whole else self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
         if name == "float":
             return self.language.to_number.format(self._typed(arguments[0], WHOLE)), NUMBER
         if name not in self.source.functions:
@@ -446,7 +459,7 @@ def c_functions(source: Source) -> str:
 def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, str]) -> str:
     """All functions of a source in structured text.
 
-    Args: `prefix`: of their names. `sizes`: first and last place of each row, by its type.
+    Args: `prefix`: of their names. `sizes`: what each row is an array of, by its type.
     """
     language = structured_text(prefix)
     parts = []
@@ -461,7 +474,7 @@ def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, str]) -> st
             for name, kind in function.arguments.items()
             if kind not in sizes
         ]
-        in_out = [f"v_{name} : ARRAY[{sizes[kind]}] OF LREAL;" for name, kind in rows.items()]
+        in_out = [f"v_{name} : ARRAY{sizes[kind]};" for name, kind in rows.items()]
         inner = [
             f"{language.types[kind].format(f'v_{name}')};" for name, kind in writer.local_variables().items()
         ]

@@ -24,9 +24,17 @@ from ringbalance.reduced_model.law.flow_law import (
     save_record,
 )
 from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.query import answer, turn
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of, velocities_of
+from ringbalance.reduced_model.tube.heads import (
+    BACK_SHARE,
+    SHARE,
+    SHARE_WIDTH,
+    TubeHeads,
+    roots_of,
+    velocities_of,
+)
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ringbalance.scene.registry import registered
@@ -136,21 +144,32 @@ class CalibratedLaw:
         (siphon, *ways), density = self.heads.tables, self.density
         rows = LawRows.of(len(self.heads.tables))
         rows.add_levels(self.levels)
-        rows.add_way(point.SIPHON, siphon, density, siphon.knots.size - 1)
+        error, pieces = self.heads.interpolation_error, siphon.knots.size - 1
+        rows.add_way(
+            point.SIPHON, siphon, density, error=error, more=(pieces, *self.carrying_pressures(siphon))
+        )
         if ways:
             rows.add_shares(siphon, density)
         for at, way in enumerate(ways, start=point.THERE):
-            rows.add_way(at, way, density, *self.path.clearing_velocities, *carried_by(self.path))
+            rows.add_way(at, way, density, error=error, more=(0.0, *self.carrying_pressures(way)))
         return rows.arrays(self.scalars())
+
+    def carrying_pressures(self, table: Table) -> FloatArray:
+        """Under which a flow carries half of the gas over the crest out, none and all, Pa."""
+        low, high = CLEARING
+        velocities = self.path.froude_velocity * np.array([(low + high) / 2, low, high])
+        return self.density * roots_of(table, velocities) ** 8 if self.path.froude_velocity else velocities
 
     def scalars(self) -> dict[int, float]:
         """What is no table, at the places of `point`."""
         path, inputs, heads = self.path, self.inputs, self.heads
         by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
         slowest, fastest = velocities_of(heads.siphon)[[0, -1]]
+        carry, carry_from = _carried_by(path)
         return {
             point.LARGEST_FILL: self.max_fill_ratio,
             point.AMBIENT: self.ambient_pressure,
+            point.LEAST_PRESSURE: -self.ambient_pressure,
             point.GAS_FACTOR: self.gas_factor,
             point.PORT: path.port_pressure,
             point.CREST: path.crest,
@@ -159,22 +178,25 @@ class CalibratedLaw:
             point.VAPOUR: path.vapour_pressure,
             point.RELEASED: path.released,
             point.CAVITY_KNOWN: path.cavity_fitted,
+            point.CLEARING_KNOWN: path.clearing_fitted,
             point.OF_DENSITY: by_density,
             point.OF_BLOWN: by_density + inputs.relative_gas_pressure**2,
             point.OF_SPEED: by_speed,
             point.OF_GAS: inputs.relative_gas_pressure**2,
             point.OF_CREST: inputs.hump_pressure**2 + inputs.vapour_pressure**2,
             point.OF_LIQUID: by_density + by_speed,
-            point.TABULATION: heads.interpolation_error**2,
             point.LOWEST: slowest,
             point.HIGHEST: fastest,
             point.WAY_BACK: float(len(heads.tables) - 1),
+            point.CARRY: carry,
+            point.CARRY_FROM: carry_from,
         }
 
     @cached_property
-    def _lists(self) -> tuple[list[float], list[list[float]]]:
+    def _lists(self) -> tuple[list[float], list[float], list[list[float]]]:
+        """Numbers, cells and pieces."""
         numbers, pieces = self.constants
-        return numbers.tolist(), pieces.tolist()
+        return numbers[: point.PLACES].tolist(), numbers[point.PLACES :].tolist(), pieces.tolist()
 
     def evaluate(
         self,
@@ -231,7 +253,8 @@ class CalibratedLaw:
     def _answer(self, x: Any, y: Any, p: Any, primed: Any) -> list[float]:
         """A query of `point` with its answer."""
         query = [float(x), float(y), float(p), float(primed), *_REST_OF_QUERY]
-        point.answer(*self._lists, query, True)
+        numbers, cells, pieces = self._lists
+        answer(numbers, cells, pieces, pieces, query, True)
         return query
 
     def _answers(self, asked: _Asked, margins: FloatArray = _NO_MARGINS) -> _Answers:
@@ -322,22 +345,24 @@ class CalibratedLaw:
         """`point.set_margin` over a primed tube's cavity in one direction, Pa; both None without a crest."""
         if not self.path.crest:
             return None, None
-        (c, p), w = self._lists, [*fills, gas_pressure, 1.0, *_REST_OF_QUERY]
-        point.set_levels(c, p, w, *fills)
+        (c, k, p), w = self._lists, [*fills, gas_pressure, 1.0, *_REST_OF_QUERY]
+        point.set_levels(c, k, p, w, *fills)
         w[point.UP_GAS] = self.gas_factor * gas_pressure
         if reverse:
-            point.turn(w)
+            turn(w)
         point.set_drive(c, w)
-        point.set_crest(c, w)
+        point.set_crest(c, w, w[point.DOWN_LEVEL] >= c[point.PORT])
+        w[point.UP_SQUARE] = point.up_square(c, w)
         w[point.HOLDS], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
         if w[point.DRIVING] > 0:
-            point.velocity(c, p, w, point.SIPHON, w[point.DRIVING])
-            row = int(w[point.ROW] + p[point.SIPHON][point.SHARES])
-            way = int(c[point.WAY_BACK]) if reverse else point.THERE
-            lost = point.lost_part(p, row, w[point.TO_END], way)
-            off = point.lost_width(p, row, w[point.TO_END])
+            point.find(k, p, w, point.SIPHON, w[point.DRIVING])
+            root = w[point.EIGHTH] / self.density**0.125
+            column = BACK_SHARE if reverse and self.heads.return_hump else SHARE
+            lost = float(self.heads.siphon.cubic(root, column))
+            off = float(self.heads.siphon.straight(root, SHARE_WIDTH))
+            w[point.LOST] = lost * w[point.DRIVING]
         spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
-        point.set_margin(c, w, lost, off, point.known_of(c, w, lost, spread))
+        point.set_margin(c, w, lost, off, point.known_of(w, lost, spread))
         sides = [
             each.cavity_margin(fills=fills, gas_pressure=gas_pressure, reverse=reverse)[0] or 0.0
             for each in self.variants
@@ -349,7 +374,7 @@ class CalibratedLaw:
         return save_record(path=Path(path), record=self)
 
 
-def carried_by(path: TubePath) -> tuple[float, float]:
+def _carried_by(path: TubePath) -> tuple[float, float]:
     """Factor of a velocity, and what is taken from it, for how far it carries gas out from over the crest."""
     low, high = CLEARING
     froude = path.froude_velocity * (high - low)

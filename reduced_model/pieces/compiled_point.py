@@ -8,14 +8,15 @@ from ringbalance.reduced_model.pieces.point import (
     MARGIN,
     MARGIN_SQUARE,
     OPPOSITE_FILL,
+    PLACES,
     PRESSURE,
     PRIMED,
     PRIMED_AFTER,
     REGIME,
     UNCERTAINTY,
     VELOCITY,
-    answer,
 )
+from ringbalance.reduced_model.pieces.query import answer
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place
 
@@ -42,11 +43,12 @@ def answer_each(
         half-widths, shape (2, n), or (2, 0) where they are not asked for.
     """
     fill, opposite, pressure, primed = asked
+    k = c[PLACES:]
     velocity, uncertainty, regime, after = answers
     for i in range(fill.size):
         w[FILL], w[OPPOSITE_FILL], w[PRESSURE] = fill[i], opposite[i], pressure[i]
         w[PRIMED] = 1.0 if primed[i] else 0.0
-        answer(c, p, w, True)
+        answer(c, k, p, p, w, True)
         velocity[i], uncertainty[i] = w[VELOCITY], w[UNCERTAINTY]
         regime[i], after[i] = int(w[REGIME]), w[PRIMED_AFTER] != 0.0
         if margins.shape[1]:

@@ -21,8 +21,8 @@ from ringbalance.reduced_model.pieces.point import (
     END,
     LARGEST_FILL,
     LAST,
-    LEVEL_CELLS,
     LEVEL_SCALE,
+    PLACES,
     SCALE,
     SLOWEST,
     Law,
@@ -61,7 +61,7 @@ def growth(p: Pieces, row: int, t: float) -> float:
 def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
     """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; it goes on straight beyond the fills."""
     x = max(0.0, min(fill, c[LARGEST_FILL]))
-    row = piece(p, c[int(x * c[LEVEL_SCALE] + c[LEVEL_CELLS])], x)
+    row = int(c[PLACES + int(x * c[LEVEL_SCALE])])
     t = x - p[row][END]
     slope = growth(p, row, t)
     return quintic(p, row, t) + (fill - x) * slope, slope
@@ -74,7 +74,7 @@ def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
         return pressure * p[way][CREEP]
     root = sqrt(sqrt(pressure))
     s = min(sqrt(root), p[way][LAST])
-    row = piece(p, c[int(s * p[way][SCALE] + p[way][CELLS])], s)
+    row = piece(p, int(c[PLACES + int(s * p[way][SCALE] + p[way][CELLS])]), s)
     return root * root * quintic(p, row, s - p[row][END])
 
 
@@ -90,8 +90,8 @@ def set_roots(c: Law, p: Pieces, way: int, cells: Filled, roots: Sequence[Filled
             cubic by the values and slopes at both ends of the piece; shape (rows, `WIDTH_OF_ROOT`).
     """
     s = sqrt(sqrt(sqrt(p[way][SLOWEST])))
-    first = int(c[int(s * p[way][SCALE] + p[way][CELLS])])
-    last = int(c[int(p[way][LAST] * p[way][SCALE] + p[way][CELLS])])
+    first = int(c[PLACES + int(s * p[way][SCALE] + p[way][CELLS])])
+    last = int(c[PLACES + int(p[way][LAST] * p[way][SCALE] + p[way][CELLS])])
     slowest, t = p[way][SLOWEST] * p[way][CREEP], s - p[first][END]
     fourth = sqrt(sqrt(slowest))
     begin, slope = fourth, _root_slope(s, fourth, quintic(p, first, t), growth(p, first, t))
@@ -136,7 +136,7 @@ def root_of_velocity(cells: Row, roots: Pieces, p: Pieces, way: int, velocity: f
         s = p[way][LAST] * sqrt(sqrt(velocity / cells[3]))
         return s, 4.0 * velocity / s
     fourth = sqrt(sqrt(velocity))
-    row = piece(roots, cells[int(fourth * cells[0] + cells[1])], fourth)
+    row = piece(roots, int(cells[int(fourth * cells[0] + cells[1])]), fourth)
     t, end = fourth - roots[row][END], p[row][END]
     near = roots[row][R0] + t * (roots[row][R1] + t * (roots[row][R2] + t * roots[row][R3]))
     return _within(p, row, velocity, near - end, roots[row][START] - end)

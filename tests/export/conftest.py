@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Final, cast
 
 import pytest
 
@@ -15,14 +15,32 @@ from ringbalance.scene.models import Scene
 Both = tuple[CalibratedLaw, CompactLaw]
 
 
+FAN: Final = {
+    "disc.outer_radius": "200 mm",
+    "disc.inner_radius": "120 mm",
+    "tube.port_radius": "200 mm",
+    "tube.hump_radius": "150 mm",
+    "tube.hump_position": 0.4,
+    "tube.length": "600 mm",
+    "tube.bore": "4 mm",
+    "rotor.speed": "1480 rpm",
+}
+"""A slow disc, in which gravity counts, and whose tube is not the same both ways."""
+
+
 def both_laws(name: str) -> Both:
-    """Of a bundled scene."""
-    scene = cast(Scene, rb.load_scene(rb.bundled_scene(name)))
+    """Of a bundled scene, or of "fan"."""
+    scene = cast(Scene, rb.load_scene(rb.bundled_scene("six_chamber" if name == "fan" else name)))
+    if name == "fan":
+        scene = scene.with_values(FAN)
     law = rb.calibrate(scene).flow_law
     return law, compact_law(scene=scene, law=law)
 
 
-@pytest.fixture(scope="session", params=["liquid_ring_paper", "six_chamber", "grinding_spindle"])
+@pytest.fixture(
+    scope="session",
+    params=["liquid_ring_paper", "six_chamber", "grinding_spindle", "imported_chamber", "fan"],
+)
 def laws(request: pytest.FixtureRequest) -> Both:
     return both_laws(request.param)
 

@@ -9,10 +9,9 @@ import pytest
 from law_queries import answers, queries
 
 from ringbalance.export import chamber
-from ringbalance.export.compact import TOLERANCE, CompactLaw, compact_law
+from ringbalance.export.compact import LARGEST, TOLERANCE, CompactLaw, compact_law
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.pieces import point
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
@@ -24,7 +23,7 @@ OK, EXTRAPOLATED, BLOCKED, UNDECIDED, INVALID = range(5)
 
 def test_it_is_small_and_within_its_tolerance_of_the_calibrated_law(laws: Both) -> None:
     law, compact = laws
-    assert compact.size <= 4096
+    assert compact.size <= 4096 == LARGEST
     asked = queries(law, 6000)
     x, y, p, primed = asked
     right = law.evaluate(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=primed.astype(bool))
@@ -43,11 +42,12 @@ def test_it_is_small_and_within_its_tolerance_of_the_calibrated_law(laws: Both) 
 def test_a_chamber_has_its_surface_and_its_moment(laws: Both, paper_scene: Scene) -> None:
     law, compact = laws
     fill = np.linspace(0.0, law.max_fill_ratio, 57)
-    moment = [chamber.moment(compact.constants, compact.pieces, each) for each in fill.tolist()]
+    tables = compact.constants, compact.tables.cells, compact.tables.pieces
+    moment = [chamber.moment(*tables, each) for each in fill.tolist()]
     right = law.moment.chamber_moment(fill)
     assert moment == pytest.approx(right, abs=2e-5 * float(np.max(np.abs(right))))
     if compact.scene == paper_scene.file:
-        radius = [chamber.surface_radius(compact.constants, compact.pieces, each) for each in fill.tolist()]
+        radius = [chamber.surface_radius(*tables, each) for each in fill.tolist()]
         assert radius == pytest.approx(surface_radius(disc=paper_scene.disc, fill_ratio=fill), rel=1e-5)
 
 
@@ -69,16 +69,19 @@ def test_what_lies_outside_is_extrapolated_or_invalid_and_never_refused(six: Bot
 
 
 def test_the_error_of_tabulation_is_in_the_uncertainty(six: Both) -> None:
-    _, law = six
-    without = list(law.constants)
-    without[point.TABULATION] = 0.0
-    exact = replace(law, constants=tuple(without))
-    asked = np.array([[0.3], [0.2], [6e5], [1.0]])
-    (velocity, wide, *_), (_, narrow, *_) = (*answers(law, asked), *answers(exact, asked))
-    assert np.hypot(narrow, np.sqrt(law.constants[point.TABULATION]) * velocity) == pytest.approx(
-        wide, rel=1e-12
+    law, exact = six
+    rough = replace(law, heads=replace(law.heads, interpolation_error=0.05))
+    scene = load_scene(scenes.replace("__init__.py", "six_chamber.toml"))
+    assert isinstance(scene, Scene)
+    asked = np.array([[0.3, 0.2], [0.2, 0.3], [6e5, 3e5], [1.0, 1.0]])
+    found = zip(
+        answers(exact, asked), answers(compact_law(scene=scene, law=rough), asked), asked.T, strict=True
     )
-    assert wide > narrow
+    for (velocity, narrow, *_), (_, wide, *_), (x, y, p, _) in found:
+        assert wide == pytest.approx(np.hypot(narrow, 0.05 * velocity), rel=0.02)
+        conditions = {"fill_ratio": x, "opposite_fill_ratio": y, "gas_pressure": p, "primed": True}
+        right, wider = (float(each.evaluate(**conditions).uncertainty) for each in (law, rough))
+        assert wider == pytest.approx(np.hypot(right, 0.05 * velocity), rel=1e-4)
 
 
 def test_inputs_that_were_fitted_together_are_refused(six: Both) -> None:

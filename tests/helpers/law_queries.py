@@ -9,6 +9,7 @@ import numpy as np
 from ringbalance.export.compact import CompactLaw
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces import point
+from ringbalance.reduced_model.pieces.query import answer
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -38,5 +39,5 @@ def answers(law: CompactLaw, asked: FloatArray) -> Iterator[list[float]]:
     """Velocity, half-width, regime, status and primed of each query, by the program's own evaluator."""
     for query in asked.T.tolist():
         w = query + [0.0] * (point.PLACES_OF_QUERY - 4)
-        point.answer(law.constants, law.pieces, w, True)
+        answer(law.constants, *law.tables, w, True)
         yield w[point.VELOCITY : point.PRIMED_AFTER + 1]

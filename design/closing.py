@@ -38,6 +38,8 @@ _CLOUD: Final = 24
 """Points of each such size of which the most promising is judged."""
 _LARGER: Final = 1.05
 """Times the size that is expected: what a design is compared with where none is known yet."""
+_WIDER: Final = 1.5
+"""Times its own standard deviation, by which the surface errs near the edge, as measured."""
 _WORTH: Final = 0.002
 """Expected relative decrease of the size from which on a design is judged."""
 _NEARLY: Final = 0.03
@@ -146,7 +148,10 @@ def _chosen(races: Races, options: Sequence[_Option], size: float, least: float)
     """
     enough, limit = float(logit(races.threshold)), min(least, _LARGER * size)
     rated = [
-        replace(each, gain=float(ndtr((each.logit - enough) / each.spread)) * math.log(limit / each.size))
+        replace(
+            each,
+            gain=float(ndtr((each.logit - enough) / (_WIDER * each.spread))) * math.log(limit / each.size),
+        )
         for each in options
     ]
     return sorted(rated, key=lambda each: (-max(each.gain, _WORTH), -each.logit))[:2]

@@ -225,8 +225,10 @@ def _effects_table(design: Design) -> Table:
         )
         for each in design.effects
     ]
-    heads = ("key", "instead", "devices that meet all", "change on the same devices, 95 %")
-    return Table(caption="One key changed, the settings as they are", heads=heads, rows=rows)
+    heads = ("key", "instead", "devices that meet all", "change, 95 %")
+    return Table(
+        caption="One key changed, the settings as they are, on the same devices", heads=heads, rows=rows
+    )
 
 
 def _change_text(compared: Paired) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from ringbalance.results.requirements import MET, MISSED, OPEN, Proportion
+from ringbalance.results.requirements import MET, MISSED, OPEN, Paired, Proportion
 
 
 def test_wilsons_bounds() -> None:
@@ -34,3 +35,22 @@ def test_nothing_drawn_says_nothing() -> None:
     nothing = Proportion(count=0, of=0)
     assert math.isnan(nothing.value)
     assert (nothing.low, nothing.high) == (0.0, 1.0)
+
+
+def test_a_wider_interval_decides_later() -> None:
+    share = Proportion(count=240, of=256)
+    assert (share.verdict(0.9), share.verdict(0.9, deviations=3.0)) == (MET, OPEN)
+    assert Proportion(count=250, of=256).verdict(0.9, deviations=3.0) == MET
+
+
+def test_a_difference_of_paired_fractions() -> None:
+    """Against the spread of many drawn pairs."""
+    random = np.random.default_rng(1)
+    found = []
+    for _ in range(400):
+        base, other = random.random((2, 256))
+        first, second = (base < 0.9) & (other < 0.98), base < 0.9
+        found.append(Paired.of(first, second).difference)
+    changes, halves = np.array(found).T
+    assert np.mean(changes) == pytest.approx(-0.9 * 0.02, abs=2e-3)
+    assert 1.96 * np.std(changes) == pytest.approx(np.mean(halves), rel=0.1)

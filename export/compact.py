@@ -44,6 +44,8 @@ _OF_SHARE: Final = 5e-4
 """Where a share decides whether a column separates, `point` allows for more."""
 _OF_CHAMBER: Final = 2e-6
 """Of the largest squared radius and moment."""
+_EASES: Final = (1.0, 1.6)
+"""Times the first of these errors, and its cube the second, where levels would have no room otherwise."""
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
@@ -165,11 +167,14 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
             "a scene without [fitted]",
         )
     tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
-    rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
-    missed = max(_add_way(rows, law, way, table, slack) for way, table in enumerate(tables))
-    _add_chamber(rows, scene, law, slack)
-    before, count = map(len, rows.arrays({}))
-    left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
+    for ease in _EASES:
+        rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
+        missed = max(_add_way(rows, law, way, table, slack, ease) for way, table in enumerate(tables))
+        _add_chamber(rows, scene, law, slack, ease)
+        before, count = map(len, rows.arrays({}))
+        left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
+        if left >= 8 * WIDTH_OF_ROW * _MOST_LEVELS:
+            break
     level_error = _add_levels(level_rows, law, slack, most=min(_MOST_LEVELS, left // (8 * WIDTH_OF_ROW)))
     level_numbers, levels = level_rows.arrays({})
     numbers, pieces = rows.arrays(
@@ -272,7 +277,7 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -
     return float(np.max(error))
 
 
-def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) -> None:
+def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float, ease: float) -> None:
     """Squared radius of the free surface, moment and its half-width over the fill ratio."""
     cells = _CELLS[0]
     x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _PER_CELL + 1))
@@ -280,7 +285,7 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) 
     x[-1] = np.nextafter(np.float32(law.max_fill_ratio), np.float32(1.0))
     columns = []
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
-        allowed = np.full_like(x, _OF_CHAMBER * float(np.max(np.abs(value))))
+        allowed = np.full_like(x, ease**3 * _OF_CHAMBER * float(np.max(np.abs(value))))
         columns.append(_Column(value=value, allowed=allowed, degree=2))
     columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
@@ -288,7 +293,7 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float) 
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
-def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float) -> float:
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float, ease: float) -> float:
     """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
@@ -296,12 +301,12 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: f
         x = _rounded(np.linspace(root * slowest, root * fastest, cells * _PER_CELL + 1))
         s = np.clip(x / root, slowest, fastest)
         value = table.quintic(s) / law.density**0.5
-        ratio = _Column(value=value, allowed=_OF_HEADS * value)
+        ratio = _Column(value=value, allowed=ease * _OF_HEADS * value)
         squared = table.straight(s, LOSS) ** 2
         beside = _shares(table, s, slack) if way == point.SIPHON else []
         ends = _ends(x, [ratio, _half_width(squared, slack * _OF_WIDTHS), *beside])
         missed = ratio.largest(x, ends, of=value)
-        if missed <= _OF_HEADS:
+        if missed <= ease * _OF_HEADS:
             break
     # The error of tabulation is part of the half-width, whatever is known of the loss.
     error = _AT_CREST * missed + law.heads.interpolation_error

@@ -301,15 +301,17 @@ def _gas_time(
         return float(loop.probe)
     if reached <= target:
         return _time_to(plant, liquid, pair, side, target, now, reached, longest, notes, w)
-    if motion.ended == 0.0:
+    lowest = max(0.0, plant.total - plant.max_fill_ratio)
+    flows = now > lowest
+    if flows and motion.ended == 0.0:
         return float(longest)
-    more = 0.0
+    # What an earlier command has emptied does not flow again.
+    ended, more = motion.ended if flows else 0.0, 0.0
     if motion.event in (_EMPTY, _FULL):
-        lowest = max(0.0, plant.total - plant.max_fill_ratio)
         p = plant.gas_pressure
         speed = steady(plant, lowest, plant.total - lowest, p, 0.0, True, 0.0)[0]
         more = (reached - target) * plant.chamber_volume / (plant.tube_area * max(speed, 1e-12))
-    return float(min(motion.ended + more, longest))
+    return float(min(ended + more, longest))
 
 
 @in_place

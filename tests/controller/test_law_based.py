@@ -64,11 +64,17 @@ def with_chambers(scene: Scene, chambers: int) -> Scene:
 # --- valve-open times ---
 
 
-def gas_time_of(ring: LiquidRing, *, side: int, wanted: float, longest: float) -> float:
-    """Valve-open time that brings a level pair to a fill of its positive chamber, s; zero: nothing flows."""
+def gas_time_of(
+    ring: LiquidRing, *, side: int, wanted: float, longest: float, fill: float = 0.25, ended: float = 0.0
+) -> float:
+    """Valve-open time that brings a pair to a fill of its positive chamber, s; zero: nothing flows.
+
+    Args: `ended`: when the flow of an earlier command did.
+    """
     plant, loop = ring.dynamics.kept_plant(total=0.5), np.zeros(1, dtype=LOOP)
     loop["maximum_gas_time"] = longest
-    liquid = np.repeat(at_rest(plant, fill=0.25), 2)
+    liquid = np.repeat(at_rest(plant, fill=fill), 2)
+    liquid["ended"] = ended
     room = np.zeros((2, 1)), np.zeros(WORKSPACE)
     return float(_gas_time(loop[0], plant[0], liquid, 0, side, wanted, *room))
 
@@ -106,6 +112,14 @@ def test_a_gas_time_ends_at_the_stall_and_at_the_longest(gas_time: Callable[...,
 
 def test_a_fill_beyond_empty_goes_on_at_the_last_velocity(gas_time: Callable[..., float]) -> None:
     assert gas_time("constant", -0.1) == pytest.approx(0.35 / (0.02 * 5))
+
+
+def test_a_chamber_that_an_earlier_command_has_emptied_is_asked_for_what_is_missing_alone(
+    laws: Mapping[str, Any], model: BalancerModel, ring_of: RingOf
+) -> None:
+    ring = ring_of(replace(model, flow=laws["constant"], tube_area=0.02 * model.chamber_volume))
+    found = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, fill=0.0, ended=0.7)
+    assert found == pytest.approx(0.1 / (0.02 * 5))
 
 
 def test_the_papers_gas_time_by_hand(model: BalancerModel, ring_of: RingOf) -> None:

@@ -22,8 +22,12 @@ _SHOWN: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor"
 """Columns that are drawn, where there are numbers."""
 _LONGEST_NOTE: Final = 50
 """Characters beside a legend."""
-_OUTSIDE: Final = {"marker": "x", "color": FIFTH, "linewidths": 0.8}
+_OUTSIDE: Final = {"marker": "x", "linewidths": 1.0}
+_OF_POINTS: Final = MAP[3:]
+"""Shades that stand out from the page."""
 _BEST: Final = {"marker": "*", "facecolors": "none", "edgecolors": INK}
+_Shades = list[tuple[str, BoolArray]]
+"""Colours, each with the points that have it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +97,7 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
     axes: list[Axis] = [(path, unit_of_path(sweep.scene, path)) for path in paths]
     title = name.replace("_", " ")
     feasible = np.array(sweep.feasible)[view.shown]
-    best = np.flatnonzero(view.shown) == sweep.best
+    best = np.flatnonzero(view.shown) == (sweep.nearest if sweep.best is None else sweep.best)
     over = [*keys, shown][:2]
 
     def points(panel: Axes, mask: BoolArray, **look: Any) -> None:
@@ -101,17 +105,18 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
             panel.scatter(*(each[mask] for each in over), zorder=3, **look)
 
     def paint(panel: Axes) -> None:
-        shades = [(FOUND, feasible)]
+        inside, outside = [(FOUND, feasible)], [(FIFTH, ~feasible)]
         if len(keys) == 1:
             order = np.argsort(over[0], kind="stable")
             panel.plot(over[0][order], over[1][order], color=MUTED, linewidth=1)
             _noted(panel, view.note)
         else:
-            shades = _coloured(panel, view, keys, shown, feasible, title, unit)
-        for place, (shade, mask) in enumerate(shades):
+            inside, outside = _coloured(panel, view, keys, shown, feasible, title, unit)
+        for place, (shade, mask) in enumerate(inside):
             points(panel, mask, s=14, color=shade, label="" if place else "feasible")
-        points(panel, ~feasible, s=12, label="not feasible", **_OUTSIDE)
-        points(panel, best, s=90, label="best", **_BEST)
+        for place, (shade, mask) in enumerate(outside):
+            points(panel, mask, s=14, color=shade, label="" if place else "not feasible", **_OUTSIDE)
+        points(panel, best, s=90, label="nearest" if sweep.best is None else "best", **_BEST)
 
     y = axes[1] if len(axes) > 1 else (title, unit)
     return draw(f"sweep-{name.replace('_', '-')}", paint, x=axes[0], y=y, columns=3, wide=True, height=3.6)
@@ -124,26 +129,31 @@ def _noted(panel: Axes, *parts: str) -> None:
 
 def _coloured(
     panel: Axes, view: _View, keys: list[Any], shown: Any, feasible: Any, title: str, unit: str
-) -> list[tuple[str, BoolArray]]:
-    """Shades over a grid of two keys with the boundary of what is feasible; else those of feasible points."""
+) -> tuple[_Shades, _Shades]:
+    """Shades over a grid of two keys, with the boundary of what is feasible; else those of points.
+
+    Returns: Of the feasible points and of the others that are still to be drawn.
+    """
     known = shown[np.isfinite(shown)]
     low, high = float(known.min()), float(known.max())
     ends = f"{title}: {given(low, unit, digits=3)} (light) to {given(high, unit, digits=3)} (dark)"
     _noted(panel, view.note, ends)
     sizes = [len(np.unique(each)) for each in keys]
     if view.sweep.plan.sample or min(sizes) < 2 or math.prod(sizes) != shown.size:
-        return _shades(shown, low, high, feasible)
+        without = (FIFTH, ~feasible & ~np.isfinite(shown))
+        return _shades(shown, low, high, feasible), [*_shades(shown, low, high, ~feasible), without]
     x, y, z, inside = (np.reshape(each, sizes) for each in (*keys, shown, feasible))
     colours = ListedColormap(list(MAP))
     panel.pcolormesh(x, y, z, shading="nearest", edgecolors="none", cmap=colours, vmin=low, vmax=high)
     if inside.any() and not inside.all():
         panel.contour(x, y, inside.astype(float), levels=[0.5], colors=INK, linewidths=1.2)
-    return []
+    return [], [(FIFTH, ~feasible)]
 
 
-def _shades(shown: FloatArray, low: float, high: float, among: BoolArray) -> list[tuple[str, BoolArray]]:
+def _shades(shown: FloatArray, low: float, high: float, among: BoolArray) -> _Shades:
     """Shades that points have, the darkest first, each with its points: one colour is written at a time."""
     share = np.nan_to_num((shown - low) / ((high - low) or 1.0))
-    place = np.minimum(share * len(MAP), len(MAP) - 1).astype(int)
-    masks = [(shade, among & np.isfinite(shown) & (place == number)) for number, shade in enumerate(MAP)]
+    place = np.minimum(share * len(_OF_POINTS), len(_OF_POINTS) - 1).astype(int)
+    known = among & np.isfinite(shown)
+    masks = [(shade, known & (place == number)) for number, shade in enumerate(_OF_POINTS)]
     return [(shade, mask) for shade, mask in reversed(masks) if mask.any()]

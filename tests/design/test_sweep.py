@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import pickle
+import re
 from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -423,6 +424,19 @@ def test_where_no_point_serves_enough_devices_the_nearest_is_named(paper_scene: 
     assert (found.best, found.nearest) == (None, 1)
     assert "sweep_nearest" in {each.code for each in found.rows().findings}
     assert found.rows().tables[1].caption == "Nearest: row 1"
+
+
+def test_points_that_do_not_meet_show_their_values_too_and_the_nearest_is_marked(
+    paper_scene: Scene, tmp_path: Path
+) -> None:
+    scene = paper_scene.with_values({"requirement.fraction": 0.999})
+    vary = {"gas.pressure": "0.42MPa:0.62MPa", "tube.bore": "1mm:2mm"}
+    found = rb.sweep(scene, vary, sample="sobol:8", runs=8, intervals=False)
+    assert found.best is None
+    reach = next(path for path in found.plot(tmp_path) if path.name == "sweep-reach.svg").read_text()
+    assert "nearest" in reach
+    colours = re.findall(r'<use [^>]*style="fill: (#[0-9a-f]{6}); stroke', reach)
+    assert len({*colours}) > 4
 
 
 def test_the_summary_of_a_sample_says_what_decides(paper_scene: Scene, valves: Path) -> None:

@@ -33,10 +33,11 @@ _OF_PROCESSOR: Final = {"x86_64": ("-Xclang", "-Oz"), "aarch64": ()}
 _PLAIN: Final = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 _OF_SYSTEM: Final = {
     "linux": (*_PLAIN, "-fno-plt", "-flto", "-Wl,--hash-style=sysv", "-lm"),
-    "darwin": _PLAIN,
+    "darwin": (*_PLAIN, "-Wl,-x"),
     "windows": ("-nostdlib", "-I.", "-lkernel32"),
 }
-"""Without what exceptions of other languages would need on their way through; Windows asks for it always."""
+"""Without what exceptions of other languages would need on their way through, which Windows asks for always,
+and without names that nothing outside asks for."""
 _HEADERS: Final = {
     "math.h": "double sqrt(double);\n",
     "stdlib.h": "#include <stddef.h>\nvoid *malloc(size_t);\nvoid free(void *);\n",

@@ -22,7 +22,7 @@ from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import chamber, controller, disc, law_based
+from ringbalance.export import chamber, controller, disc, law_based, valves
 from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -256,10 +256,9 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
     chambers = scene.disc.chambers
 
     def place(offset: str, chamber: int | None) -> int:
-        value = int(getattr(controller, offset))
         if chamber is None:
-            return value
-        return controller.FIRST_CHAMBER + controller.PER_CHAMBER * chamber + value
+            return int(getattr(controller, offset))
+        return controller.FIRST_CHAMBER + valves.PER_CHAMBER * chamber + int(getattr(valves, offset))
 
     return Block(
         kind="controller",
@@ -268,8 +267,8 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
         facts="Settings of the scene; the vibration enters by its components.",
         constants=_settings(scene),
         tables=None,
-        start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
-        modules=(point, controller),
+        start=(0.0,) * (controller.FIRST_CHAMBER + valves.PER_CHAMBER * chambers),
+        modules=(point, valves, controller),
         steps="step",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),
@@ -299,14 +298,14 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     beside = law_steps.change_of(r, half)
     row += [*run["memory"][: beside - r].tolist(), *[0.0] * law_based.FIRST_CHAMBER]
     first_chamber = len(row)
-    row += [0.0] * (law_based.PER_CHAMBER * chambers)
+    row += [0.0] * (valves.PER_CHAMBER * chambers)
     places = {"VIBRATION_X": r + law_steps.SEEN_X, "VIBRATION_Y": r + law_steps.SEEN_Y}
     places |= {name: beside + getattr(law_based, name) for name in ("RESTS", "SAMPLES", "WAIT")}
 
     def place(offset: str, chamber: int | None) -> int:
         if chamber is None:
             return places["RESTS" if offset == "RESTING" else offset]
-        return first_chamber + law_based.PER_CHAMBER * chamber + int(getattr(law_based, offset))
+        return first_chamber + valves.PER_CHAMBER * chamber + int(getattr(valves, offset))
 
     return Block(
         kind="controller",
@@ -316,7 +315,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
-        modules=(point, query, chamber, disc, law_steps, law_based),
+        modules=(point, query, chamber, disc, valves, law_steps, law_based),
         steps="control",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),

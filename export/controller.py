@@ -8,6 +8,15 @@ waits for the longest of these and one period more.  Source: `controller.algorit
 
 from math import sqrt
 
+from ringbalance.export.valves import (
+    AT_RESIDUAL,
+    GREATEST,
+    INSTANT,
+    OPEN_TIME,
+    PER_CHAMBER,
+    cut_short,
+    longest_open,
+)
 from ringbalance.reduced_model.pieces.point import Law, Query, larger, smaller
 
 # fmt: off
@@ -16,11 +25,8 @@ CHAMBERS, LIMIT, GAIN, PER_TIME, DERIVATIVE, LEAST, MOST, PERIOD, RESETS = 0, 1,
 LAG_COSINE, LAG_SINE, DIRECTIONS = 9, 10, 11
 
 VIBRATION_X, VIBRATION_Y, RESTING, SAMPLES, WAIT = 0, 1, 2, 3, 4
-INTEGRAL, BEFORE_X, BEFORE_Y, BEFORE, SINCE, HAS_BEFORE, WANTED = 5, 6, 7, 8, 9, 10, 11
-FIRST_CHAMBER, PER_CHAMBER, OPEN_TIME, AT_RESIDUAL = 12, 2, 0, 1
+INTEGRAL, BEFORE_X, BEFORE_Y, BEFORE, SINCE, HAS_BEFORE, WANTED, FIRST_CHAMBER = 5, 6, 7, 8, 9, 10, 11, 12
 # fmt: on
-
-GREATEST, INSTANT = 1e6, 1e-9
 
 
 def direction(c: Law, chamber: int) -> int:
@@ -136,36 +142,15 @@ def sample(c: Law, w: Query) -> None:
 
 def set_wait(c: Law, w: Query) -> None:
     """Until one period after the last valve has closed."""
-    longest = 0.0
-    chamber = 0
-    while chamber < int(c[CHAMBERS]):
-        longest = larger(longest, w[FIRST_CHAMBER + PER_CHAMBER * chamber + OPEN_TIME])
-        chamber = chamber + 1
-    w[WAIT] = longest + c[PERIOD]
-
-
-def pass_time(c: Law, w: Query, time: float) -> None:
-    """Valves stay open for less, and those of chambers with no more liquid to give no longer."""
-    w[SINCE] = w[SINCE] + time
-    w[WAIT] = w[WAIT] - time
-    cut = False
-    chamber = 0
-    while chamber < int(c[CHAMBERS]):
-        at = FIRST_CHAMBER + PER_CHAMBER * chamber + OPEN_TIME
-        w[at] = w[at] - time
-        if w[at] > INSTANT and emptied(c, w, chamber):
-            cut = True
-            w[at] = 0.0
-        if w[at] <= INSTANT:
-            w[at] = 0.0
-        chamber = chamber + 1
-    if cut:
-        set_wait(c, w)
+    w[WAIT] = longest_open(w, FIRST_CHAMBER, int(c[CHAMBERS])) + c[PERIOD]
 
 
 def step(c: Law, w: Query, time: float) -> None:
     """Let a time pass, s, and sample the vibration if it is time to."""
-    pass_time(c, w, time)
+    w[SINCE] = w[SINCE] + time
+    w[WAIT] = w[WAIT] - time
+    if cut_short(w, FIRST_CHAMBER, int(c[CHAMBERS]), time):
+        set_wait(c, w)
     if w[WAIT] > INSTANT:
         return
     w[SAMPLES] = w[SAMPLES] + 1.0

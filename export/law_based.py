@@ -47,6 +47,7 @@ from ringbalance.export.disc import (
     command,
     pass_pair,
 )
+from ringbalance.export.valves import GREATEST, INSTANT, OPEN_TIME, PER_CHAMBER, cut_short, longest_open
 from ringbalance.reduced_model.pieces.point import (
     AMBIENT,
     BLOCK,
@@ -78,11 +79,10 @@ LAW_SQUARE, AMPLITUDE_SQUARE, PHASE_SQUARE, OFFSETS = 6, 7, 8, 9
 
 # Behind the pairs the algorithm's own memory (`law_steps`), what a host sees beside, and of each chamber.
 RESTS, SAMPLES, WAIT, OPENED, FLOW_PRIMED, FIRST_CHAMBER = 0, 1, 2, 3, 4, 5
-PER_CHAMBER, OPEN_TIME, AT_RESIDUAL = 2, 0, 1
 # fmt: on
 
-GREATEST, INSTANT, SLOWEST_FALL = 1e6, 1e-9, 1e-12
-HALVINGS, PARTS, GAUSS, END_STEP, SHORTEST_PART = 60, 64.0, 0.28867513459481287, 1e-3, 1e-9
+HALVINGS, PARTS, GAUSS, END_STEP = 60, 64.0, 0.28867513459481287, 1e-3
+SHORTEST_PART, SLOWEST_FALL = 1e-9, 1e-12
 
 
 def settings(c: Law) -> int:
@@ -303,16 +303,12 @@ def sample(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
 
 def set_wait(c: Law, w: Query) -> None:
     """Until one period after the last valve has closed."""
-    longest = 0.0
-    chamber = 0
-    while chamber < 2 * int(c[int(c[BLOCK]) + PAIRS]):
-        longest = larger(longest, w[chamber_of(c, chamber) + OPEN_TIME])
-        chamber = chamber + 1
+    longest = longest_open(w, chamber_of(c, 0), 2 * int(c[int(c[BLOCK]) + PAIRS]))
     w[beside(c) + WAIT] = longest + c[settings(c) + PERIOD]
 
 
 def pass_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
-    """Liquid moves, valves stay open for less, and those of chambers with no more liquid no longer."""
+    """Liquid moves, and valves stay open for less."""
     half = int(c[int(c[BLOCK]) + PAIRS])
     r = beside(c)
     w[r + WAIT] = w[r + WAIT] - time
@@ -320,18 +316,7 @@ def pass_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> 
     while pair < half:
         pass_pair(c, k, p, q, w, FIRST_PAIR + PER_PAIR * pair, time)
         pair = pair + 1
-    cut = False
-    chamber = 0
-    while chamber < 2 * half:
-        at = chamber_of(c, chamber)
-        w[at + OPEN_TIME] = w[at + OPEN_TIME] - time
-        if w[at + OPEN_TIME] > INSTANT and w[at + AT_RESIDUAL] != 0.0:
-            cut = True
-            w[at + OPEN_TIME] = 0.0
-        if w[at + OPEN_TIME] <= INSTANT:
-            w[at + OPEN_TIME] = 0.0
-        chamber = chamber + 1
-    if cut:
+    if cut_short(w, chamber_of(c, 0), 2 * half, time):
         set_wait(c, w)
 
 

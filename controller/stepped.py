@@ -12,7 +12,7 @@ from ringbalance.controller.algorithms.law_based import LawBased, controller_of
 from ringbalance.controller.compiled_loop import decide
 from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.reduced_model.calibration import chamber_and_law
-from ringbalance.reduced_model.injection.dynamics import PLANT, WORKSPACE
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE, empty_plants
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import Records
 from ringbalance.scene.models import Scene
@@ -41,7 +41,7 @@ class Stepped:
         self.algorithm, self.rises_tolerated = algorithm, algorithm.rises_tolerated
         self._loop, self._run = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
         algorithm.fill(self._loop[0], self._run[0])
-        self._plant = algorithm.plant if isinstance(algorithm, LawBased) else np.zeros(1, dtype=PLANT)
+        self._plant = algorithm.plant if isinstance(algorithm, LawBased) else empty_plants(1)
 
     def start(self) -> Memory:
         """As `Controller.start`."""

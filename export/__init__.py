@@ -1,4 +1,4 @@
-"""Law, disc and controller for other programs: some four hundred numbers, and one source.
+"""Law, disc and controller for other programs: at most 4 kB of numbers, and one source.
 
 `compact.py` makes the numbers of the law, whose `pieces.point` answers one query from them, with `chamber.py`
 beside it; `disc.py` and `controller.py` go

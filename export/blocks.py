@@ -300,11 +300,12 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     first_chamber = len(row)
     row += [0.0] * (valves.PER_CHAMBER * chambers)
     places = {"VIBRATION_X": r + law_steps.SEEN_X, "VIBRATION_Y": r + law_steps.SEEN_Y}
-    places |= {name: beside + getattr(law_based, name) for name in ("RESTS", "SAMPLES", "WAIT")}
+    places |= {"RESTING": beside + law_based.RESTS, "SAMPLES": beside + law_based.SAMPLES}
+    places["WAIT"] = beside + law_based.WAIT
 
     def place(offset: str, chamber: int | None) -> int:
         if chamber is None:
-            return places["RESTS" if offset == "RESTING" else offset]
+            return places[offset]
         return first_chamber + valves.PER_CHAMBER * chamber + int(getattr(valves, offset))
 
     return Block(

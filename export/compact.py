@@ -1,4 +1,4 @@
-"""The calibrated law as some four hundred numbers, from which every host answers with the same bits.
+"""The calibrated law as at most 4 kB of numbers, from which every host answers with the same bits.
 
 Velocity over the square root of its pressure stands as polynomials of degree five along the pressure's eighth
 root, levels alike along the fill ratio, each piece as long as the tolerance allows; beside them is what
@@ -110,8 +110,6 @@ class CompactLaw:
     constants: tuple[float, ...]
     """At the places that `point` names."""
     tables: Tables
-    head_error: float
-    """Largest relative error of a velocity for a given head against the calibrated law."""
     level_error: float
     """Largest error of a level's pressure, Pa; part of its half-width."""
     departure: float = 0.0
@@ -169,7 +167,8 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
     tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
     for ease in _EASES:
         rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
-        missed = max(_add_way(rows, law, way, table, slack, ease) for way, table in enumerate(tables))
+        for way, table in enumerate(tables):
+            _add_way(rows, law, way, table, slack, ease)
         _add_chamber(rows, scene, law, slack, ease)
         before, count = map(len, rows.arrays({}))
         left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
@@ -197,7 +196,6 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
             pieces=_tuples(pieces.astype(np.float32)),
             levels=_tuples(levels),
         ),
-        head_error=missed,
         level_error=level_error,
     )
     return replace(made, departure=_departure(made, law))
@@ -293,8 +291,8 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float, 
     rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
-def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float, ease: float) -> float:
-    """Velocities over the eighth root of a pressure. Returns: their largest relative error."""
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float, ease: float) -> None:
+    """Velocities over the eighth root of a pressure."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
     for cells in _CELLS:
@@ -316,7 +314,6 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: f
     rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more, cells=cells)
     if beside:
         rows.add(*(each.pieces(x, ends) for each in beside))
-    return missed
 
 
 def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[_Column]:

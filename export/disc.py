@@ -102,6 +102,14 @@ def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
         w[VELOCITY] = -w[VELOCITY]
 
 
+def keep_primed(w: Query, place: int) -> None:
+    """Keep whether the tube holds a continuous column; while a parted one flows, that stays as it was."""
+    if w[PRIMED_AFTER] != 0.0:
+        w[place] = 1.0
+    elif w[REGIME] == BLOCKED:
+        w[place] = 0.0
+
+
 def set_rates(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     """Of a pair's fill, 1/s, and of its gases."""
     d = int(c[BLOCK])
@@ -186,10 +194,7 @@ def settle(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
         fill = c[d + TOTAL] - w[at + X]
         side = side + 1
     set_tube(c, k, p, q, w, at)
-    if w[PRIMED_AFTER] != 0.0:
-        w[at + IS_PRIMED] = 1.0
-    elif w[REGIME] == BLOCKED:
-        w[at + IS_PRIMED] = 0.0
+    keep_primed(w, at + IS_PRIMED)
 
 
 def length(c: Law, w: Query, at: int, left: float) -> float:

@@ -45,19 +45,17 @@ from ringbalance.export.disc import (
     VALVE,
     X,
     command,
+    keep_primed,
     pass_pair,
 )
 from ringbalance.export.valves import GREATEST, INSTANT, OPEN_TIME, PER_CHAMBER, cut_short, longest_open
 from ringbalance.reduced_model.pieces.point import (
     AMBIENT,
     BLOCK,
-    BLOCKED,
     DOWN_GAS,
     GAS_FACTOR,
     LARGEST_FILL,
     PRIMED,
-    PRIMED_AFTER,
-    REGIME,
     UP_GAS,
     VELOCITY,
     Cells,
@@ -158,10 +156,7 @@ def falling(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float) -> fl
     w[DOWN_GAS] = 0.0
     w[PRIMED] = w[r + FLOW_PRIMED]
     back = set_answer(c, k, p, w, False)
-    if w[PRIMED_AFTER] != 0.0:
-        w[r + FLOW_PRIMED] = 1.0
-    elif w[REGIME] == BLOCKED:
-        w[r + FLOW_PRIMED] = 0.0
+    keep_primed(w, r + FLOW_PRIMED)
     if back:
         return -c[d + PER_SECOND] * w[VELOCITY]
     return c[d + PER_SECOND] * w[VELOCITY]

@@ -57,7 +57,8 @@ BLOWN, FALL, DRIVING, ABOVE, RESTING, CAVITY, LEAST, MOST, GAS_THERE = 16, 17, 1
 ROOT, EIGHTH, ROW, TO_END, GROWTH, LOSS = 25, 26, 27, 28, 29, 30
 FULL_ROOT, FULL_ROW, FULL_TO_END = 31, 32, 33
 # Of the column up to the crest: pressure that holds it; at first, before a part of the gas is carried out,
-# with its velocity there; part of the driving pressure that a full siphon loses, and that pressure.
+# with its velocity there; whether a column is there afterwards; part of the driving pressure that a full
+# siphon loses, and that pressure.
 HOLDS, AT_FIRST, SLOWER, SWEPT, PART_LOST, LOST = 34, 35, 36, 37, 38, 39
 # Row beside the piece of the whole tube, and its velocity where that is worked out, too.
 BESIDE, FULL = 40, 41
@@ -345,7 +346,7 @@ def full_speed(p: Pieces, w: Query) -> float:
 
 @both_ways
 def fastest(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
-    """The same, but not above that of the full siphon."""
+    """Velocity of the column up to the crest, but not above that of the full siphon."""
     if pressure < w[LOST]:
         return velocity(k, p, w, way, pressure)
     if w[FULL] == 0.0:

@@ -154,22 +154,19 @@ def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, widths: bool) -> No
 
     With `widths` the velocity's half-width (95 %), m/s, too; without, the status is never undecided.
     """
-    w[VELOCITY] = 0.0
     w[UNCERTAINTY] = 0.0
     w[MARGIN] = 0.0
     w[MARGIN_SQUARE] = 0.0
-    w[REGIME] = BLOCKED
-    w[PRIMED_AFTER] = 0.0
     up = w[FILL]
     down = w[OPPOSITE_FILL]
-    usual = is_usual(c, w)
-    w[STATUS] = OK
-    if usual:
-        worth = OK
-    else:
+    worth = OK
+    if not is_usual(c, w):
         worth = worth_of(c, w)
-        w[STATUS] = worth
         if worth == INVALID:
+            w[VELOCITY] = 0.0
+            w[REGIME] = BLOCKED
+            w[PRIMED_AFTER] = 0.0
+            w[STATUS] = INVALID
             return
         up = within(c, up)
         down = within(c, down)
@@ -179,7 +176,5 @@ def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, widths: bool) -> No
     w[STATUS] = STANDS
     if set_answer(c, k, p, w, widths):
         w[VELOCITY] = -w[VELOCITY]
-    if usual:
-        return
     if worth == EXTRAPOLATED:
         w[STATUS] = EXTRAPOLATED

@@ -104,12 +104,6 @@ class TubePath:
         return 0.0 if self.hump_pressure is None else self.hump_pressure
 
     @property
-    def clearing_velocities(self) -> tuple[float, float]:
-        """Between which the gas over the crest may be there or gone, m/s; fitted, both in their middle."""
-        low, high = (sum(CLEARING) / 2,) * 2 if self.clearing_fitted else CLEARING
-        return low * self.froude_velocity, high * self.froude_velocity
-
-    @property
     def return_pressure(self) -> float:
         """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa.
 

@@ -125,17 +125,21 @@ def run_design(
 
     Args: `executor`: who computes; default `workers` processes, default one for each processor. `start`:
         seed of the points that are tried.
-    Raises: SceneError: a scene without [design], or one that leaves nothing to choose.
+    Raises: SceneError: a scene without [design], or one that leaves nothing to choose or to cancel.
     """
     space, told = Space.of(liquid_ring_scene(scene)), progress or (lambda _: None)
     balancer = balancer_of(space.scene)
     needed = abs(balancer.rotor().unbalance)
+    if needed == 0.0:
+        problem = "the rotor has no unbalance that a disc could cancel"
+        raise SceneError.of_file(scene.file, problem, "an amplitude above 0 of rotor.initial_vibration")
     workers = workers or os.cpu_count() or 1
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         crew = executor or pool
         asked = balancer.asked_fraction()
         found = hunt(space, asked=asked, needed=needed, executor=crew, told=told, seed=start)
-        judged, races = judged_designs(found), found.races
+        races, raced = found.races, len(found.races.candidates)
+        judged = judged_designs(found)
         best = _taken(judged, sized=space.sized)
         judgement: Judgement | None = None
         effects: tuple[Effect, ...] = ()
@@ -151,7 +155,7 @@ def run_design(
         given=scene,
         space=space,
         static=found.static,
-        raced=len(races.candidates) - len(judged),
+        raced=raced,
         needed=needed,
         reach=None if best is None else _reach(space, best.point),
         point=found.static.reach_point if best is None else best.point,

@@ -143,13 +143,14 @@ def setting_text(path: str, value: object) -> str:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return ", ".join(setting_text(path, each) for each in value)
     if isinstance(value, float | int):
-        return _short_text(_line_at(path), float(value))
+        return _short_text(_line_at(path), value)
     return str(value)
 
 
 def _short_text(line: _Line, value: float) -> str:
     if not line.dimension:
-        return f"{value:.4g} {line.shown.unit}".rstrip()
+        # Whole numbers count something, or are a seed: every digit counts.
+        return f"{value if isinstance(value, int) else format(value, '.4g')} {line.shown.unit}".rstrip()
     return format_quantity(value, line.dimension, _suited_unit(line, value), digits=4)
 
 
@@ -170,12 +171,7 @@ def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault
 def scene_lines(scene: AnyScene) -> Iterator[str]:
     """Main values of a scene with their keys, for its text in a terminal."""
     for paths in scene_kind(scene.balancer).main:
-        yield ", ".join(f"{path} {_short(scene, path)}" for path in paths)
-
-
-def _short(scene: AnyScene, path: str) -> str:
-    value = _value(scene, path)
-    return _short_text(_line_at(path), value) if isinstance(value, float) else str(value)
+        yield ", ".join(f"{path} {setting_text(path, _value(scene, path))}" for path in paths)
 
 
 def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:

@@ -157,7 +157,7 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table |
         return None, (*faults, data_fault(file, "", problem))
     if len(data) - 1 > most:
         problem = f"{len(data) - 1} rows; a row is one measurement, so average or thin out a recording"
-        return None, (*faults, data_fault(file, "", problem, allowed=f"up to {MOST_ROWS} rows"))
+        return None, (*faults, data_fault(file, "", problem, allowed=f"up to {most} rows"))
     if header is None:
         return None, faults
     separator = _separator(data[0][1])

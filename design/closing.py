@@ -27,7 +27,7 @@ from ringbalance.results.requirements import MET
 AS_SMALL: Final = 0.01
 """Relative difference in size up to which two designs count as equally small: the search's resolution."""
 _MOST: Final = 10
-"""Designs that are judged at the most, but for one."""
+"""Listed designs from which on no further pair is judged."""
 _TURNS: Final = 6
 """In which two designs are judged."""
 _STEP: Final = 0.06
@@ -190,7 +190,7 @@ def _in_order(hunt: Hunt) -> list[Judged]:
 
     def judge(*places: int) -> None:
         some = [at for at in places if 0 <= at < len(options) and at not in judged]
-        races.told(f"judging designs {len(judged) + 1} and on of at most {_MOST}")
+        races.told(f"judging designs {len(judged) + 1} and on")
         calls = [
             partial(
                 judged_design, races.space.hasty, options[at].point, place=options[at].place, search=search

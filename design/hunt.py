@@ -1,9 +1,9 @@
 """The search for a design: points of a Sobol sequence, those that can work without a run, races of a few
 drawn devices, then points about the best, closer and closer, led by a surface through the counts of all.
 
-Smallest is the volume of the cylinder around the chambers; where the disc's size does not vary, or differs by
-less than `closing.AS_SMALL`, the gas that is used decides.  Everything is counted and nothing timed, so that
-the same scene gives the same design on every machine.
+Smallest is the volume of the cylinder around the chambers; where the disc's size does not vary, the gas that
+is used decides, and among listed designs within `closing.AS_SMALL` the promise.  Everything is counted and
+nothing timed, so that the same scene gives the same design on every machine.
 """
 
 from __future__ import annotations

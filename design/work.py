@@ -20,7 +20,7 @@ from ringbalance.scene.platform.processes import beside
 CALL: Final = 5e-3
 """s, that a call of an executor costs there and back, at most."""
 _BUNDLE: Final = 0.5
-"""s of work in one call, at least."""
+"""s of work in one call, where there is enough for all workers."""
 _IDLE: Final = 0.05
 """Share of their time that workers may wait for the process that sends and takes all bundles."""
 _WORTH: Final = 4.0

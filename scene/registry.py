@@ -27,7 +27,10 @@ def register(name: str, *, scene: str, balancer: str) -> None:
 
 
 def register_function(name: str, *, place: str) -> None:
-    """Make a function known that methods of a scene use, by its place "module:name"; it imports scenes."""
+    """Make a function known by its place "module:name", which is imported when it is first asked for.
+
+    It is one of a room above, or of a package that is slow to load.
+    """
     _PLACES["function", name] = place
 
 

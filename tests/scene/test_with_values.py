@@ -7,6 +7,7 @@ import math
 import pickle
 import tomllib
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,8 @@ def test_a_nameless_scene_has_the_values_and_the_hash_of_the_named_one(values: d
     before = toml_bytes(document_of(scene))
     whole, (bare, digest) = scene.with_values(values), nameless(scene, values)
     assert digest == whole.sha256
+    # A scene that was not changed has the hash of its file.
+    assert not values or digest == sha256(toml_bytes(document_of(whole))).hexdigest()
     blank = {"name": "", "source": "", "sha256": "", "values_sha256": "", "defaulted": (), "origins": ()}
     assert bare == replace(whole, **blank)  # type: ignore[arg-type]
     assert toml_bytes(document_of(scene)) == before

@@ -27,8 +27,9 @@ from ringbalance.scene.arrays import FloatArray
 Both = tuple[CalibratedLaw, CompactLaw]
 HERE = Path(__file__).parent
 MOST = 60_000
-MOST_OF_ALL_THREE = 80_000
+MOST_LAW_BASED = 80_000
 """Law, disc and controller in one, for six systems: a third more than one of them."""
+KINDS = ("law", "disc", "controller", "law_based")
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 STARTS = {
@@ -109,7 +110,7 @@ def ran(host: Path, law: CompactLaw, asked: FloatArray) -> FloatArray:
 
 
 @needs_compiler
-@pytest.mark.parametrize("kind", ["law", "disc", "controller", "law_based"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_an_importer_in_python_has_the_reference_results(
     tmp_path: Path, blocks: dict[str, Block], version: Version, kind: str
 ) -> None:
@@ -134,7 +135,7 @@ def _table(file: Path) -> list[dict[str, float]]:
 
 
 @needs_compiler
-@pytest.mark.parametrize("kind", ["law", "disc", "controller", "law_based"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_fmpy_finds_no_fault_and_simulates_it(
     tmp_path: Path, blocks: dict[str, Block], version: Version, kind: str
 ) -> None:
@@ -158,7 +159,7 @@ def test_fmpy_finds_no_fault_and_simulates_it(
 
 def test_fmutool_finds_no_fault(tmp_path: Path, blocks: dict[str, Block], version: Version) -> None:
     pytest.importorskip("fmu_manipulation_toolbox")
-    for kind in ("law", "disc", "controller"):
+    for kind in KINDS:
         file = tmp_path / f"{kind}.fmu"
         file.write_bytes(fmu_bytes(blocks[kind], "disc", version)[0])
         command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", str(file), "-check"]
@@ -168,14 +169,14 @@ def test_fmutool_finds_no_fault(tmp_path: Path, blocks: dict[str, Block], versio
         assert f"No semantic error against the FMI-{version[3]} standard" in told
 
 
-@pytest.mark.parametrize("kind", ["law", "disc", "controller", "law_based"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_with_a_cross_compiler_it_has_libraries_for_all_systems(
     blocks: dict[str, Block], version: Version, kind: str
 ) -> None:
     """Where `ziglang` is installed: each begins as its system's libraries do."""
     pytest.importorskip("ziglang")
     content = fmu_bytes(blocks[kind], "disc", version, all_systems=True)[0]
-    assert len(content) <= (MOST_OF_ALL_THREE if kind == "law_based" else MOST)
+    assert len(content) <= (MOST_LAW_BASED if kind == "law_based" else MOST)
     unit = ZipFile(BytesIO(content))
     heads = {name: unit.read(name)[:4] for name in unit.namelist() if name.startswith("binaries/")}
     begins = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}

@@ -169,8 +169,7 @@ def _nearest(races: Races) -> list[_Option]:
 
 def _judged(races: Races, options: Sequence[_Option], settings: Settings | None) -> list[Judged]:
     """Verdicts, which the surface learns."""
-    places = [races.places(each.points.shares, beside=False)[0] for each in options]
-    firsts = [place[0] if place else None for place in places]
+    firsts = [races.nearest_places(each.points.shares)[0] for each in options]
     judge = partial(judged_design, races.space.hasty, settings=settings)
     calls = [partial(judge, each.point, place=place) for each, place in zip(options, firsts, strict=True)]
     judged: list[Judged] = []

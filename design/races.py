@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
 from ringbalance.design.racing import DEVICES, Place, Race, near, race
@@ -18,12 +19,10 @@ from ringbalance.design.space import Space
 from ringbalance.design.static import Record, reach_of, static_rows
 from ringbalance.design.surface import Surface
 from ringbalance.results.requirements import MET, Proportion
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 
 Told = Callable[[str], None]
 
-VERDICT: Final = 1024
-"""Devices of a verdict."""
 _TOGETHER: Final = 256
 _BLOCKS: Final = 8
 """Of devices, over which designs are spread: what one block has by chance does not lead the search."""
@@ -58,7 +57,7 @@ class Points:
     reach: FloatArray
     """Unbalance that each cancels in any direction, of what is needed, shape (n,)."""
 
-    def some(self, places: Sequence[int] | IntArray) -> Points:
+    def some(self, places: Sequence[int]) -> Points:
         """Of them."""
         chosen = np.asarray(places, dtype=np.intp)
         points = [self.points[i] for i in chosen.tolist()]
@@ -67,10 +66,10 @@ class Points:
 
 def threshold(asked: float) -> float:
     """Least fraction of the devices of a verdict whose lower 95 % bound is the fraction asked for."""
-    count = math.ceil(asked * VERDICT)
-    while count < VERDICT and Proportion(count=count, of=VERDICT).verdict(asked) != MET:
+    count = math.ceil(asked * MOST_DRAWS)
+    while count < MOST_DRAWS and Proportion(count=count, of=MOST_DRAWS).verdict(asked) != MET:
         count += 1
-    return count / VERDICT
+    return count / MOST_DRAWS
 
 
 def deal(executor: Executor | None, calls: Sequence[Callable[[], Any]]) -> list[Any]:
@@ -100,6 +99,8 @@ class Races:
     """Places in the unit cube that can work, of the first sample."""
     candidates: list[Candidate] = field(default_factory=list)
     raced: set[str] = field(default_factory=set)
+    fitted: Surface | None = None
+    """The surface through the counts of all candidates; None: one came since, or none is fitted."""
 
     def answered(self, points: Sequence[Point]) -> list[Record]:
         """What points come to without a run."""
@@ -140,7 +141,7 @@ class Races:
 
     def add(self, points: Points, at: int, raced: Race) -> None:
         """One of some points, that raced."""
-        point = points.points[at]
+        point, self.fitted = points.points[at], None
         self.candidates.append(
             Candidate(
                 shares=points.shares[at],
@@ -167,19 +168,29 @@ class Races:
 
     def surface(self) -> Surface:
         """Through the counts of all designs."""
-        return Surface.of(
-            self.coordinates(self.points),
-            met=np.array([each.race.met for each in self.candidates]),
-            devices=np.array([each.race.meets.size for each in self.candidates]),
-        )
+        if self.fitted is None:
+            self.fitted = Surface.of(
+                self.coordinates(self.points),
+                met=np.array([each.race.met for each in self.candidates]),
+                devices=np.array([each.race.meets.size for each in self.candidates]),
+            )
+        return self.fitted
 
-    def places(self, shares: FloatArray, *, beside: bool = True) -> list[list[Place] | None]:
-        """By point the settings of the nearest design that served many devices, and others beside them."""
-        whole = [each for each in self.candidates if each.race.meets.size >= DEVICES] or self.candidates
+    @property
+    def _well_known(self) -> list[Candidate]:
+        """Candidates that ran many devices; all, where none has."""
+        return [each for each in self.candidates if each.race.meets.size >= DEVICES] or self.candidates
+
+    def nearest_places(self, shares: FloatArray) -> list[Place | None]:
+        """By point the settings of the nearest design that ran many devices."""
+        whole = self._well_known
         known = self.space.coordinates(np.array([each.shares for each in whole]))
         apart = np.linalg.norm(self.space.coordinates(shares)[:, np.newaxis] - known, axis=2)
-        nearest = [whole[at].race.place for at in np.argmin(apart, axis=1).tolist()]
-        return [self._beside(each) if beside else each and [each] for each in nearest]
+        return [whole[at].race.place for at in np.argmin(apart, axis=1).tolist()]
+
+    def places(self, shares: FloatArray) -> list[list[Place] | None]:
+        """By point these settings, and others beside them."""
+        return [self._beside(each) for each in self.nearest_places(shares)]
 
     def _beside(self, place: Place | None) -> list[Place] | None:
         if place is None:
@@ -190,7 +201,7 @@ class Races:
 
     def parents(self, value: Callable[[Points], FloatArray], size: float) -> FloatArray:
         """Places of those that would be best if they had a size, m^3."""
-        whole = [each for each in self.candidates if each.race.meets.size >= DEVICES] or self.candidates
+        whole = self._well_known
         shares = np.array([each.shares for each in whole])
         if self.space.sized:
             shares = np.array([self.space.sized_at(each, size) for each in shares])

@@ -189,9 +189,13 @@ def _heat(balancer: Balancer, races: Sequence[Race], numbers: Sequence[int]) -> 
     ]
 
 
+def _meets(demands: Sequence[Demand], outcomes: Outcomes) -> BoolArray:
+    return np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0))
+
+
 def _outcome(demands: Sequence[Demand], outcomes: Outcomes) -> dict[str, Any]:
     return {
-        "meets": np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0)),
+        "meets": _meets(demands, outcomes),
         "times": outcomes.settling_time,
         "energy": outcomes.energy,
     }
@@ -273,6 +277,6 @@ def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Dr
     try:
         balancer = quick_balancer(point_scene(scene, point))
         (outcomes,) = balancer.run_all([settings], draws, further=_WATCHED)
-        return np.asarray(np.all([each.met(outcomes) for each in balancer.demands()], axis=0))
+        return _meets(balancer.demands(), outcomes)
     except (SceneError, *FAULTS):
         return None

@@ -110,6 +110,11 @@ class Sweep(Result):
             ranked = [(None if value is None else -value, i) for value, i in ranked]
         return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
 
+    @property
+    def best_or_nearest(self) -> int | None:
+        """The best row, or the nearest where none is feasible."""
+        return self.nearest if self.best is None else self.best
+
     @cached_property
     def nearest(self) -> int | None:
         """Where runs show no feasible point, the one that serves most devices; None where none serves any."""
@@ -218,12 +223,14 @@ class Sweep(Result):
         return self._shares(["fraction" if self.runs else "reach"])
 
     def _shares(self, names: Sequence[str], *, total: bool = False) -> Shares:
+        if not self.plan.sample:
+            return {}
         columns = {name: _array(values) for name, _, values in self.fields()}
         numbers = {name: each for name, each in columns.items() if each.dtype == np.float64}
         for axis in self.plan.axes:
             if axis.names:
                 numbers[axis.head] = np.array([axis.names.index(each) for each in columns[axis.head]], float)
-        paths = [axis.head for axis in self.plan.axes if axis.head in numbers] if self.plan.sample else []
+        paths = [axis.head for axis in self.plan.axes if axis.head in numbers]
         found = {}
         for name in names if paths else ():
             if name not in numbers:
@@ -348,7 +355,7 @@ class Sweep(Result):
 
     def _best_table(self) -> Iterator[Table]:
         """What the best or the nearest point comes to."""
-        place = self.nearest if self.best is None else self.best
+        place = self.best_or_nearest
         if place is None:
             return
         row, run = self.static[place], self.driven[place]

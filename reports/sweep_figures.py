@@ -76,7 +76,7 @@ def _view(sweep: Sweep) -> _View | None:
         return _View(sweep=sweep, paths=paths, shown=everything, note="")
     most = sorted(numbers, key=lambda axis: -len(axis.grid()))[:2]
     drawn = [axis for axis in sweep.plan.axes if axis in most]
-    row = next((each for each in (sweep.best, sweep.nearest) if each is not None), 0)
+    row = sweep.best_or_nearest or 0
     others = [axis for axis in sweep.plan.axes if axis not in most and len(axis.grid()) > 1]
     for axis in others:
         values = [sweep.points[row].get(path) for path in axis.paths]
@@ -97,7 +97,7 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
     axes: list[Axis] = [(path, unit_of_path(sweep.scene, path)) for path in paths]
     title = name.replace("_", " ")
     feasible = np.array(sweep.feasible)[view.shown]
-    best = np.flatnonzero(view.shown) == (sweep.nearest if sweep.best is None else sweep.best)
+    best = np.flatnonzero(view.shown) == sweep.best_or_nearest
     over = [*keys, shown][:2]
 
     def points(panel: Axes, mask: BoolArray, **look: Any) -> None:

@@ -14,9 +14,9 @@ from design_spread import answer
 
 import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import MOST_DRAWS, judged
 from ringbalance.controller.judging.search import searched
-from ringbalance.design.races import VERDICT, threshold
+from ringbalance.design.races import threshold
 from ringbalance.design.racing import _settings, near
 from ringbalance.design.space import Space
 from ringbalance.results.requirements import MET, OPEN, Proportion
@@ -140,9 +140,9 @@ def test_the_tube_follows_the_disc() -> None:
 
 @pytest.mark.parametrize("asked", [0.5, 0.9, 0.99])
 def test_the_threshold_is_the_least_fraction_that_is_surely_enough(asked: float) -> None:
-    count = round(threshold(asked) * VERDICT)
-    assert Proportion(count=count, of=VERDICT).verdict(asked) == MET
-    assert Proportion(count=count - 1, of=VERDICT).verdict(asked) == OPEN
+    count = round(threshold(asked) * MOST_DRAWS)
+    assert Proportion(count=count, of=MOST_DRAWS).verdict(asked) == MET
+    assert Proportion(count=count - 1, of=MOST_DRAWS).verdict(asked) == OPEN
 
 
 def test_an_error_in_a_file_of_valves_names_its_cell(tmp_path: Path) -> None:

@@ -85,10 +85,13 @@ class TubeHeads:
         log_u = _places(_NOMINAL_KNOTS)
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
         exact, tables = _Widths(*([np.zeros((log_u.size, 1))] * 4)), []
+        # One column where nothing that a head depends on differs between designs.
+        shape = log_u.size, designs.size
         for way, columns in _columns(lost, exact, 0.0):
-            stored = [np.broadcast_to(values, way.root.shape) for each in columns for values in each.stored]
-            rows = np.stack(stored).transpose(2, 0, 1).reshape(way.root.shape[1], -1)
-            tables.append([Table(knots=x, columns=row) for x, row in zip(way.root.T, rows, strict=True)])
+            stored = [np.broadcast_to(values, shape) for each in columns for values in each.stored]
+            rows = np.stack(stored).transpose(2, 0, 1).reshape(designs.size, -1)
+            roots = np.broadcast_to(way.root, shape).T
+            tables.append([Table(knots=x, columns=row) for x, row in zip(roots, rows, strict=True)])
         return tuple(map(cls._of_tables, zip(*tables, strict=True)))
 
     @classmethod

@@ -16,7 +16,7 @@ from ringbalance.reduced_model.calibration_record import Calibration, priming_pr
 from ringbalance.reduced_model.estimates import range_flow
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.making import nominal_law
+from ringbalance.reduced_model.law.making import nominal_law, nominal_laws
 from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.heads import LOSS, TubeHeads
@@ -239,6 +239,25 @@ def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
         np.testing.assert_allclose(lines[0], lines[1], rtol=1e-9, atol=1e-3)
     flows = [range_flow(each) for each in (on_shaft, on_liquid)]
     np.testing.assert_allclose(flows[0].velocity, flows[1].velocity, rtol=1e-9)
+
+
+@pytest.mark.parametrize("tube", [{}, {"hump_radius": None}, {"drag_coefficient": 50.0}], ids=str)
+@pytest.mark.parametrize("speeds", [(1.0, 1.0), (1.0, 1.02)])
+def test_laws_of_many_scenes_are_those_of_each(
+    point_scene: Scene, tube: dict[str, float | None], speeds: tuple[float, ...]
+) -> None:
+    """Whether everything that the tube's head depends on differs between them, a part of it, or nothing."""
+    scene = dataclasses.replace(point_scene, tube=dataclasses.replace(point_scene.tube, **tube))  # type: ignore[arg-type]
+    rotors = [dataclasses.replace(scene.rotor, speed=each * scene.rotor.speed) for each in speeds]
+    scenes = [dataclasses.replace(scene, rotor=each) for each in rotors]
+    many, single = nominal_laws(scenes, gravity=False), [nominal_law(each, gravity=False) for each in scenes]
+    for p in (0.7e6, 1.5e6):
+        at_once, alone = (
+            [float(law.evaluate(fill_ratio=0.2, gas_pressure=p, primed=True).velocity) for law in laws]
+            for laws in (many, single)
+        )
+        assert min(alone) > 0
+        np.testing.assert_allclose(at_once, alone, rtol=1e-12)
 
 
 def test_table_inverts_to_the_law(law: CalibratedLaw) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import ringbalance as rb
+from ringbalance import face
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -84,6 +85,13 @@ def test_what_tune_recommends_is_a_scene_that_runs() -> None:
     assert scene.sha256 != short().sha256
     assert scene.origin_of("controller.proportional") == "inferred"
     assert rb.simulate(scene, flow_law=rb.paper_law(scene)).scene == scene
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_search_over_the_pressure_can_be_asked_for(monkeypatch: pytest.MonkeyPatch, asked: bool) -> None:
+    monkeypatch.setattr(face, "tuned", lambda _, **options: options)
+    options: Any = rb.tune(short(), flow_law=rb.paper_law(short()), pressure=asked)
+    assert options["along"] is asked
 
 
 class Wrapped:

@@ -95,3 +95,12 @@ def test_a_sample_tells_what_moves_its_results(paper_scene: Scene) -> None:
         assert whole + half > share - width
     with pytest.raises(KeyError):
         rb.sweep(paper_scene, {"tube.bore": "0.7mm:2mm:3"}).sensitivity()["velocity"]
+
+
+def test_half_of_what_nothing_explains_counts_for_every_input() -> None:
+    """A result that is noise alone: each input may take part in all of it or in none, so a half +- a half."""
+    random = np.random.default_rng(11)
+    x = np.stack([(random.permutation(1024) + random.random(1024)) / 1024 for _ in range(2)], axis=1)
+    shares, widths = total_order(x, random.standard_normal(1024))
+    assert shares == pytest.approx([0.5, 0.5], abs=0.05)
+    assert widths == pytest.approx([0.5, 0.5], abs=0.1)

@@ -197,6 +197,13 @@ def test_a_bad_axis_is_one_clear_error(
         rb.sweep(paper_scene, vary, sample=sample)
 
 
+def test_a_sweep_over_a_wide_range_is_no_wrong_unit(paper_scene: Scene) -> None:
+    """From a tenth to 300 times the scene's own bore: only a list that is far as a whole is refused."""
+    bore = paper_scene.tube.bore
+    table = rb.sweep(paper_scene, {"tube.bore": [0.1 * bore, 300 * bore]}, intervals=False)
+    assert [point["tube.bore"] for point in table.points] == pytest.approx([0.1 * bore, 300 * bore])
+
+
 class Lost(Executor):
     """Workers that the system ends."""
 

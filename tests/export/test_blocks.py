@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
 from ringbalance.export.blocks import Block, controller_block, disc_block
 from ringbalance.export.hosts import c_files, python_files, st_files
+from ringbalance.export.reference import reference_files
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -161,3 +163,22 @@ def test_headers_and_declarations_say_unit_range_and_meaning(blocks: dict[str, B
     assert header.count("/* in, ") + header.count("/* out, ") == len(blocks["disc"].variables)
     assert "(* in, s, 0 to 1e+06: how long" in st_files(blocks["disc"], "m")["m.st"]
     assert "# out, m, -1 to 1: zero-to-peak vibration" in python_files(blocks["disc"], "m")["m.py"]
+
+
+@pytest.mark.parametrize("kind", ["law", "disc"])
+def test_reference_results_are_those_of_the_step_that_they_stand_at(
+    blocks: dict[str, Block], kind: str
+) -> None:
+    """Inputs hold from their row's time on; outputs are read after that step, one step later."""
+    block = blocks[kind]
+    files = {name.rsplit("/", 1)[-1]: text.decode() for name, text in reference_files(block, "unit").items()}
+    stimuli, results = (
+        list(csv.DictReader(files[f"unit_{name}.csv"].splitlines())) for name in ("in", "out")
+    )
+    row = list(block.start)
+    for place, (stimulus, result) in enumerate(zip(stimuli, results, strict=True)):
+        inputs = {name: float(value) for name, value in stimulus.items() if name != "time"}
+        outputs = block.run(row, 0.01, inputs)
+        assert float(stimulus["time"]) == pytest.approx(0.01 * place)
+        assert float(result["time"]) == pytest.approx(0.01 * (place + 1))
+        assert {name: float(result[name]) for name in outputs} == outputs

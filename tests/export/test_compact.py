@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from law_queries import answers, queries
 
-from ringbalance.export import chamber
+from ringbalance.export import chamber, compact
 from ringbalance.export.compact import LARGEST, TOLERANCE, CompactLaw, compact_law
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.pieces import point
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
@@ -92,3 +93,22 @@ def test_inputs_that_were_fitted_together_are_refused(six: Both) -> None:
     with pytest.raises(SceneError, match="fitted together"):
         compact_law(scene=scene, law=law)
     object.__setattr__(law, "variants", ())
+
+
+def test_the_error_of_the_levels_is_in_their_half_width(six: Both, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hydrostatic pressures far rougher than an export has them: their half-width holds the departure."""
+    law, _ = six
+    scene = load_scene(scenes.replace("__init__.py", "six_chamber.toml"))
+    assert isinstance(scene, Scene)
+    monkeypatch.setattr(compact, "_OF_LEVELS", 1e8 * compact._OF_LEVELS)
+    rough, row = compact_law(scene=scene, law=law), [0.0] * point.PLACES_OF_QUERY
+    fills = np.linspace(1e-3, 0.999 * law.max_fill_ratio, 500)
+    values = []
+    for fill in fills.tolist():
+        level = point.level(rough.constants, rough.tables.cells, rough.tables.levels, row, fill)
+        values.append((level, row[point.LEVEL_WIDTH]))
+    levels, widths = np.array(values).T
+    departure = np.abs(levels - law.hydrostatic_pressure(fills))
+    # Without the tables' error, most fills would lie outside.
+    assert np.mean(departure > law.hydrostatic_pressure_uncertainty(fills)) > 0.5
+    assert np.mean(departure > widths) < 0.02

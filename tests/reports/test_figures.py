@@ -7,8 +7,10 @@ from typing import Any, get_args
 from xml.etree import ElementTree
 
 import pytest
+from matplotlib.figure import Figure
 
-from ringbalance.reports.figure import LIGHT, Drawing, decade, plain_number
+from ringbalance.reports.figure import LIGHT, MUTED, Drawing, decade, plain_number
+from ringbalance.reports.figure import curve as band_of
 from ringbalance.reports.page import page_content
 from ringbalance.reports.pages.cases import _series_plots
 from ringbalance.verification.evidence import CurveStyle
@@ -165,3 +167,11 @@ def test_every_figure_has_its_caption(pages: dict[str, str]) -> None:
     )
     assert captions
     assert all(len(caption) > 10 for caption in captions)
+
+
+def test_a_band_is_one_half_width_to_either_side() -> None:
+    """About a line at three, two down and one up where that is the half-width."""
+    axes = Figure().add_subplot()
+    band_of([0.0, 1.0], [3.0, 3.0], band=[2.0, 1.0], color=MUTED)(axes)
+    corners = {tuple(corner) for corner in axes.collections[0].get_paths()[0].vertices.tolist()}
+    assert corners == {(0.0, 1.0), (0.0, 5.0), (1.0, 2.0), (1.0, 4.0)}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reports.figure import NARROW, Drawing
 from ringbalance.reports.pages.loop import LOOP
 from ringbalance.reports.pages.operation import SECTION, _disc_section, _letter_radius, _operating_map
@@ -61,6 +62,22 @@ def test_liquid_spills_between_the_priming_pressure_and_a_full_bore(work: Work, 
     lift = work.calibration.flow_law.ends(fill_ratio=point.fill_ratio).upstream_hydrostatic
     priming = (work.calibration.flow_law.path.hump_pressure or 0.0) - float(lift)
     assert 0 < first - priming <= pressure[1]
+
+
+def test_the_pressure_that_lifts_the_liquid_over_the_crest_is_hydrostatics(
+    work: Work, collected: Record
+) -> None:
+    """p = rho w^2 (a^2 - r^2) / 2 from the free surface a to either end r of the crest's range, no flow."""
+    ring, crest = work.ring, collected["crest"]
+    disc, radii = ring.disc, crest["radius_m"]
+    assert radii[0] < (ring.tube.hump_radius or 0.0) < radii[1]
+    for column in (0, 40, 100):
+        fill = collected["fill_ratio"][column]
+        surface = surface_radius(disc=disc, fill_ratio=fill)
+        for radius, pressures in zip(radii, crest["lifting_pressure_Pa"], strict=True):
+            head = ring.liquid.density * ring.rotor.speed**2 * (surface**2 - radius**2) / 2
+            # The gas brings its own column's weight, less than a thousandth of the liquid's.
+            assert pressures[column] == pytest.approx(max(head, 0.0), rel=0.01)
 
 
 def test_each_area_of_the_map_is_named_in_words(collected: Record) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.assumptions import assumptions_of
+from ringbalance.verification.assumptions import assumptions_of, widened
 from ringbalance.verification.case import CaseDefinition, RestsOn
 from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
@@ -182,3 +182,22 @@ def test_no_verdict_rests_on_an_assumption_that_it_does_not_name(paper_scene: Sc
         passes = quantity.limit * (1.0 if against is None else against.value)
         moved = errors[1][quantity.name] - errors[0][quantity.name]
         assert abs(moved) <= 0.01 * abs(passes) + 1e-9, quantity.name
+
+
+@pytest.mark.parametrize(("per_mm", "reach"), [(5.0, (-1.0, 1.0)), (-5.0, (-1.0, 1.0)), (0.0, (0.0, 0.0))])
+def test_an_assumed_range_reaches_both_ways(
+    paper_scene: Scene, per_mm: float, reach: tuple[float, float]
+) -> None:
+    """0.2 mm either way of a plate, five a millimetre: one down and one up."""
+    code, thickness = (
+        Thick(per_mm=per_mm),
+        RestsOn(path="disc.plate_thickness", low=2.577e-3, high=2.977e-3, why="so"),
+    )
+    scene = with_origin(paper_scene, "disc.plate_thickness", "assumed")
+    wider = widened(
+        code.compute(scene, "light"),
+        scene,
+        assumptions_of([thickness], scene),
+        at=lambda moved: code.compute(moved, "light"),
+    )
+    assert wider.found["answer"].reach == pytest.approx(reach, abs=1e-9)

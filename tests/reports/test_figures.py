@@ -6,6 +6,7 @@ import re
 from typing import Any, get_args
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -173,5 +174,5 @@ def test_a_band_is_one_half_width_to_either_side() -> None:
     """About a line at three, two down and one up where that is the half-width."""
     axes = Figure().add_subplot()
     band_of([0.0, 1.0], [3.0, 3.0], band=[2.0, 1.0], color=MUTED)(axes)
-    corners = {tuple(corner) for corner in axes.collections[0].get_paths()[0].vertices.tolist()}
+    corners = {tuple(corner) for corner in np.asarray(axes.collections[0].get_paths()[0].vertices)}
     assert corners == {(0.0, 1.0), (0.0, 5.0), (1.0, 2.0), (1.0, 4.0)}

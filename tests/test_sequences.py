@@ -91,7 +91,7 @@ _COMMAND: Final = re.compile(r"^ *(?:\.venv/bin/)?ringbalance (.*)$", re.MULTILI
 
 
 def prescribed() -> str:
-    """README's disc with a prescribed k and a liquid by its density: nothing of the tube's head is uncertain."""
+    """README's disc with a prescribed k and a liquid by its density: nothing of the tube's head varies."""
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     text = re.search(r"```toml\n(.*?)```", page, re.DOTALL)
     assert text

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json as json_format
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
 
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
@@ -24,7 +26,7 @@ def tune(
     law: str = "calibrated",
     json: bool = False,
     pressure: bool = False,
-    remedies: bool | None = None,
+    remedies: Annotated[bool | None, Parameter(negative="--no-remedies")] = None,
     save: Path | None = None,
     tolerance: str | None = None,
     models: Models | None = None,

@@ -29,7 +29,7 @@ def sweep(
     scene: Path,
     *,
     out: Path,
-    vary: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    vary: Annotated[list[str] | None, Parameter(consume_multiple=1)] = None,
     plan: Path | None = None,
     sample: str = "",
     runs: int = 0,
@@ -37,7 +37,7 @@ def sweep(
     check: int = 3,
     workers: int | None = None,
     no_figures: bool = False,
-    write: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
+    write: Annotated[list[int] | None, Parameter(consume_multiple=1)] = None,
     tolerance: str | None = None,
     json: bool = False,
 ) -> int:
@@ -75,7 +75,8 @@ def sweep(
     planned = _plan(told, vary or [], plan, sample)
     if write:
         check_rows(write, len(planned.points()))
-    check_file(out / TABLE)
+    for name in (TABLE, SUMMARY):
+        check_file(out / name)
     with activity("sweep", "points ...") as shown:
         found = run_sweep(
             told,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -30,6 +32,11 @@ from ringbalance.scene.describe import setting_text
 from ringbalance.scene.origins import raw_value_at
 
 _CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
+_EDGES: Final = {
+    True: ("design_edge", "design_edge_default"),
+    False: ("design_edge_missed", "design_edge_missed_default"),
+}
+"""By whether the design meets what is required: at an end that the scene gives, and at one by default."""
 _EDGE: Final = 0.02
 """Of a range: nearer to its end, a value stands at it."""
 
@@ -54,7 +61,7 @@ def design_document(design: Design) -> dict[str, Any]:
         "balancer": scene.balancer,
         "designs": {
             "static": static.points,
-            "refused": static.refused,
+            "refused": len(static.refusals),
             "blocked": static.blocked,
             "able": static.able,
             "raced": design.raced,
@@ -130,7 +137,10 @@ def _findings(design: Design) -> Iterator[Finding]:
     if judgement is None:
         reach = 0.0 if math.isnan(static.reach) else static.reach
         values = {**counted, "reach": reach, "needed": design.needed, "share": reach / design.needed}
-        yield Finding(code="design_none_able" if reach else "design_none_flows", values=values)
+        allowed = static.points - len(static.refusals)
+        without = "design_none_flows" if allowed else "design_all_refused"
+        yield Finding(code="design_none_able" if reach else without, values={**values, "allowed": allowed})
+        yield from _refusals(static.refusals, static.points)
         return
     changes = {path: value for path, value in design.point.items() if isinstance(value, float | int | str)}
     yield Finding(code=_CODES[judgement.verdict], values=share_values(judgement), change=changes)
@@ -139,13 +149,27 @@ def _findings(design: Design) -> Iterator[Finding]:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
         yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
     yield Finding(code="design_looked", values=counted)
+    yield from _refusals(static.refusals, static.points)
     if design.succeeded:
         yield from _sharpness(design)
     else:
         yield from _misses(design, judgement)
-    for path, end in _edges(design):
-        code = "design_edge" if design.succeeded else "design_edge_missed"
-        yield Finding(code=code, values={"path": path, "end": end})
+    for path, end, wider in _edges(design):
+        code, default = _EDGES[design.succeeded]
+        if wider is None:
+            yield Finding(code=code, values={"path": path, "end": end})
+        else:
+            yield Finding(code=default, values={"path": path, "end": end, "vary": wider})
+
+
+def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
+    """How many designs the checks of a scene refuse, and the most frequent reason."""
+    # Sentences of one reason differ in numbers and units, which are shorter words.
+    reasons = [tuple(re.findall("[a-z_]{4,}", text)) for text in texts]
+    for reason, most in Counter(reasons).most_common(1):
+        values = {"count": len(texts), "points": points, "reasons": len(set(reasons)), "most": most}
+        text = texts[reasons.index(reason)]
+        yield Finding(code="design_refused", values={**values, "text": text})
 
 
 def _sharpness(design: Design) -> Iterator[Finding]:
@@ -184,15 +208,16 @@ def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:
     return float(values[-count] if demand.sense == AT_LEAST else values[count - 1])
 
 
-def _edges(design: Design) -> Iterator[tuple[str, str]]:
-    """Keys that stand at an end of their range, with that end."""
+def _edges(design: Design) -> Iterator[tuple[str, str, str | None]]:
+    """Keys that stand at an end of their range, with that end, and `vary` of a wider one, where the scene
+    does not give the end."""
     for axis in design.space.axes:
         for path, ends in axis.ranges.items():
             value = float(design.point[path])
             if abs(value - ends.low) <= _EDGE * abs(ends.low):
-                yield path, setting_text(path, ends.low)
+                yield path, setting_text(path, ends.low), design.space.wider(path, low=True)
             elif abs(value - ends.high) <= _EDGE * abs(ends.high):
-                yield path, setting_text(path, ends.high)
+                yield path, setting_text(path, ends.high), design.space.wider(path, low=False)
 
 
 def _keys_table(design: Design, judgement: Judgement) -> Table:

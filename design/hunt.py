@@ -71,8 +71,8 @@ class Static:
     """What the points of the first sample come to without a run."""
 
     points: int
-    refused: int
-    """By the checks of a scene."""
+    refusals: tuple[str, ...]
+    """Of each point that the checks of a scene refuse, the reason."""
     blocked: int
     """In which nothing flows."""
     able: int
@@ -206,7 +206,7 @@ def _static(points: Sequence[Point], rows: Sequence[Record], able: int) -> Stati
     best = int(np.argmax(reach))
     return Static(
         points=len(points),
-        refused=sum(not row["sha256"] for row in rows),
+        refusals=tuple(row["finding"]["values"]["text"] for row in rows if not row["sha256"]),
         blocked=sum(row["status"] == "blocked" for row in rows),
         able=able,
         reach=reach[best] or math.nan,

@@ -20,6 +20,7 @@ from ringbalance.design.static import Record, reach_of, static_rows
 from ringbalance.design.surface import Surface
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.processes import dealt
 
 Told = Callable[[str], None]
 
@@ -76,8 +77,8 @@ def deal(executor: Executor | None, calls: Sequence[Callable[[], Any]]) -> list[
     """Their answers, in their order. Args: `executor`: who computes; None: this process."""
     if executor is None:
         return [call() for call in calls]
-    futures = [executor.submit(call) for call in calls]
-    return [each.result() for each in futures]
+    answers = dict(dealt(executor, calls))
+    return [answers[place] for place in range(len(calls))]
 
 
 @dataclass(kw_only=True)

@@ -154,6 +154,16 @@ class Space:
                     return name
         return ""
 
+    def wider(self, path: str, *, low: bool) -> str | None:
+        """`vary` with a range that goes on beyond an end, as TOML; None: the scene itself gives this end."""
+        if any(path in axis.paths for axis in _listed(self.scene)) or not (low or path == "tube.bore"):
+            return None
+        (ends,) = (axis.ranges[path] for axis in self.axes if path in axis.ranges)
+        floor = self.scene.disc.inner_radius if path == "disc.outer_radius" else 0.0
+        first, last = ((ends.low + floor) / 2, ends.high) if low else (ends.low, 2 * ends.high)
+        text = f"{path}={setting_text(path, first)}:{setting_text(path, last)}{':log' * ends.log}"
+        return "[{}]".format(", ".join(f'"{each}"' for each in (*self.scene.design.vary, text)))
+
     def range_text(self, path: str) -> str:
         """What a key may be, in its usual unit."""
         (axis,) = (each for each in self.axes if path in each.paths)

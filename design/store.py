@@ -1,7 +1,8 @@
 """Answers kept in a folder, each found by the content that it was computed from.
 
 An entry begins with the digest of its payload and is written whole or not at all.  One that does not fit its
-digest, such as a file with a flipped bit, counts as absent and is removed; it is computed again.
+digest, such as a file with a flipped bit, a link or a folder, counts as absent and is removed; it is computed
+again.
 """
 
 from __future__ import annotations
@@ -9,12 +10,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.files import discard, read_kept, write_whole
 from ringbalance.scene.platform.program import program_digest
 
 
@@ -28,13 +28,14 @@ class Store:
         """Payload of an entry; None: there is none, or it is damaged."""
         path = self._path(key)
         try:
-            digest, _, payload = path.read_bytes().partition(b"\n")
-        except OSError:
+            digest, _, payload = read_kept(path).partition(b"\n")
+        except FileNotFoundError:
             return None
+        except OSError:
+            digest, payload = b"", b""
         if hashlib.sha256(key.encode() + payload).hexdigest().encode() == digest:
             return json.loads(payload)
-        with suppress(OSError):
-            path.unlink()
+        discard(path if path.parent.is_dir() else path.parent)
         return None
 
     def put(self, key: str, payload: Any) -> None:

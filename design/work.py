@@ -8,14 +8,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
-from contextlib import contextmanager
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
 from ringbalance.design.store import Store, key_of
-from ringbalance.scene.platform.processes import beside
+from ringbalance.scene.platform.processes import beside, dealt
 
 CALL: Final = 5e-3
 """s, that a call of an executor costs there and back, at most."""
@@ -155,28 +154,9 @@ def _dealt(
 ) -> Iterator[tuple[Sequence[int], list[Any]]]:
     size = bundle_size(seconds, count=len(places), workers=workers)
     bundles = [places[start : start + size] for start in range(0, len(places), size)]
-    with _cancelled() as futures:
-        for bundle in bundles:
-            futures[executor.submit(_bundle, [tasks[place].call for place in bundle])] = bundle
-        for future in as_completed(list(futures)):
-            bundle = futures[future]
-            try:
-                payloads = future.result()
-            except BrokenExecutor:
-                # Ended by the system, usually for lack of memory: this process needs less than several do.
-                payloads = _bundle([tasks[place].call for place in bundle])
-            yield bundle, payloads
-
-
-@contextmanager
-def _cancelled() -> Iterator[dict[Future[list[Any]], Sequence[int]]]:
-    """Futures whose rest nobody wants when the block is left."""
-    futures: dict[Future[list[Any]], Sequence[int]] = {}
-    try:
-        yield futures
-    finally:
-        for future in futures:
-            future.cancel()
+    calls = [partial(_bundle, [tasks[place].call for place in bundle]) for bundle in bundles]
+    for number, payloads in dealt(executor, calls):
+        yield bundles[number], payloads
 
 
 def bundle_size(seconds: float, *, count: int, workers: int) -> int:

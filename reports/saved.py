@@ -21,11 +21,11 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.reports.section import Record
+from ringbalance.scene.platform.files import discard
 from ringbalance.scene.platform.kept_code import (
     OTHER,
     checked_content,
     code_root,
-    discard,
     trusted,
     write_checked,
 )

@@ -168,10 +168,16 @@ THREAD_COUNTS = (
 
 
 def _converted(hint: Any, tokens: Sequence[Token]) -> Any:
-    """As cyclopts converts an argument, but a whole number is not made of another one by rounding."""
-    parts = [token.value for token in tokens if "." in token.value]
-    if parts and int in {hint, *get_args(hint)}:
-        raise ValueError(f"{parts[0]} is not a whole number.")
+    """As cyclopts converts an argument, but a whole number is not made of another one by rounding, nor a file
+    of a folder's name."""
+    kinds = {hint, *get_args(hint)}
+    for text in (token.value for token in tokens):
+        if int in kinds and "." in text:
+            raise ValueError(f"{text} is not a whole number.")
+        if Path in kinds and any(character < " " for character in text):
+            raise ValueError(f"{text!r} holds a control character.")
+        if Path in kinds and text.endswith(("/", os.sep)) and Path(text).is_file():
+            raise ValueError(f"{text} is a file, not a folder; leave out the last {text[-1]}.")
     return convert(hint, tokens)
 
 

@@ -15,10 +15,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from cyclopts import CycloptsError, UnknownOptionError
 
 from ringbalance import __version__, cli, streams
 from ringbalance.scene import Fault, SceneError, bundled_scene
 
+ROOT = Path(__file__).parents[1]
 PAPER = str(bundled_scene("liquid_ring_paper"))
 LAUNCH = [sys.executable, "-c", "import sys; from ringbalance.cli import main; sys.exit(main())"]
 
@@ -102,6 +104,9 @@ def broken_scene(tmp_path: Path) -> Path:
         (["verify", "no_such_case"], ["no_such_case"]),
         (["simulate", PAPER, "--law", "no_such_law.json"], ["no_such_law.json"]),
         (["calibrate", "no_such_scene.toml"], ["no_such_scene.toml"]),
+        (["calibrate", f"{PAPER}/"], [f"{PAPER}/ is a file, not a folder"]),
+        (["sweep", PAPER, "--vary", "tube.bore=1mm,2mm", "--out", "a\nb"], ["--out", "control character"]),
+        (["sweep", PAPER, "--vary", "tube.bore=1mm,2mm", "--out", "o", "--write"], ["--write", "at least 1"]),
     ],
 )
 def test_wrong_usage(words: list[str], told: list[str], here: Run) -> None:
@@ -309,6 +314,28 @@ def test_help_has_an_example_and_the_exit_codes_of_its_command(here: Run, name: 
     assert f"Example: ringbalance {name}" in shown
     assert ("0 done; 1 " in shown) == bool(cli.Command._make(cli.COMMANDS[name]).failure)
     assert "docs/commands.md" in shown
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_documented_option_is_accepted(here: Run, name: str) -> None:
+    """By the page of commands and by `--help`; a value that lacks is another error."""
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    row = re.search(rf"^\| `ringbalance {name}\b[^`]*`", page, re.MULTILINE)
+    assert row is not None
+    listed = re.findall(r"^│[ *]+((?:--[a-z-]+ )+)", here(name, "--help").stdout, re.MULTILINE)
+    assert listed
+    elsewhere = {"--help", "--version", "--install-completion", "--brief", "--quiet", "--log"}
+    options = {*re.findall(r"--[a-z][a-z-]*", f"{row[0]} {listed}")} - elsewhere
+    app = cli._build_app()
+    refused = []
+    for option in options:
+        try:
+            app.parse_args([name, PAPER, PAPER, option], exit_on_error=False, print_error=False)
+        except UnknownOptionError:
+            refused.append(option)
+        except CycloptsError:
+            continue
+    assert not refused
 
 
 def test_the_shell_s_completion_is_written(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Protocol
 
 LOG: Final = logging.getLogger("ringbalance")
-"""Progress and messages as information, errors as errors; nothing is written unless a handler is added."""
+"""Progress and messages as information, what a user must know as warnings, errors as errors; nothing is
+written unless a handler is added."""
 LOG.addHandler(logging.NullHandler())
 _FORMAT: Final = "%(asctime)s %(levelname)s %(message)s"
 
@@ -24,6 +26,18 @@ class _Display:
     """About five lines in place of a result's tables."""
     quiet: bool = False
     """Neither progress nor messages."""
+
+
+class _Warnings(logging.Handler):
+    """Shows warnings on standard error; errors are shown where they end the command."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write the text of a warning. Args: `record`: of the log."""
+        if record.levelno == logging.WARNING:
+            # Closed, or none at all: nobody reads it.
+            with suppress(AttributeError, OSError, ValueError):
+                sys.stderr.write(f"{record.getMessage()}\n")
+                sys.stderr.flush()
 
 
 _DISPLAY: Final[ContextVar[_Display]] = ContextVar("display")
@@ -77,11 +91,13 @@ def displayed(*, brief: bool, quiet: bool, log: Path | None) -> Iterator[None]:
     Raises: OSError: the file cannot be written.
     """
     token = _DISPLAY.set(_Display(brief=brief, quiet=quiet))
-    handler = None if log is None else logging.FileHandler(log, encoding="utf-8")
-    if handler is not None:
-        handler.setFormatter(logging.Formatter(_FORMAT))
-        LOG.addHandler(handler)
+    handlers: list[logging.Handler] = [] if quiet else [_Warnings()]
+    if log is not None:
+        handlers.append(logging.FileHandler(log, encoding="utf-8"))
+        handlers[-1].setFormatter(logging.Formatter(_FORMAT))
         LOG.setLevel(logging.INFO)
+    for handler in handlers:
+        LOG.addHandler(handler)
     try:
         yield
     except Exception as error:
@@ -89,7 +105,7 @@ def displayed(*, brief: bool, quiet: bool, log: Path | None) -> Iterator[None]:
         raise
     finally:
         _DISPLAY.reset(token)
-        if handler is not None:
+        LOG.setLevel(logging.NOTSET)
+        for handler in handlers:
             LOG.removeHandler(handler)
-            LOG.setLevel(logging.NOTSET)
             handler.close()

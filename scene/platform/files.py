@@ -32,6 +32,10 @@ _PREFIX: Final = ".ringbalance-"
 _NAME: Final = re.compile(re.escape(_PREFIX) + "[0-9a-f]{16}")
 _LOCK: Final = "lock"
 _FILES: Final = "files"
+_SYSTEM: Final = ("/dev/", "/proc/")
+"""Folders whose links lead to what the process has open."""
+_MOST_KEPT: Final = 2**28
+"""Bytes of a kept file that is read."""
 _BEGINNING: Final = 60.0
 """s in which a folder that is being made gets its lock."""
 _LONGEST_WORK: Final = 86400.0
@@ -43,18 +47,19 @@ def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path
 
     After a power cut the old content or the new one is there, never an empty file: the content reaches the
     disk before the name does.
-    Args: `path`: of the file; a link is followed, a device or a pipe is written to directly. `data`: its
-        content; text is written as UTF-8. `private`: only this user may read or write it.
+    Args: `path`: of the file; a link there is replaced, one to its folder is followed, a device or a pipe is
+        written to directly. `data`: its content; text is written as UTF-8. `private`: only this user may read
+        or write it.
     Raises: OSError: the folder cannot be made or written; nothing is left behind.
     """
     content = data.encode() if isinstance(data, str) else data
     if _is_special(path):
         path.write_bytes(content)
         return path
-    target = _target(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(target.parent)
-    _replace_whole(target, content, mode=0o600 if private else 0o666)
+    folder = _through_links(path.parent)
+    folder.mkdir(parents=True, exist_ok=True)
+    _remove_abandoned(folder)
+    _replace_whole(folder / path.name, content, mode=0o600 if private else 0o666)
     return path
 
 
@@ -76,7 +81,7 @@ def check_file(path: Path, *, apart_from: Path | None = None) -> None:
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder, not a file; name a file")
         if not _is_special(path):
-            with draft_folder(_nearest(_target(path).parent)):
+            with draft_folder(_nearest(_through_links(path.parent))):
                 pass
 
 
@@ -100,6 +105,27 @@ def read_bounded(path: str | Path, *, what: str, most: int, regular: bool = Fals
         return b"", f"the file cannot be read: {reason}"
     too_large = f"the file is larger than any {what}, which has up to {most // 2**20} MiB"
     return content, too_large if len(content) > most else ""
+
+
+def read_kept(path: Path) -> bytes:
+    """The bytes of a file that the program keeps for itself, whatever stands in its place by now.
+
+    Raises: OSError: it cannot be read, is a link, no file, or larger than any that is kept.
+    """
+    flags = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    with open(path, "rb", opener=lambda name, mode: os.open(name, mode | flags)) as stream:
+        status = os.fstat(stream.fileno())
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _MOST_KEPT:
+            raise OSError(f"{path} is no file that is kept")
+        return stream.read()
+
+
+def discard(path: Path) -> None:
+    """Remove a file, a link or a folder with all that it holds, as far as that is possible."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        shutil.rmtree(path, ignore_errors=True)
 
 
 @contextmanager
@@ -132,19 +158,11 @@ def staged(folder: Path, *, files: Sequence[str] = (), folders: Sequence[str] = 
 
 
 def _is_special(path: Path) -> bool:
-    """True for a device, a pipe or a socket: nothing that a rename should replace."""
+    """True for a device, a pipe or a socket, and for /dev/stdout and the like: nothing that a rename should
+    replace."""
+    if path.is_symlink() and f"{_through_links(path.parent)}/".startswith(_SYSTEM):
+        return True
     return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def _target(path: Path) -> Path:
-    """The file behind the links, in a folder that a link does not make up."""
-    target = _through_links(path)
-    if path.is_symlink() and not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"{path} is a link to {os.readlink(path)}, whose folder does not exist; make that folder or "
-            "choose another file"
-        )
-    return target
 
 
 def _through_links(path: Path) -> Path:

@@ -13,7 +13,6 @@ import hashlib
 import inspect
 import os
 import pickle
-import shutil
 import stat
 import sys
 import time
@@ -24,7 +23,7 @@ from typing import Any, Final
 
 from numba.core import compiler, serialize
 
-from ringbalance.scene.platform.files import cache_folder, write_whole
+from ringbalance.scene.platform.files import cache_folder, discard, read_kept, write_whole
 
 try:
     import fcntl
@@ -57,11 +56,9 @@ def code_root() -> Path:
 
 def checked_content(path: Path) -> bytes:
     """Content of a kept file without the checksum; OSError or ValueError when it cannot be used."""
-    if path.exists() and not path.is_file():
-        raise OSError(f"{path} is not a file")
     if _may_be_changed_by_others(path):
         raise PermissionError(f"{path} may have been written by another user")
-    data = path.read_bytes()
+    data = read_kept(path)
     if hashlib.sha256(data[_SIZE:]).digest() != data[:_SIZE]:
         raise ValueError(f"{path} is damaged")
     return data[_SIZE:]
@@ -74,14 +71,6 @@ def write_checked(path: Path, content: bytes) -> None:
     _make_private(path.parent)
     _remove_old()
     write_whole(path, hashlib.sha256(content).digest() + content, private=True)
-
-
-def discard(path: Path) -> None:
-    """Remove a file or a folder, as far as that is possible."""
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        shutil.rmtree(path, ignore_errors=True)
 
 
 @cache

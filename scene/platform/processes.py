@@ -6,14 +6,15 @@ import gc
 import logging
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
+from weakref import WeakSet
 
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.platform.memory import COLLECTED_AT
@@ -27,6 +28,8 @@ _WORKER_ENDED: Final = (
     "ringbalance: a worker process was ended by the system, probably for lack of memory; its work is done "
     "again in this process. Should that be ended too, close other programs and run again"
 )
+_BROKEN: Final[WeakSet[Executor]] = WeakSet()
+"""Executors of which it was said that the system ended a worker."""
 _ALONE: Final = "ringbalance: no further process can be used here (%s); one process does all the work"
 
 
@@ -40,7 +43,6 @@ class Workers(ProcessPoolExecutor):
         # When this process is killed, multiprocessing removes its semaphores, and need not say so.
         with _environment({"PYTHONWARNINGS": "ignore::UserWarning:multiprocessing.resource_tracker"}):
             super().__init__(count, mp_context=get_context("spawn"), initializer=_begin)
-        self._ended = False
 
     def submit(self, fn: Callable[_P, _R], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_R]:
         """Have a worker call a function of an importable module; without a worker left, BrokenProcessPool."""
@@ -60,13 +62,7 @@ class Workers(ProcessPoolExecutor):
         Args: `future`: of `submit`. `again`: does the same work here.
         Returns: The result; with a note on standard error where the work was done again.
         """
-        try:
-            return future.result()
-        except BrokenProcessPool:
-            if not self._ended:
-                self._ended = True
-                _LOG.warning(_WORKER_ENDED)
-        return again()
+        return _result(self, future, again)
 
     def taken(self, future: Future[_R], here: Callable[[], _R]) -> _R:
         """What a worker returns; what none has begun, this process does."""
@@ -82,6 +78,42 @@ class Workers(ProcessPoolExecutor):
         for process in started if error is None else started.union(active_children()):
             process.kill()
         self.shutdown(cancel_futures=True)
+
+
+def dealt(executor: Executor, calls: Sequence[Callable[[], _R]]) -> Iterator[tuple[int, _R]]:
+    """Places and answers of calls as they come; what a lost worker had to do is done again in this process.
+
+    Args: `executor`: any, its workers may be on other machines. `calls`: can be pickled.
+    """
+    places: dict[Future[_R], int] = {}
+    try:
+        for place, call in enumerate(calls):
+            places[_submitted(executor, call)] = place
+        for future in as_completed(list(places)):
+            yield places[future], _result(executor, future, calls[places[future]])
+    finally:
+        # Nobody wants the rest when the caller stops early.
+        for future in places:
+            future.cancel()
+
+
+def _submitted(executor: Executor, call: Callable[[], _R]) -> Future[_R]:
+    try:
+        return executor.submit(call)
+    except BrokenExecutor as error:
+        lost: Future[_R] = Future()
+        lost.set_exception(error)
+        return lost
+
+
+def _result(executor: Executor, future: Future[_R], again: Callable[[], _R]) -> _R:
+    try:
+        return future.result()
+    except BrokenExecutor:
+        if executor not in _BROKEN:
+            _BROKEN.add(executor)
+            _LOG.warning(_WORKER_ENDED)
+    return again()
 
 
 def checked_workers(workers: int) -> int:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -16,7 +21,7 @@ import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import MOST_DRAWS, judged
 from ringbalance.controller.judging.search import searched
-from ringbalance.design.races import threshold
+from ringbalance.design.races import deal, threshold
 from ringbalance.design.racing import _settings, near
 from ringbalance.design.space import Space
 from ringbalance.results.requirements import MET, OPEN, Proportion
@@ -65,6 +70,15 @@ def test_the_scene_as_designed_is_judged_alike(found: rb.Design) -> None:
     assert again.fraction == found.judgement.fraction
 
 
+def test_what_lost_workers_had_to_do_is_done_again() -> None:
+    lost: Future[Any] = Future()
+    lost.set_exception(BrokenProcessPool("ended"))
+    with ThreadPoolExecutor(1) as pool:
+        done = pool.submit(int, "7")
+    executor = Mock(submit=Mock(side_effect=[done, lost, BrokenProcessPool("ended before")]))
+    assert deal(executor, [partial(int, text) for text in ("7", "8", "9")]) == [7, 8, 9]
+
+
 def test_executors_make_no_difference(found: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
         other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
@@ -87,6 +101,42 @@ def test_a_rotor_without_unbalance_leaves_nothing_to_design() -> None:
     still = open_scene(rotor__initial_vibration={"amplitude": "0 um", "phase": "0 deg"})
     with pytest.raises(rb.SceneError, match=r"no unbalance that a disc could cancel.*initial_vibration"):
         rb.find_design(still, workers=1)
+
+
+def test_designs_that_are_refused_are_counted_with_the_most_frequent_reason() -> None:
+    """A valve slower than the controller's period (0.5 s), and one on whose way nothing is wrong."""
+    slow = {"name": "slow", "conductance": "0.3 l/(s*bar)", "critical_ratio": 0.3, "valve_lag": "2 s"}
+    sound = {**slow, "name": "sound", "valve_lag": "2 ms"}
+    none = rb.find_design(open_scene(design__valves=[slow]))
+    all_refused, refused = none.to_dict()["findings"]
+    assert (all_refused["code"], refused["code"]) == ("design_all_refused", "design_refused")
+    assert refused["values"].items() >= {"count": 3, "points": 3, "reasons": 1, "most": 3}.items()
+    assert "the valve has moved" in refused["values"]["text"]
+    weak = rb.find_design(open_scene((*WIDTHS[:2], "gas.pressure=0.01MPa"), design__valves=[slow, sound]))
+    flows, refused = weak.to_dict()["findings"]
+    assert (flows["code"], flows["values"]["allowed"]) == ("design_none_flows", 3)
+    assert refused["values"].items() >= {"count": 3, "points": 6, "reasons": 1, "most": 3}.items()
+
+
+def test_a_default_end_of_a_range_is_told_apart_from_a_given_one(found: rb.Design) -> None:
+    def edges(design: rb.Design, **point: float) -> dict[str, Any]:
+        at = {**design.point, **{key.replace("__", "."): value for key, value in point.items()}}
+        findings = replace(design, point=at).rows().findings
+        return {each.code: each.values for each in findings if each.code.startswith("design_edge")}
+
+    scene = open_scene((), design__axial_width="38 mm")
+    open_ended = replace(found, given=scene, space=Space.of(scene))
+    narrow = edges(open_ended, disc__axial_width=3.8e-3)
+    assert set(narrow) == {"design_edge_default"}
+    vary = narrow["design_edge_default"]["vary"]
+    assert vary == '["disc.axial_width=1.9 mm:38 mm:log"]'
+    # What it says to set is a range that goes on beyond that end.
+    wider = Space.of(open_scene(tuple(json.loads(vary)), design__axial_width="38 mm"))
+    assert wider.range_text("disc.axial_width") == "1.9 mm to 38 mm"
+    assert set(edges(replace(found, space=wider), disc__axial_width=1.9e-3)) == {"design_edge"}
+    assert set(edges(open_ended, disc__axial_width=38e-3)) == {"design_edge"}
+    (bore,) = edges(open_ended, tube__bore=3e-3, disc__axial_width=20e-3).values()
+    assert bore["vary"] == '["tube.bore=0.3 mm:6 mm:log"]'
 
 
 def test_all_listed_designs_that_can_work_count_as_raced(found: rb.Design) -> None:

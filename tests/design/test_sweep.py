@@ -5,11 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 import pickle
 import re
+import shutil
 from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -205,20 +208,29 @@ def test_a_sweep_over_a_wide_range_is_no_wrong_unit(paper_scene: Scene) -> None:
 
 
 class Lost(Executor):
-    """Workers that the system ends."""
+    """Workers that the system ends: at work, or before, as a pool that is broken already says at once."""
+
+    def __init__(self, *, before: bool = False) -> None:
+        self.before = before
 
     def submit(self, _function: Any, /, *_: Any, **_named: Any) -> Future[Any]:
         future: Future[Any] = Future()
+        if self.before:
+            raise BrokenProcessPool("ended before")
         future.set_exception(BrokenProcessPool("ended"))
         return future
 
 
-def test_any_executor_gives_the_same_table(paper_scene: Scene) -> None:
+def test_any_executor_gives_the_same_table(paper_scene: Scene, caplog: pytest.LogCaptureFixture) -> None:
     pressures = {"gas.pressure": np.linspace(0.4e6, 0.8e6, 5)}
     serial = rb.sweep(paper_scene, pressures, runs=2).to_csv()
     with ThreadPoolExecutor(2) as threads:
         assert rb.sweep(paper_scene, pressures, runs=2, executor=threads).to_csv() == serial
-    assert rb.sweep(paper_scene, pressures, runs=2, executor=Lost()).to_csv() == serial
+    for lost in (Lost(), Lost(before=True)):
+        caplog.clear()
+        assert rb.sweep(paper_scene, pressures, runs=2, executor=lost).to_csv() == serial
+        (note,) = caplog.messages
+        assert "its work is done again in this process" in note
 
 
 def test_kept_answers_are_found_by_content_and_damaged_ones_made_again(
@@ -244,6 +256,20 @@ def test_kept_answers_are_found_by_content_and_damaged_ones_made_again(
     assert Store(folder=tmp_path).get(entry.name) is None
     assert sweep() == first
     assert done[-1] == 12
+    for spoil in (
+        partial(entry.symlink_to, "/dev/zero"),
+        partial(os.mkfifo, entry),
+        partial((entry / "more").mkdir, parents=True),
+    ):
+        entry.unlink()
+        spoil()
+        assert sweep() == first
+        assert done[-1] == 12
+        assert entry.is_file()
+    shutil.rmtree(entry.parent)
+    entry.parent.touch()
+    assert sweep() == first
+    assert entry.is_file()
     sweep(intervals=False)
     assert done[-1] == 12
 

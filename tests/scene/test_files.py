@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -64,26 +63,33 @@ def test_named_files_are_moved_last(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert moved == ["b", "z", "evidence", "a_page"]
 
 
-def test_links_are_written_through(tmp_path: Path) -> None:
+def test_a_link_to_a_folder_is_followed_and_one_to_a_file_replaced(tmp_path: Path) -> None:
+    """By what moves many files to their folder, and by what writes one."""
     real = tmp_path / "real"
     real.mkdir()
     (tmp_path / "out").symlink_to(real)
     with staged(tmp_path / "out", folders=("figures",)) as stage:
         (stage / "figures").mkdir()
         (stage / "figures" / "one").touch()
-    (tmp_path / "law").symlink_to(real / "law.json")
-    write_whole(tmp_path / "law", "{}")
-    assert names(real) == {"figures/one", "law.json"}
-    assert (tmp_path / "law").is_symlink()
+        (stage / "page").write_text("page")
+        (real / "page").symlink_to(tmp_path / "other")
+    (tmp_path / "other").write_text("mine")
+    (real / "law.json").symlink_to(tmp_path / "other")
+    check_file(tmp_path / "out" / "law.json")
+    write_whole(tmp_path / "out" / "law.json", "{}")
+    assert names(real) == {"figures/one", "page", "law.json"}
+    assert not any(path.is_symlink() for path in real.iterdir())
+    assert (tmp_path / "other").read_text() == "mine"
 
 
-def test_a_link_into_a_folder_that_is_missing_is_refused(tmp_path: Path) -> None:
-    link = tmp_path / "link"
-    link.symlink_to(tmp_path / "missing" / "file")
-    for write in (check_file, partial(write_whole, data="1")):
-        with pytest.raises(FileNotFoundError, match="folder does not exist"):
-            write(link)
-    assert [path.name for path in tmp_path.iterdir()] == ["link"]
+@pytest.mark.skipif(not Path("/dev/stdout").is_symlink(), reason="no /dev/stdout that is a link")
+def test_standard_output_is_written_to(tmp_path: Path) -> None:
+    code = "import pathlib; from ringbalance.scene.platform.files import check_file, write_whole; "
+    code += "check_file(out := pathlib.Path('/dev/stdout')); write_whole(out, 'law')"
+    with open(tmp_path / "law", "wb") as stream:
+        subprocess.run([sys.executable, "-c", code], stdout=stream, check=True)
+    assert (tmp_path / "law").read_text() == "law"
+    assert Path("/dev/stdout").is_symlink()
 
 
 def test_a_file_that_the_system_cuts_off_is_named(tmp_path: Path) -> None:

@@ -9,11 +9,14 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
+from pathlib import Path
 
 import pytest
 
+from ringbalance.scene.platform.display import displayed
 from ringbalance.scene.platform.memory import seldom_collected
-from ringbalance.scene.platform.processes import Workers, beside
+from ringbalance.scene.platform.processes import Workers, beside, dealt
 
 
 def test_the_work_of_an_ended_worker_is_done_again(caplog: pytest.LogCaptureFixture) -> None:
@@ -27,6 +30,31 @@ def test_the_work_of_an_ended_worker_is_done_again(caplog: pytest.LogCaptureFixt
     (told,) = caplog.messages
     assert "lack of memory" in told
     assert "run again" in told
+
+
+@pytest.mark.parametrize("log", [False, True])
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_command_goes_on_without_its_worker_and_says_so_once(
+    quiet: bool, log: bool, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """On standard error, also beside a log; the same pool is asked again after its worker was ended."""
+    here = os.getpid()
+    file = tmp_path / "log" if log else None
+    with displayed(brief=False, quiet=quiet, log=file), Workers(1) as pool:
+        ended = [partial(_ended_unless, here), partial(_ended_unless, here)]
+        assert dict(dealt(pool, ended)) == {0: here, 1: here}
+        assert dict(dealt(pool, ended)) == {0: here, 1: here}
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.count("a worker process was ended by the system") == (not quiet)
+    assert file is None or file.read_text().count("WARNING ringbalance: a worker process") == 1
+
+
+def _ended_unless(process: int) -> int:
+    """End this process, unless it is another one."""
+    if os.getpid() != process:
+        signal.raise_signal(signal.SIGKILL)
+    return os.getpid()
 
 
 def test_without_semaphores_one_process_does_the_work(

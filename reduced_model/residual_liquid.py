@@ -110,10 +110,9 @@ class ResidualLiquid:
         rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
         change = min(_by_flow(scene, rate, width), 0.99)
         drawn = _residual_fills(scene, law, [1 - change, 1 + change])
-        stalled = [
-            stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure + side * head)
-            for side in (1, -1)
-        ]
+        gas = scene.gas
+        sides = gas.pressure + head, max(gas.pressure - head, -gas.ambient_pressure)
+        stalled = [stalled_fill_ratio(law=law, total=top, gas_pressure=side) for side in sides]
         low, high = np.minimum(np.maximum(drawn, stalled), top / 2)
         by_fill = (_pair_moment(law, top, low) - _pair_moment(law, top, high)) / 2
         ends = law.moment.half_width(np.array([self.least_fill_ratio, self.largest_fill_ratio]))

@@ -327,14 +327,17 @@ def _turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayL
     """Loss coefficient of one bend in turbulent flow, with the friction of its own arc in it.
 
     K = f phi r/d + (0.10 + 2.4 f) sin(phi/2) + 6.6 f (sqrt(sin(phi/2)) + sin(phi/2)) (d/r)^(4 phi/pi)
+    Beyond 180 degrees, where the sine would fall again, what stands beside the friction of the arc is that of
+    180 degrees times phi/180 deg.
     Args: `bend`: angle phi and centre-line radius r. `friction_factor`: f (Darcy) of the straight tube at the
         same Re, any shape.
     Range: turbulent flow in smooth tubes, phi up to 180 degrees, r/d of at least 0.5.
     Source: Rennels and Hudson, Pipe Flow (2012), as in `fluids.fittings.bend_rounded`, which takes no arrays.
     """
-    f, sine = np.asarray(friction_factor, dtype=np.float64), np.sin(bend.angle / 2)
-    tight = (bore / bend.radius) ** (4 * bend.angle / math.pi)
+    f, turned = np.asarray(friction_factor, dtype=np.float64), np.minimum(bend.angle, math.pi)
+    sine, tight = np.sin(turned / 2), (bore / bend.radius) ** (4 * turned / math.pi)
     turning = (0.10 + 2.4 * f) * sine + 6.6 * f * (np.sqrt(sine) + sine) * tight
+    turning = turning * bend.angle / turned
     return np.asarray(f * bend.angle * bend.radius / bore + turning, dtype=np.float64)
 
 

@@ -27,7 +27,7 @@ from ringbalance.reduced_model.tube.path import (
 from ringbalance.scene.arrays import FloatArray, clipped, plain
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.faults import SceneError
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.uncertain import independent_half_widths
@@ -80,7 +80,7 @@ class TubeHeads:
         """The heads of every design without uncertainties and on few knots.
 
         These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values.
-        Raises: ValueError: as `TubeHeads.of`. SceneError: the scene's `model_errors` make no loss.
+        Raises: ValueError: as `TubeHeads.of`. SceneError: a head that falls with the velocity.
         """
         log_u = _places(_NOMINAL_KNOTS)
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
@@ -103,7 +103,7 @@ class TubeHeads:
     def of(cls, scene: Scene) -> TubeHeads:
         """Tabulate the heads of a scene's tube, on as many knots as its tolerance asks for.
 
-        Raises: ValueError: arcs of bends longer than the tube.
+        Raises: ValueError: arcs of bends longer than the tube. SceneError: a head that falls.
         Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
         """
         place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
@@ -308,11 +308,18 @@ def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
     return np.asarray(root * np.minimum(u / at[0], 1.0) ** 0.125 * np.maximum(u / at[-1], 1.0) ** 0.25)
 
 
-def _inconsistent(scene: Scene) -> Exception:
-    """That the head falls where the velocity grows, by what the scene says of its models or by them alone."""
+def _inconsistent(scene: Scene) -> SceneError:
+    """That the head falls where the velocity grows, by what the scene says of its models or by them alone.
+
+    A bend's friction at rest belongs to its leg, and what rotation adds is spread along the path: where bends
+    are nearly the whole tube, rotation's share of a leg falls at the transition faster than its head grows.
+    """
     problem = "the tube's head does not grow with the velocity"
     if not scene.tube.model_errors:
-        return ValueError(f"{problem}: its loss terms are inconsistent")
+        reason = "the arcs of its bends take so much of its length that k falls too fast at the transition"
+        allowed = "a longer tube, or bends of smaller angle or radius"
+        text = f"{problem}: {reason}"
+        return SceneError([Fault(file=scene.file, table="tube", key="bends", problem=text, allowed=allowed)])
     fault = scene_fault(
         scene, "tube.model_errors", problem=f"with these corrections {problem}", allowed="smaller ones"
     )

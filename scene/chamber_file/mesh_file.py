@@ -63,20 +63,21 @@ def read_mesh_file(content: bytes, *, ending: str) -> Contents:
 
 def _by_meshio(content: bytes, read: Callable[[str], meshio.Mesh], allowed: str) -> meshio.Mesh:
     """Raises: MeshFileError: the file is no such mesh. Args: `allowed`: what is."""
-    with tempfile.TemporaryDirectory() as folder:
+    bound = _SPARE_MEMORY + _MEMORY_PER_BYTE * len(content)
+    quiet = redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO())
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), quiet[0], quiet[1]:
+        warnings.simplefilter("error", DeprecationWarning)
+        warnings.simplefilter("ignore", ResourceWarning)
         path = Path(folder) / "mesh"
         path.write_bytes(content)
-        try:
-            with warnings.catch_warnings(), redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-                warnings.simplefilter("error", DeprecationWarning)
-                warnings.simplefilter("ignore", ResourceWarning)
-                with bounded_memory(_SPARE_MEMORY + _MEMORY_PER_BYTE * len(content)):
-                    mesh = read(str(path))
-        except (Exception, SystemExit) as error:
-            # A damaged count asks for all memory that there is.
-            reason = " ".join(str(error).split())[:200]
-            problem = f"meshio cannot read it, it is damaged or cut off ({type(error).__name__} {reason}"
-            raise MeshFileError.of(f"{problem.rstrip()})", allowed) from error
+        with bounded_memory(bound):
+            try:
+                mesh = read(str(path))
+            except (Exception, SystemExit) as error:
+                # A damaged count asks for all memory that there is.
+                reason = " ".join(str(error).split())[:200]
+                problem = f"meshio cannot read it, it is damaged or cut off ({type(error).__name__} {reason}"
+                raise MeshFileError.of(f"{problem.rstrip()})", allowed) from error
     if mesh.points.ndim != 2 or mesh.points.shape[1] != 3:
         raise MeshFileError.of("its nodes do not have three coordinates each", allowed)
     return mesh

@@ -36,9 +36,10 @@ _STATM: Final = Path("/proc/self/statm")
 def bounded_memory(more: int) -> Iterator[None]:
     """Let a block take at most so many bytes of addresses more than there are: beyond, it has a MemoryError.
 
-    For code of others that reads a file and believes the counts in it.
+    For code of others that reads a file and believes the counts in it. No bound where the system does not
+    tell how many there are, as where /proc is not mounted.
     """
-    if sys.platform != "linux":
+    if sys.platform != "linux" or not _STATM.exists():
         yield
         return
     before = resource.getrlimit(resource.RLIMIT_AS)

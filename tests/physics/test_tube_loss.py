@@ -127,6 +127,16 @@ def test_a_turbulent_bend_is_the_librarys() -> None:
     assert float(width) == pytest.approx(0.25 * expected, rel=1e-3)
 
 
+@pytest.mark.parametrize("turns", [1.5, 2.0, 5.0])
+def test_a_turbulent_bend_beyond_half_a_turn_costs_in_proportion(turns: float) -> None:
+    """Two loops cost no less than one, and the sine of half the angle is never below zero."""
+    numbers = {"bore": 1.5e-3, "friction_factor": 0.02, "reynolds": 1e6}
+    half, _ = _bend(bend=Bend(angle=math.pi, radius=3e-3), **numbers)
+    more, width = _bend(bend=Bend(angle=turns * math.pi, radius=3e-3), **numbers)
+    assert more == pytest.approx(turns * half, rel=1e-6)
+    assert width == pytest.approx(0.25 * more, rel=1e-6)
+
+
 @pytest.mark.parametrize(("reynolds", "excess"), [(20, 0.18), (50, 0.55), (100, 0.94), (200, 1.14)])
 def test_a_laminar_bend_at_rest_is_that_of_the_three_dimensional_solution(
     reynolds: float, excess: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +12,10 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import PLANT, Dynamics
 from ringbalance.reduced_model.injection.limits import residual_fills, stalled_fills
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.models import Scene
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Bend, Scene
 
 # Blocked, stalls, draws gas first, draws gas at many fills.
 PRESSURES = 0.1e6, 0.45e6, 0.7e6, 2e6
@@ -33,3 +36,33 @@ def test_limits_of_plants_are_those_of_their_law(paper_scene: Scene) -> None:
     assert stalled[0] == total / 2
     drawn = [residual_fill_ratio(scene, law=model.flow) for scene in scenes]
     assert residual_fills(plants, Designs.stacked(scenes)) == pytest.approx(drawn, abs=1e-9)
+
+
+def test_bends_that_are_nearly_the_whole_tube_are_refused_by_their_key(paper_scene: Scene) -> None:
+    """Rotation is spread along the path, a bend's friction is not: a leg without arcs loses less at the
+    transition, and no velocity would belong to a head."""
+    d = 0.3114e-3
+    bends = [
+        Bend(angle=math.radians(a), radius=r * d) for a, r in ((31, 0.5), (123, 22), (162, 1), (166, 650))
+    ]
+    tube = replace(
+        paper_scene.tube,
+        bore=d,
+        bends=tuple(bends),
+        length=2147 * d,
+        port_radius=0.13,
+        hump_radius=0.1,
+        hump_position=0.25,
+        hump_shape="point",
+        roughness=0.0,
+    )
+    scene = replace(
+        paper_scene,
+        tube=tube,
+        liquid=replace(paper_scene.liquid, kinematic_viscosity=31e-6),
+        rotor=replace(paper_scene.rotor, speed=1446.0),
+    )
+    varied = replace(scene, rotor=replace(scene.rotor, speed=1440.0))
+    for heads in (lambda: TubeHeads.bare(scene), lambda: TubeHeads.nominal(Designs.stacked([scene, varied]))):
+        with pytest.raises(SceneError, match=r"\[tube\] bends: .* does not grow with the velocity"):
+            heads()

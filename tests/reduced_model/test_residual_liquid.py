@@ -157,3 +157,13 @@ def test_all_pairs_reach_the_nearest_side_of_their_polygon(chambers: int, share:
     carried = np.abs(np.cos(directions[:, None] - axes)).sum(axis=1)
     assert float(carried.min()) == pytest.approx(share, rel=1e-6)
     assert reach_share(chambers) == pytest.approx(share, rel=1e-12)
+
+
+def test_a_gas_pressure_below_the_uncertainty_of_the_wall_pressure_is_calibrated(
+    table_1_scene: Scene,
+) -> None:
+    """The lower side of its interval would be below a vacuum: the whole liquid stays at either side."""
+    scene = replace(table_1_scene, gas=replace(table_1_scene.gas, pressure=0.0))
+    found = calibrate(scene)
+    assert found.residual.usable_volume == 0
+    assert found.residual.model_uncertainty(scene, law=found.flow_law, head=2e5)[0] == 0

@@ -16,6 +16,7 @@ import pytest
 from drawn_chamber import drawn, inp, loaded, msh_2, msh_4, scene_text, vtu
 
 from ringbalance.scene import Scene, SceneError, load_scene
+from ringbalance.scene.platform import memory
 
 
 def _binary(folder: Path, version: str) -> bytes:
@@ -77,6 +78,23 @@ def test_a_damaged_count_does_not_take_all_memory(tmp_path: Path) -> None:
     content[at : at + 8] = struct.pack("<Q", 2**31)
     with pytest.raises(SceneError, match=r"it is damaged or cut off \(MemoryError"):
         loaded(tmp_path, bytes(content), file)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")
+def test_a_sound_mesh_is_read_where_the_system_does_not_tell_its_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A Linux without /proc."""
+    monkeypatch.setattr(memory, "_STATM", tmp_path / "statm")
+    assert isinstance(loaded(tmp_path, msh_4(drawn())), Scene)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux alone")
+def test_what_fails_beside_the_reader_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "statm").write_text("nothing\n", encoding="ascii")
+    monkeypatch.setattr(memory, "_STATM", tmp_path / "statm")
+    with pytest.raises(ValueError, match="nothing"):
+        loaded(tmp_path, msh_4(drawn()))
 
 
 def test_a_pipe_a_folder_and_no_file(tmp_path: Path) -> None:

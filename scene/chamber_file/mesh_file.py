@@ -11,7 +11,7 @@ import re
 import struct
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,9 +36,21 @@ from ringbalance.scene.platform.memory import bounded_memory
 
 FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 _GMSH: Final = (
-    "Gmsh 2.2 or 4.1 with cells of first or second order (Mesh.ElementOrder) and physical groups alone "
+    "Gmsh 2.2 or 4.1, not partitioned, with cells of first or second order (Mesh.ElementOrder) and physical groups alone "
     "(Mesh.SaveAll = 0, Mesh.SaveParametric = 0)"
 )
+_NO_GROUP: Final = "elements of it are in no physical group, as with Mesh.SaveAll = 1"
+_UNREAD_GMSH: Final = MappingProxyType(
+    {
+        r"\$MeshFormat\s+4(\.0)?\s": "it is of version 4.0 of Gmsh's format",
+        r"\$MeshFormat\s+(?!2|4)": "it is of another version of Gmsh's format",
+        r"\$PartitionedEntities": "it is partitioned",
+        r"\$ParametricNodes|parametric nodes": "its nodes have parametric coordinates",
+        r"Incompatible cell data": _NO_GROUP,
+    }
+)
+_GMSH_DATA: Final = re.compile(rb"(?ms)^\$(NodeData|ElementData|ElementNodeData)\s.*?\$End\1\s*")
+"""Results on the mesh, which meshio wants for every node."""
 _VTU: Final = "a .vtu file of an UnstructuredGrid, compressed by zlib, lzma or not at all"
 _FLUENT: Final = (b"(0", b"(1", b"(2")
 _MOST_UNPACKED: Final = 8 * 12 * MOST_NODES
@@ -61,8 +73,16 @@ def read_mesh_file(content: bytes, *, ending: str) -> Contents:
     return READERS[ending](content)
 
 
-def _by_meshio(content: bytes, read: Callable[[str], meshio.Mesh], allowed: str) -> meshio.Mesh:
-    """Raises: MeshFileError: the file is no such mesh. Args: `allowed`: what is."""
+def _by_meshio(
+    content: bytes,
+    read: Callable[[str], meshio.Mesh],
+    allowed: str,
+    unread: Mapping[str, str] = MappingProxyType({}),
+) -> meshio.Mesh:
+    """Raises: MeshFileError: the file is no such mesh.
+
+    Args: `allowed`: what is. `unread`: sentences about sound files, by what stands in them or in the error.
+    """
     bound = _SPARE_MEMORY + _MEMORY_PER_BYTE * len(content)
     quiet = redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO())
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), quiet[0], quiet[1]:
@@ -76,6 +96,9 @@ def _by_meshio(content: bytes, read: Callable[[str], meshio.Mesh], allowed: str)
             except (Exception, SystemExit) as error:
                 # A damaged count asks for all memory that there is.
                 reason = " ".join(str(error).split())[:200]
+                for pattern, text in unread.items():
+                    if re.search(pattern.encode(), content) or re.search(pattern, reason):
+                        raise MeshFileError.of(text, allowed) from error
                 problem = f"meshio cannot read it, it is damaged or cut off ({type(error).__name__} {reason}"
                 raise MeshFileError.of(f"{problem.rstrip()})", allowed) from error
     if mesh.points.ndim != 2 or mesh.points.shape[1] != 3:
@@ -83,7 +106,7 @@ def _by_meshio(content: bytes, read: Callable[[str], meshio.Mesh], allowed: str)
     return mesh
 
 
-def _contents(mesh: meshio.Mesh, marks: Iterator[Mark], others: tuple[str, ...]) -> Contents:
+def _contents(mesh: meshio.Mesh, marks: Iterable[Mark], others: tuple[str, ...]) -> Contents:
     blocks = tuple((block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells)
     points = np.asarray(mesh.points, dtype=np.float64)
     return Contents(points=points, blocks=blocks, marks=tuple(marks), other_names=others)
@@ -100,8 +123,11 @@ def _read_gmsh(content: bytes) -> Contents:
         if content.count(b"\n$" + section) + content.startswith(b"$" + section) > 1:
             problem = f"section ${section.decode()} stands in the file twice"
             raise MeshFileError.of(problem, "each section once")
-    mesh = _by_meshio(content, meshio.gmsh.read, _GMSH)
-    return _contents(mesh, _groups(mesh), tuple(mesh.field_data))
+    mesh = _by_meshio(_GMSH_DATA.sub(b"", content), meshio.gmsh.read, _GMSH, _UNREAD_GMSH)
+    marks = tuple(_groups(mesh))
+    if mesh.field_data and not any(mark.where.any() for mark in marks):
+        raise MeshFileError.of(_NO_GROUP, _GMSH)
+    return _contents(mesh, marks, tuple(mesh.field_data))
 
 
 def _groups(mesh: meshio.Mesh) -> Iterator[Mark]:
@@ -111,14 +137,20 @@ def _groups(mesh: meshio.Mesh) -> Iterator[Mark]:
     """
     for name, sets in mesh.cell_sets.items():
         for block, rows in enumerate(sets if not name.startswith("gmsh:") else ()):
-            yield Mark(name=name, block=block, where=_mask(rows, len(mesh.cells[block])))
+            yield Mark(name=_known(name), block=block, where=_mask(rows, len(mesh.cells[block])))
     names = {(int(of), int(number)): name for name, (number, of) in mesh.field_data.items()}
     for block, numbers in enumerate(mesh.cell_data.get("gmsh:physical", ())):
         of = dimension(mesh.cells[block].type)
         for number in np.unique(np.abs(numbers)).tolist():
             named = names.get((of, number), f"physical group {number}")
             if number and named not in mesh.cell_sets:
-                yield Mark(name=named, block=block, where=np.abs(numbers) == number)
+                yield Mark(name=_known(named), block=block, where=np.abs(numbers) == number)
+
+
+def _known(name: str) -> str:
+    """A name of a boundary or the volume, which a file may have in any case; other names as they are."""
+    lower = name.strip().lower()
+    return lower if lower in (*KNOWN_NAMES, VOLUME) else name
 
 
 def _mask(rows: object, count: int) -> BoolArray:
@@ -136,15 +168,16 @@ def _read_vtu(content: bytes) -> Contents:
     if _COMPRESSED.search(content):
         _refuse_bomb(content)
     mesh = _by_meshio(content, meshio.vtu.read, _VTU)
-    data = mesh.cell_data
-    if any(np.ndim(values) != 1 for name in data for values in data[name] if name in (*KNOWN_NAMES, VOLUME)):
+    data = [(_known(name), each) for name, each in mesh.cell_data.items()]
+    named = [(name, each) for name, each in data if name in (*KNOWN_NAMES, VOLUME)]
+    if any(np.ndim(values) != 1 for _, each in named for values in each):
         raise MeshFileError.of("data of cells that have a boundary's name must be one number for each cell")
     marks = (
         Mark(name=name, block=block, where=np.asarray(values) != 0)
-        for name in (*KNOWN_NAMES, VOLUME)
-        for block, values in enumerate(data.get(name, ()))
+        for name, each in named
+        for block, values in enumerate(each)
     )
-    return _contents(mesh, marks, tuple(data))
+    return _contents(mesh, marks, tuple(mesh.cell_data))
 
 
 def _refuse_bomb(content: bytes) -> None:
@@ -185,6 +218,7 @@ _KINDS: Final = (
     (r"T[23]D2|B[23]1", "line"),
     (r"T[23]D3|B[23]2", "line3"),
 )
+_EXPONENTS: Final = str.maketrans("dD", "ee")
 _NODES: Final = MappingProxyType({"line": 2, "line3": 3, **NODES})
 _ALLOWED: Final = "C3D4, C3D10, C3D8 or C3D20 for the chamber, S3, S4, S6 or S8 for its faces"
 _FACES: Final = MappingProxyType(
@@ -194,6 +228,25 @@ _FACES: Final = MappingProxyType(
     }
 )
 """Corners of the faces S1, S2, ... by their number."""
+_READ: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "node": ("nset", "system=r"),
+        "element": ("type", "elset"),
+        "elset": ("elset", "generate", "instance", "internal", "unsorted"),
+        "surface": ("name", "type=element", "type=node", "internal"),
+        "part": ("name",),
+        "end part": (),
+        "assembly": ("name",),
+        "end assembly": (),
+        "instance": ("name", "part"),
+        "end instance": (),
+    }
+)
+"""Keywords of a mesh with the options that may stand there, some with one value alone."""
+_PASSED: Final = re.compile(
+    r"heading|preprint|nset|material|density|elastic|(solid|shell|membrane|surface) section"
+)
+"""Keywords that leave the mesh as it is."""
 _SKIPPED: Final = re.compile(r"(surface|line|volume)\d+|_.*|", re.IGNORECASE)
 """Names that programs give by themselves."""
 
@@ -213,7 +266,7 @@ class _Parts:
 
 
 def _read_abaqus(content: bytes) -> Contents:
-    """The contents of an .inp file: nodes, elements, element sets and surfaces, no other keyword.
+    """The contents of an .inp file up to its first step: nodes, elements, element sets and surfaces.
 
     Own code: meshio passes over *SURFACE, keeps the last of several *NODE, *ELSET or *ELEMENT of one name,
     and gives the set of one *ELEMENT to another where some have none, all without a word.
@@ -223,7 +276,11 @@ def _read_abaqus(content: bytes) -> Contents:
     """
     parts = _Parts()
     for keyword, options, data in _keywords(content.decode("utf-8", errors="replace")):
-        _add(parts, keyword, options, data)
+        if keyword == "step":
+            break
+        if not _PASSED.fullmatch(keyword):
+            _refuse_unread(keyword, options)
+            _add(parts, keyword, options, data)
     if not parts.nodes or not parts.elements:
         raise MeshFileError.of(
             "this is not an Abaqus mesh: it has no *NODE or no *ELEMENT", "an Abaqus .inp file"
@@ -257,15 +314,29 @@ def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
     """Each keyword with its options and the lines of data under it; text before the first is none."""
     for block in re.split(r"(?m)^\*(?!\*)", re.sub(r"(?m)^\*\*.*$", "", text))[1:]:
         head, *data = (line for line in block.splitlines() if line.strip())
+        while head.rstrip().endswith(",") and data and data[0].lstrip()[0].isalpha():
+            head += data.pop(0)
         word, *rest = (part.strip() for part in head.split(","))
         pairs = (part.partition("=") for part in rest)
         options = {key.strip().lower(): value.strip().strip('"').lower() for key, _, value in pairs}
-        yield word.lower(), options, data
+        yield " ".join(word.lower().split()), {key: value for key, value in options.items() if key}, data
+
+
+def _refuse_unread(keyword: str, options: dict[str, str]) -> None:
+    """Raises: MeshFileError: a keyword or an option that might change the mesh, and that is not read."""
+    if keyword == "include":
+        raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
+    if keyword not in _READ:
+        names = ", ".join(f"*{name.upper()}" for name in _READ if " " not in name)
+        raise MeshFileError.of(f"it has *{keyword.upper()[:40]}, which is not read", names)
+    for key, value in options.items():
+        if not {key, f"{key}={value}"} & set(_READ[keyword]):
+            option = f"{key}={value}".rstrip("=").upper()[:40]
+            names = ", ".join(each.upper() for each in _READ[keyword]) or "none"
+            raise MeshFileError.of(f"*{keyword.upper()} has the option {option}, which is not read", names)
 
 
 def _add(parts: _Parts, keyword: str, options: dict[str, str], data: list[str]) -> None:
-    if keyword == "include":
-        raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
     if keyword == "instance" and data:
         raise MeshFileError.of(
             "*INSTANCE moves the part", "a part in its final place, or a mesh without parts"
@@ -286,15 +357,17 @@ def _add(parts: _Parts, keyword: str, options: dict[str, str], data: list[str]) 
 
 
 def _table(data: list[str], width: int, what: str) -> FloatArray:
+    """Numbers in rows; an exponent may be written with D, and a blank between commas is zero."""
+    text = "\n".join(data).translate(_EXPONENTS)
+    text = re.sub(r",(?=[ \t]*,)", ",0", text).replace(",", " ")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            values = np.fromstring(" ".join(data).replace(",", " "), dtype=np.float64, sep=" ")
+            values = np.fromstring(text, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError) as error:
-            problem = f"{what} holds something other than numbers: the file is damaged"
-            raise MeshFileError.of(problem) from error
+            raise MeshFileError.of(f"{what} holds something other than numbers") from error
     if not len(values) or len(values) % width:
-        raise MeshFileError.of(f"{what} does not have {width} numbers for each entry: the file is damaged")
+        raise MeshFileError.of(f"{what} does not have {width} numbers for each entry")
     return values.reshape(-1, width)
 
 
@@ -303,7 +376,7 @@ def _whole(values: FloatArray, what: str) -> IntArray:
     with np.errstate(invalid="ignore"):
         numbers = values.astype(np.int64)
     if not ((numbers == values) & (np.abs(values) < 2**53)).all():
-        raise MeshFileError.of(f"{what} has a fraction where a whole number belongs: the file is damaged")
+        raise MeshFileError.of(f"{what} has a fraction where a whole number belongs")
     return numbers
 
 

@@ -269,7 +269,7 @@ def _mirrored(kind: str) -> IntArray:
 
 def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tuple[Finding, ...]]:
     """Facets of a body by name, each as its cell has them, and what is wrong with the names."""
-    wrong = [*_volume_names(body), *_unknown(body), *_missing(body)]
+    wrong = [*_volume_names(body), *_missing(body)]
     sides = facets.outer[np.argsort(facets.keys[facets.outer], kind="stable")]
     held = np.zeros((len(KNOWN_NAMES), len(sides)), dtype=np.bool_)
     for each in body.named:
@@ -278,6 +278,7 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
         wrong += _other_middles(body, facets.nodes[sides[at[real]]], each, real)
         if each.name in KNOWN_NAMES:
             held[KNOWN_NAMES.index(each.name), at[real]] = True
+    wrong += _unknown(body, facets, sides, held)
     several = held.sum(axis=0) > 1
     if several.any():
         both = [KNOWN_NAMES[place] for place in np.flatnonzero(held[:, several][:, 0])]
@@ -297,24 +298,29 @@ def _places(body: Body, facets: Facets, named: NamedFacets, keys: IntArray) -> t
 
 
 def _volume_names(body: Body) -> Iterator[Finding]:
-    """All cells have the name of the volume, or none has a name."""
-    for name, cells in body.cell_names:
-        if name != VOLUME:
-            what = f"cells of the volume {toml_text(name)} are not the chamber{did_you_mean(name, [VOLUME])}"
-            allowed = f'the name "{VOLUME}", or no named volume'
-            yield from _about(body, what, body.corners[cells], allowed)
-    marks = [cells for name, cells in body.cell_names if name == VOLUME]
-    if marks and len(body.cell_names) == 1:
-        what = f'cells do not belong to the volume "{VOLUME}"'
-        yield from _about(body, what, body.corners[~marks[0]], f'every cell in "{VOLUME}"')
+    """All cells belong to the volume, or none has a name; a single group of cells is the volume."""
+    groups = dict(body.cell_names)
+    volume = next(iter(groups)) if len(groups) == 1 else VOLUME
+    inside = groups.get(volume, np.zeros(len(body.cells), dtype=np.bool_))
+    for name, cells in groups.items():
+        what = f"cells of the volume {toml_text(name)} are not the chamber{did_you_mean(name, [VOLUME])}"
+        allowed = f'the name "{VOLUME}", or one named volume'
+        if name != volume:
+            yield from _about(body, what, body.corners[cells & ~inside], allowed)
+    if len(groups) == 1:
+        what = f"cells do not belong to the volume {toml_text(volume)}"
+        yield from _about(body, what, body.corners[~inside], f"every cell in {toml_text(volume)}")
 
 
-def _unknown(body: Body) -> Iterator[Finding]:
+def _unknown(body: Body, facets: Facets, sides: IntArray, held: BoolArray) -> Iterator[Finding]:
+    """Facets of an unknown name that have no known one beside it. Args: `held`: as names times `sides`."""
     for each in body.named:
         if each.name not in KNOWN_NAMES:
+            at, real = _places(body, facets, each, facets.keys[sides])
+            alone = ~(real & held[:, at].any(axis=0))
             hint = did_you_mean(each.name, KNOWN_NAMES)
             what = f"facets have the unknown name {toml_text(each.name)}{hint}"
-            yield from _about(body, what, each.corners, ", ".join(KNOWN_NAMES))
+            yield from _about(body, what, each.corners[alone], ", ".join(KNOWN_NAMES))
 
 
 def _missing(body: Body) -> Iterator[Finding]:

@@ -61,7 +61,7 @@ def _start() -> None:
 
 def _name(face: _Entity) -> str:
     """The last part of a label such as "Shapes/Body/outer_wall", where it is a name of a boundary."""
-    label = str(gmsh.model.getEntityName(*face)).rsplit("/", 1)[-1].strip()
+    label = str(gmsh.model.getEntityName(*face)).rsplit("/", 1)[-1].strip().lower()
     return label if label in KNOWN_NAMES else ""
 
 

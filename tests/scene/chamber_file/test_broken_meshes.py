@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -218,6 +219,17 @@ def pinched(drawing: Drawing) -> Drawing:
     return without(drawing, *(number for number in cells if number not in keep))
 
 
+def in_no_group(drawing: Drawing) -> None:
+    for each in drawing.elements.values():
+        each.group = 0
+
+
+def other_volume(drawing: Drawing) -> None:
+    """One cell in a second group of cells."""
+    drawing.names[3, 8] = "chambre"
+    drawing.elements[drawing.cells()[0]].group = 8
+
+
 def in_part(drawing: Drawing) -> None:
     drawing.elements[drawing.cells()[0]].group = 0
 
@@ -286,7 +298,7 @@ MESHES: dict[str, Broken] = {
         spoilt(lambda d: d.names.pop((2, 5))), ('unknown name "physical group 5" (12): at (',)
     ),
     "volume of another name": Broken(
-        spoilt(lambda d: named(d, "chamber", "chambre")), ('"chambre" are not the chamber (did you mean',)
+        spoilt(other_volume), ('"chambre" are not the chamber (did you mean "chamber"?) (1): at (',)
     ),
     "cells without the name": Broken(spoilt(in_part), ('do not belong to the volume "chamber" (1): at (',)),
     "line named": Broken(spoilt(lines_only), ('"outer_wall" names lines or points, not facets',)),
@@ -326,6 +338,17 @@ MESHES: dict[str, Broken] = {
 }
 
 
+def spoilt_4(change: Callable[[Drawing], object]) -> Callable[[], bytes]:
+    """As `spoilt`, in version 4.1."""
+
+    def content() -> bytes:
+        drawing = drawn()
+        change(drawing)
+        return msh_4(drawing)
+
+    return content
+
+
 def text(old: str, new: str) -> Callable[[], bytes]:
     """A file of version 4.1 with some text replaced."""
     return lambda: msh_4(drawn()).replace(old.encode(), new.encode(), 1)
@@ -338,7 +361,29 @@ FILES: dict[str, Broken] = {
     "another format": Broken(lambda: b"solid\n", ("ends with .stl",), "chamber.stl"),
     "no mesh at all": Broken(lambda: b"hello\n", ("not a Gmsh mesh",)),
     "ansys": Broken(lambda: b'(0 "ANSYS")\n(2 3)\n', ("ANSYS Fluent",)),
-    "old version": Broken(text("4.1 0 8", "1 0 8"), (UNREAD, "allowed: Gmsh 2.2 or 4.1")),
+    "old version": Broken(text("4.1 0 8", "1 0 8"), ("it is of another version", "allowed: Gmsh 2.2 or 4.1")),
+    "version 4.0": Broken(
+        lambda: re.sub(rb"(s\n\d+ \d+) 1 \d+", rb"\1", msh_4(drawn()).replace(b"4.1 0 8", b"4 0 8")),
+        ("it is of version 4.0 of Gmsh's format",),
+    ),
+    "partitioned": Broken(
+        lambda: (
+            msh_4(drawn()).replace(b"3 7 4 72", b"3 9 4 72")
+            + b"$PartitionedEntities\n$EndPartitionedEntities\n"
+        ),
+        ("it is partitioned",),
+    ),
+    "parametric 4.1": Broken(text("3 7 0 ", "3 7 1 "), ("its nodes have parametric coordinates",)),
+    "parametric 2.2": Broken(
+        lambda: msh_2(drawn()).replace(b"Nodes", b"ParametricNodes"),
+        ("its nodes have parametric coordinates",),
+    ),
+    "all saved 4.1": Broken(
+        spoilt_4(lambda d: add(d, "line", [1, 2], 0)), ("elements of it are in no physical group",)
+    ),
+    "all saved 2.2": Broken(
+        spoilt(in_no_group), ("elements of it are in no physical group, as with Mesh.SaveAll = 1",)
+    ),
     "no nodes": Broken(text("$Nodes", "$Knots"), (UNREAD,)),
     "no elements": Broken(
         lambda: msh_4(drawn()).replace(b"$Elements", b"$Others").replace(b"$EndElements", b"$EndOthers"),
@@ -361,6 +406,34 @@ FILES: dict[str, Broken] = {
     "abaqus moved part": Broken(
         lambda: inp(drawn()) + b"*INSTANCE, NAME=a, PART=b\n1., 0., 0.\n", ("*INSTANCE moves",), "chamber.inp"
     ),
+    "abaqus cylindrical": Broken(
+        lambda: inp(drawn()).replace(b"*NODE\n", b"*Node, Nset=all, System=c\n", 1),
+        ("*NODE has the option SYSTEM=C, which is not read",),
+        "chamber.inp",
+    ),
+    "abaqus continued": Broken(
+        lambda: inp(drawn()).replace(b"*NODE\n", b"*NODE, NSET=all,\n SYSTEM=C\n", 1),
+        ("*NODE has the option SYSTEM=C, which is not read",),
+        "chamber.inp",
+    ),
+    **{
+        f"abaqus {word}": Broken(
+            lambda word=word: f"*{word}\n0., 0., 0., 1.\n".encode() + inp(drawn()),  # type: ignore[misc]
+            (f"it has *{word}, which is not read",),
+            "chamber.inp",
+        )
+        for word in (
+            "SYSTEM",
+            "NCOPY",
+            "NGEN",
+            "NFILL",
+            "NMAP",
+            "ELGEN",
+            "ELCOPY",
+            "TRANSFORM",
+            "UNKNOWN WORD",
+        )
+    },
     "abaqus half a node": Broken(
         lambda: inp(drawn()).replace(b"*NODE\n", b"*NODE\n1, 2\n", 1),
         ("*NODE does not have 4",),

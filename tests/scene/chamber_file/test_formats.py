@@ -10,7 +10,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from drawn_chamber import NAMES, Drawing, drawn, inp, loaded, msh_2, msh_4, vtu
+from drawn_chamber import CHAMBER, NAMES, Drawing, drawn, inp, loaded, msh_2, msh_4, vtu
 from vtkmodules import vtkCommonDataModel
 
 from ringbalance.scene import Scene
@@ -162,6 +162,63 @@ def test_a_surface_of_abaqus(tmp_path: Path) -> None:
     assert sorted(map(sorted, found.boundaries["outer_wall"].tolist())) == sorted(
         map(sorted, own.boundaries["outer_wall"].tolist())
     )
+
+
+def in_capitals(drawing: Drawing) -> Drawing:
+    drawing.names = {key: name.replace("_wall", "_Wall").title() for key, name in drawing.names.items()}
+    return drawing
+
+
+def renamed(drawing: Drawing, name: str) -> Drawing:
+    drawing.names[3, CHAMBER] = name
+    return drawing
+
+
+def with_foreign_name(drawing: Drawing) -> Drawing:
+    drawing.names[2, 40] = "heat_flux"
+    return drawing
+
+
+NODE_DATA = b'$NodeData\n1\n"p"\n1\n0.0\n3\n0\n1\n1\n1 2.5\n$EndNodeData\n'
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda: msh_2(in_capitals(drawn())),
+        lambda: msh_4(in_capitals(drawn())),
+        lambda: msh_2(renamed(drawn(), "my fluid")),
+        lambda: msh_4(renamed(drawn(), "all")),
+        lambda: msh_4(with_foreign_name(drawn()), more={2: [40]}),
+        lambda: msh_2(drawn()) + NODE_DATA,
+        lambda: msh_4(drawn()) + NODE_DATA,
+    ],
+    ids=["capitals 2.2", "capitals 4.1", "fluid", "all", "second name", "data 2.2", "data 4.1"],
+)
+def test_names_and_data_of_other_programs_do_not_matter(write: Callable[[], bytes], tmp_path: Path) -> None:
+    """One group of cells is the chamber, whatever its name; names in any case; results on the nodes."""
+    found, own = (geometry_of(loaded(tmp_path, each())) for each in (write, lambda: msh_2(drawn())))
+    assert found.points == pytest.approx(own.points)
+    assert {name: len(each) for name, each in found.boundaries.items()} == {
+        name: len(each) for name, each in own.boundaries.items()
+    }
+
+
+def test_an_abaqus_file_as_other_programs_write_it(tmp_path: Path) -> None:
+    """A keyword goes on after a comma, exponents have a D, a blank is zero; sections and steps are passed."""
+    drawing = drawn("hexahedron")
+    drawing.points = {n: (x, y, 0.0 if z == 0 else z) for n, (x, y, z) in drawing.points.items()}
+    own = geometry_of(loaded(tmp_path, inp(drawing), "chamber.inp"))
+    lines = inp(drawing).decode().replace("*ELEMENT, TYPE", "*Element,\n type").splitlines()
+    start = lines.index("*NODE") + 1
+    nodes = [each.split(", ") for each in lines[start : start + len(drawing.points)]]
+    rows = [[n, f"{float(x) * 1e3:.12f}D-3", y, "" if float(z) == 0 else z] for n, x, y, z in nodes]
+    assert any(not row[3] for row in rows)
+    lines[start : start + len(rows)] = [", ".join((*row, "")) for row in rows]
+    more = "*SOLID SECTION, ELSET=chamber, MATERIAL=water\n*MATERIAL, NAME=water\n*STEP\n*CLOAD\n1, 2, 3.\n"
+    found = geometry_of(loaded(tmp_path, ("\n".join(lines) + "\n" + more).encode(), "chamber.inp"))
+    assert found.points == pytest.approx(own.points, abs=1e-12)
+    assert set(found.boundaries) == set(own.boundaries)
 
 
 def test_facets_without_a_name_are_walls(tmp_path: Path) -> None:

@@ -36,8 +36,8 @@ from ringbalance.scene.platform.memory import bounded_memory
 
 FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 _GMSH: Final = (
-    "Gmsh 2.2 or 4.1, not partitioned, with cells of first or second order (Mesh.ElementOrder) and physical groups alone "
-    "(Mesh.SaveAll = 0, Mesh.SaveParametric = 0)"
+    "Gmsh 2.2 or 4.1, not partitioned, with cells of first or second order (Mesh.ElementOrder) and "
+    "physical groups alone (Mesh.SaveAll = 0, Mesh.SaveParametric = 0)"
 )
 _NO_GROUP: Final = "elements of it are in no physical group, as with Mesh.SaveAll = 1"
 _UNREAD_GMSH: Final = MappingProxyType(

@@ -110,7 +110,7 @@ def observations_of(
     if wrong:
         return None, tuple(wrong)
     # Amplitudes as the file's convention has them become zero to peak.
-    factor = AMPLITUDES[str(table.header.get(_AMPLITUDE, "zero_to_peak"))]
+    factor = AMPLITUDES[str(table.header.get(_AMPLITUDE, "zero_to_peak")).lower()]
     letters = table.texts("chamber") if kind.has_chamber else ("",) * len(table.rows)
     used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
     return Observations(
@@ -154,7 +154,7 @@ def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
     if not str(table.header.get("source", "-")).strip():
         yield data_fault(table.file, "source", "it is empty", allowed="rig, run and date")
     stated = table.header.get(_AMPLITUDE)
-    if kind.has_amplitudes and not (isinstance(stated, str) and stated in AMPLITUDES):
+    if kind.has_amplitudes and not (isinstance(stated, str) and stated.lower() in AMPLITUDES):
         allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
         problem = "the first lines must say how amplitudes are counted"
         value = "missing" if stated is None else toml_text(stated)

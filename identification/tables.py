@@ -162,7 +162,7 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table |
         return None, faults
     separator = _separator(data[0][1])
     try:
-        heads = _without_empty_end(_cells(data[0][1], separator))
+        heads = tuple(map(_lower_name, _without_empty_end(_cells(data[0][1], separator))))
     except csv.Error as error:
         return None, (*faults, _cell_fault(head_at, error, file))
     rows, bad_rows = _rows(data[1:], len(heads), separator, file)
@@ -257,6 +257,12 @@ def _rows(
 def in_order(faults: Iterable[Fault]) -> list[Fault]:
     """Errors of one file in the order of its lines, those of the whole file first."""
     return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
+
+
+def _lower_name(head: str) -> str:
+    """A head whose name may have capitals, as spreadsheets make them; capitals of a unit have a meaning."""
+    name, bracket, unit = head.partition("[")
+    return name.lower() + bracket + unit
 
 
 def split_head(head: str) -> tuple[str, str] | None:

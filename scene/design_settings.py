@@ -7,8 +7,8 @@ from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, 
 from ringbalance.scene.keys.fields import (
     POSITIVE,
     OneLine,
+    PositiveGaugePressure,
     PositiveLength,
-    PositivePressure,
     ProperFraction,
     Time,
     each_of,
@@ -42,7 +42,7 @@ class DesignSettings:
         Shown("largest axial width", "mm"),
     ] = None
     pressure: Annotated[
-        PositivePressure | None,
+        PositiveGaugePressure | None,
         unused(
             "the gas keeps its pressure", "highest gauge pressure that is available, for `design` and `tune`"
         ),

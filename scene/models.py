@@ -26,13 +26,14 @@ from ringbalance.scene.keys.derivations import angle_of_chambers, even_number_of
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
+    AbsolutePressure,
     FillRatio,
+    GaugePressure,
     Length,
     OneLine,
+    PositiveAbsolutePressure,
     PositiveAngle,
     PositiveLength,
-    PositivePressure,
-    Pressure,
     ProperFraction,
     Temperature,
     Time,
@@ -175,7 +176,7 @@ class Liquid:
         Shown("kinematic viscosity", "mm^2/s"),
     ]
     vapour_pressure: Annotated[
-        Pressure,
+        AbsolutePressure,
         derived("that of the known liquid; 0 Pa for a custom one", "absolute"),
         UNKNOWN,
         Shown("vapour pressure", "kPa", note="absolute"),
@@ -306,7 +307,7 @@ class Gas:
     """The driving gas; None marks a term that the scene does not ask for."""
 
     pressure: Annotated[
-        Pressure,
+        GaugePressure,
         needed("gauge pressure in the driven chamber while its valve is open"),
         UNCERTAIN,
         Shown("gas pressure", "MPa", note="gauge"),
@@ -326,7 +327,7 @@ class Gas:
         Shown("gas inlet radius", "mm"),
     ] = None
     ambient_pressure: Annotated[
-        PositivePressure,
+        PositiveAbsolutePressure,
         standard("101.325 kPa", "absolute pressure of the surroundings"),
         UNCERTAIN,
         Shown("ambient pressure", "kPa", note="absolute"),

@@ -17,7 +17,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.faults import meant_text
 from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.toml import toml_text
 
@@ -103,6 +103,10 @@ _NUMBER = re.compile(
 )
 _NOT_FINITE = re.compile(r"\s*[+-]?(nan|inf)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]")
+_THOUSANDS = re.compile(r"\s*([+-]?[1-9][0-9]{0,2}(?:[ ,'_’][0-9]{3})+)(\.[0-9]+)?(?![0-9.,])")
+_NORMAL_LITRES = re.compile(r"[Nn](l|L|dm\^3|m\^3)/.*")
+_COUNTED = re.compile(r"(.*[a-z])[ *]?\(?([gGaA])(?:auge|bs|bsolute)?\)?", re.DOTALL)
+"""A unit of pressure, and whether it is over the ambient pressure or absolute, as in barg and bar(a)."""
 _DYNAMIC_VISCOSITIES = ("Pa*s", "mPa*s", "cP", "P")
 _SPELLINGS = MappingProxyType(
     {
@@ -257,7 +261,7 @@ def _split(text: object, kind: _Dimension) -> tuple[str, str]:
         raise FieldError(f"it is longer than {_LONGEST_TEXT} characters", _allowed(kind))
     spelled = _respelled(text)
     match = _NUMBER.fullmatch(spelled)
-    if match is None:
+    if match is None or _THOUSANDS.match(spelled):
         raise FieldError(_not_a_number(spelled), _allowed(kind))
     return match[1], match[2]
 
@@ -265,6 +269,11 @@ def _split(text: object, kind: _Dimension) -> tuple[str, str]:
 def _not_a_number(text: str) -> str:
     if _NOT_FINITE.match(text):
         return "it is not a finite number"
+    if thousands := _THOUSANDS.match(text):
+        joined = re.sub(r"[ ,'_’]", "", thousands[1]) + (thousands[2] or "")
+        single = re.fullmatch(r"[^,]*,[0-9]+", thousands[0].strip())
+        decimal = f" or, if the comma is a decimal one, {thousands[1].replace(',', '.')}" if single else ""
+        return f"its digits are parted: write {joined}{decimal}"
     if _DECIMAL_COMMA.match(text):
         return "it has a decimal comma; write a point"
     return "it is not a number followed by a unit"
@@ -322,7 +331,32 @@ def _wrong_unit(unit_text: str, kind: _Dimension) -> str:
     for other in DIMENSIONS.values():
         if unit in other.units:
             return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}'
-    return f"{toml_text(unit)} is not a unit of {kind.noun}{did_you_mean(unit, kind.units)}"
+    problem = f"{toml_text(unit)} is not a unit of {kind.noun}"
+    if kind is DIMENSIONS["conductance"] and (normal := _NORMAL_LITRES.fullmatch(unit)):
+        return f"{problem}: it counts gas at 0 degC and 101.325 kPa; 1 N{normal[1]} is 1.087 {normal[1]} ANR"
+    # A letter more or less is another unit: no hint but to what is spelled alike.
+    alike = (each for each in kind.units if _letters(each) == _letters(unit))
+    return f"{problem}{meant_text(next(alike, ''))}"
+
+
+def _letters(unit: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", unit.lower())
+
+
+def counted_pressure(value: object, *, gauge: bool) -> object:
+    """A pressure without the mark of its unit, such as barg or psia, that says how it is counted.
+
+    Raises: FieldError: counted in the other way.
+    """
+    match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+    marked = _COUNTED.fullmatch(match[2]) if match else None
+    if not match or not marked or marked[1] not in DIMENSIONS["pressure"].units:
+        return value
+    if (marked[2] in "gG") != gauge:
+        ways = ("absolute", "over the ambient pressure")
+        problem = f"{toml_text(match[2])} is {ways[not gauge]}, and this pressure is {ways[gauge]}"
+        raise FieldError(problem, "the same pressure with the ambient pressure taken off or added")
+    return f"{match[1]} {marked[1]}"
 
 
 NO_UNIT: Final = "dimensionless"

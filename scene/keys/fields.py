@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, get_args
 
 from ringbalance.scene.faults import did_you_mean
-from ringbalance.scene.units import DIMENSIONS, FieldError, parse_quantity
+from ringbalance.scene.units import DIMENSIONS, FieldError, counted_pressure, parse_quantity
 
 _LARGEST_NUMBER = 1e9
 _LONGEST_NAME = 200
@@ -90,6 +90,12 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
         return number
 
     return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
+
+
+def _pressure(bounds: Bounds, *, gauge: bool) -> Reader:
+    """Reader of a gauge or an absolute pressure, in whose unit that may be marked: "7 barg", "1 bara"."""
+    plain = quantity("pressure", bounds)
+    return replace(plain, read=lambda value: plain.read(counted_pressure(value, gauge=gauge)))
 
 
 def _balance_grade() -> Reader:
@@ -319,11 +325,13 @@ Angle = Annotated[float, quantity("angle", NOT_NEGATIVE)]
 Turn = Annotated[float, angle_of_turn()]
 PositiveTime = Annotated[float, quantity("time", POSITIVE)]
 Time = Annotated[float, quantity("time", NOT_NEGATIVE)]
-Pressure = Annotated[float, quantity("pressure", NOT_NEGATIVE)]
+GaugePressure = Annotated[float, _pressure(NOT_NEGATIVE, gauge=True)]
+AbsolutePressure = Annotated[float, _pressure(NOT_NEGATIVE, gauge=False)]
 TimePerChamber = Annotated[
     tuple[float, ...], _one_or_each(quantity("time", NOT_NEGATIVE), example='["50 ms", "30 ms"]')
 ]
-PositivePressure = Annotated[float, quantity("pressure", POSITIVE)]
+PositiveGaugePressure = Annotated[float, _pressure(POSITIVE, gauge=True)]
+PositiveAbsolutePressure = Annotated[float, _pressure(POSITIVE, gauge=False)]
 Temperature = Annotated[float, quantity("temperature")]
 Influence = Annotated[float, quantity("influence_coefficient", POSITIVE)]
 PositiveMass = Annotated[float, quantity("mass", POSITIVE)]

@@ -58,11 +58,11 @@ def _needed_by_others(reading: Reading) -> Iterator[Fault]:
         yield reading.missing("tube.length", "k cannot be calculated without it")
     if reading.values.get("tube.entrance") == "rounded" and reading.lacks("tube.entrance_radius"):
         yield reading.missing("tube.entrance_radius", "a rounded entrance needs its radius")
-    if reading.known("requirement.grade") and reading.lacks("rotor.mass"):
+    if not reading.lacks("requirement.grade") and reading.lacks("rotor.mass"):
         yield reading.missing("rotor.mass", "requirement.grade asks for nothing without it")
     pair = ("gas.conductance", "gas.critical_ratio")
     for present, absent in (pair, pair[::-1]):
-        if reading.known(present) and reading.lacks(absent):
+        if not reading.lacks(present) and reading.lacks(absent):
             yield reading.missing(absent, f"{present.split('.')[1]} has no meaning without it")
 
 

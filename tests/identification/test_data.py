@@ -128,6 +128,19 @@ def test_what_a_spreadsheet_does_to_a_file_is_undone(
     np.testing.assert_array_equal(second.lines, first.lines + 1)
 
 
+def test_capitals_of_a_table_s_words_do_not_matter(
+    sound_files: Mapping[str, str], paper_scene: Scene
+) -> None:
+    """A spreadsheet begins a head with one, and RMS is written so."""
+    plain = sound_files["trial_weight"].replace('"zero_to_peak"', '"rms"')
+    spelled = (
+        plain.replace('"rms"', '"RMS"').replace("amplitude [", "Amplitude [").replace("angle [", "ANGLE [")
+    )
+    assert spelled != plain.replace('"rms"', '"RMS"')
+    found, own = read(spelled, paper_scene), read(plain, paper_scene)
+    np.testing.assert_array_equal(found.columns["amplitude"], own.columns["amplitude"])
+
+
 @pytest.mark.parametrize("written", ["[µm]", "[μm]", "[um]", " [um]"])
 def test_both_characters_for_micro_and_the_degree_sign_are_known(
     written: str, sound_files: Mapping[str, str], paper_scene: Scene

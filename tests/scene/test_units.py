@@ -10,6 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.scene.describe import setting_text
+from ringbalance.scene.keys.declaration import keys_of
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.models import Gas
 from ringbalance.scene.units import DIMENSIONS, FieldError, format_quantity, parse_quantity
 
 EVERY_UNIT = [(dimension, unit) for dimension, kind in DIMENSIONS.items() for unit in kind.units]
@@ -108,7 +111,12 @@ def test_no_unit_serves_two_dimensions() -> None:
         ("mm", "length", "not a number followed by a unit"),
         ("1.2.3 mm", "length", "not a number followed by a unit"),
         ("44,5 mm", "length", "decimal comma"),
-        ("1_000 mm", "length", "is not a unit of length"),
+        ("1_000 mm", "length", "its digits are parted: write 1000"),
+        ("10,000 rpm", "speed", "parted: write 10000 or, if the comma is a decimal one, 10.000"),
+        ("10 000 rpm", "speed", "its digits are parted: write 10000"),
+        ("10,000.5 rpm", "speed", "its digits are parted: write 10000.5"),
+        ("1,234,567 rpm", "speed", "its digits are parted: write 1234567"),
+        ("130 Nl/(min*bar)", "conductance", "101.325 kPa; 1 Nl is 1.087 l ANR"),
         ("nan mm", "length", "not a finite number"),
         ("-inf mm", "length", "not a finite number"),
         ("1e400 mm", "length", "magnitude is above 1000 m"),
@@ -134,6 +142,33 @@ def test_refused(value: object, dimension: str, problem: str) -> None:
     assert caught.value.problem.isprintable()
     names = DIMENSIONS[dimension].units
     assert "absolute zero" in problem or all(name in caught.value.allowed for name in names)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension"),
+    [("5 krpm", "speed"), ("3 grad", "angle"), ("3 Sl/(s*bar)", "conductance"), ("7 barx", "pressure")],
+)
+def test_no_unit_of_another_size_is_suggested(text: str, dimension: str) -> None:
+    with pytest.raises(FieldError) as caught:
+        parse_quantity(text, dimension)
+    assert "did you mean" not in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "pressure"),
+    [
+        ("pressure", "7 barg", 7e5),
+        ("pressure", "0.7 MPa(g)", 7e5),
+        ("pressure", "101 psig", 101 * 6894.757293168361),
+        ("pressure", "7 bar", 7e5),
+        ("ambient_pressure", "1 bara", 1e5),
+        ("ambient_pressure", "100 kPa abs", 1e5),
+    ],
+)
+def test_a_unit_may_say_how_its_pressure_is_counted(key: str, text: str, pressure: float) -> None:
+    reader = keys_of(Gas)[key].takes
+    assert isinstance(reader, Reader)
+    assert reader.read(text) == pytest.approx(pressure)
 
 
 @given(st.text(max_size=70))

@@ -26,7 +26,6 @@ from ringbalance.results.result import Rows, Table, models_table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.keys.derivations import permissible_unbalance
-from ringbalance.scene.models import Scene
 
 
 def simulation_document(simulation: Simulation) -> dict[str, Any]:
@@ -303,14 +302,13 @@ def command_document(nominal: Simulation) -> dict[str, Any]:
 
 _DEVIATIONS: Final = 3.0
 _HOUR: Final = 3600.0
-_HALVINGS: Final = 30
 
 
 def conventions(run: Simulation) -> tuple[Quantity, ...]:
     """Unbalances and vibrations of the run as ISO 21940 and ISO 20816 name them, the loop's peak sensitivity,
     gas used, and down to which speed the correction lasts without gas.
     """
-    return (*_unbalances(run), *_vibrations(run), *_loop(run), *_gas(run), _lasting(run))
+    return (*_unbalances(run), *_vibrations(run), *_loop(run), *_gas(run), *_lasting(run))
 
 
 def _unbalances(run: Simulation) -> Iterator[Quantity]:
@@ -386,35 +384,20 @@ def _per_hour(run: Simulation) -> float | None:
     return used.normal_volume / (end - since) * _HOUR
 
 
-def _lasting(run: Simulation) -> Quantity:
-    """Speed down to which the fullest chamber keeps its liquid with the gas off, by hydrostatics."""
-    name = "correction lasts without gas down to"
-    fill = max(float(each[-1]) for each in run.fill_ratio.values())
-    speed = _lasting_speed(run.scene, fill)
-    if speed is None:
-        finding = Holding.of(run.scene, fill_ratio=fill).finding
-        return _row("lasting_speed", name, None, "rad/s", status=finding.code if finding else "ok")
-    return _row("lasting_speed", name, speed, "rad/s")
+def _lasting(run: Simulation) -> Iterator[Quantity]:
+    """Speeds down to which the fullest chamber keeps its liquid with the gas off, by hydrostatics: whatever
+    the pressure of a cavity over the crest, and under the one that runs take.
 
-
-def _lasting_speed(scene: Scene, fill_ratio: float) -> float | None:
-    """Lowest speed at which a full tube parts over the crest before it drains a chamber of a fill, rad/s, the
-    gas off; None where it does not part at the scene's.
-
-    Restarts find what the run-down has left: below this speed opposite chambers level out.
+    Restarts find what the run-down has left: below, opposite chambers level out.
     """
-
-    def holds(speed: float) -> bool:
-        slower = replace(scene, rotor=replace(scene.rotor, speed=speed))
-        return Holding.of(slower, fill_ratio=fill_ratio).holds
-
-    low, high = 0.0, scene.rotor.speed
-    if not holds(high):
-        return None
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return high
+    fill = max(float(each[-1]) for each in run.fill_ratio.values())
+    held = Holding.of(run.scene, fill_ratio=fill)
+    status = "ok" if held.finding is None else held.finding.code
+    for key, name, speed in (
+        ("lasting_speed", "correction lasts without gas, sure down to", held.sure_speed),
+        ("likely_lasting_speed", "correction lasts without gas, perhaps down to", held.likely_speed),
+    ):
+        yield _row(key, name, speed, "rad/s", status="ok" if speed is not None else status)
 
 
 def _row(key: str, name: str, value: float | None, unit: str = "1", *, status: str = "ok") -> Quantity:

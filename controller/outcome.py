@@ -109,7 +109,9 @@ def _causes(run: Simulation) -> Iterator[Finding]:
     if outcome is Outcome.DRIFTING:
         total = 2 * run.scene.disc.initial_fill
         fill = total - min(run.plant.residual_fill, total / 2)
-        yield Holding.of(run.scene, fill_ratio=fill).finding or Finding(code="tube_runs_back")
+        held = Holding.of(run.scene, fill_ratio=fill)
+        lost = None if held.likely_speed is not None else held.finding
+        yield lost or Finding(code="tube_runs_back")
     if outcome in _BY_SETTINGS:
         code = "own_overshoots" if _own(run) else "overshoots"
         yield Finding(code=code, values={"overshoots": run.overshoots})

@@ -76,8 +76,10 @@ def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
 
 def runs_back(scene: Scene, _: Observations) -> str:
     """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
-    found = Holding.of(scene, fill_ratio=scene.disc.initial_fill).finding
-    return "" if found is None else f"by this scene no injection leaves a change behind: {found.text}"
+    held = Holding.of(scene, fill_ratio=scene.disc.initial_fill)
+    if held.finding is None or held.likely_speed is not None:
+        return ""
+    return f"by this scene no injection leaves a change behind: {held.finding.text}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

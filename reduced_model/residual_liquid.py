@@ -192,10 +192,14 @@ def _flow_rate(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArra
 
 @dataclass(frozen=True, kw_only=True)
 class Holding:
-    """What becomes of the fullest chamber's liquid with the gas off."""
+    """What becomes of the fullest chamber's liquid with the gas off, by the pressure of a cavity over the
+    crest: vapour alone is sure to be reached, and runs of nominal parts take `TubePath.released`.
+    """
 
-    holds: bool
-    """Whether it stays there, by `TubePath.holds`."""
+    sure_speed: float | None
+    """Lowest speed at which it stays whatever that pressure, rad/s; None: not even at the scene's."""
+    likely_speed: float | None
+    """Lowest speed at which it stays under the pressure that runs take, likewise."""
     hump_radius: float | None
     """Of the scene's crest, m; None without one."""
     largest_hump_radius: float | None
@@ -204,30 +208,46 @@ class Holding:
     @classmethod
     def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
         """By hydrostatics, gravity left out. Args: `fill_ratio`: the largest that runs reach."""
-        path, wall = tube_path(scene), scene.disc.outer_radius
+        path, wall, speed = tube_path(scene), scene.disc.outer_radius, scene.rotor.speed
         fullest = float(
             surface_radius(disc=scene.disc, fill_ratio=min(fill_ratio, scene.disc.max_fill_ratio))
         )
         level = column_pressure(scene=scene, radius=fullest)
-        pull = scene.liquid.density * scene.rotor.speed**2 / 2
-        square = wall**2 - path.holding_pressure(level) / pull if pull > 0 else 0.0
+        pull = scene.liquid.density * speed**2 / 2
+        sure = path.holding_pressure(level) - level
+        square = wall**2 - (level + sure) / pull if pull > 0 else 0.0
+
+        def lowest(tension: float) -> float | None:
+            """The column parts under a tension D_m - P, and D_m - P grows with the square of the speed."""
+            here = path.column_pressure - level
+            if not path.crest or here < tension:
+                return None
+            return speed * math.sqrt(tension / here) if tension > 0 else 0.0
+
         return cls(
-            holds=path.holds(level),
+            sure_speed=lowest(sure),
+            likely_speed=lowest(path.column_pressure - path.return_pressure),
             hump_radius=scene.tube.hump_radius,
             largest_hump_radius=math.sqrt(square) if square > 0 else None,
         )
 
     @property
+    def holds(self) -> bool:
+        """Whether it is sure to stay there."""
+        return self.sure_speed is not None
+
+    @property
     def finding(self) -> Finding | None:
-        """That a correction does not last, and the crest that would hold it; None where the tube holds."""
+        """That a correction does not, or may not, last, and the crest that holds it; None where it is sure."""
         if self.holds:
             return None
         if self.largest_hump_radius is None:
             return Finding(code="no_crest_holds")
         # Rounded down to a tenth of a millimetre: a crest there holds.
         crest = math.floor(1e4 * self.largest_hump_radius * (1 + 1e-12)) / 1e4
+        code = "no_crest" if self.hump_radius is None else "crest_too_low"
         return Finding(
-            code="no_crest" if self.hump_radius is None else "crest_too_low",
+            code="crest_undecided" if self.likely_speed is not None else code,
             values={"crest_radius": self.hump_radius, "largest_crest_radius": crest},
             change={"tube.hump_radius": crest},
         )

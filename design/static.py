@@ -20,6 +20,7 @@ from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
+from ringbalance.results.numbers import believed
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of, nameless
@@ -129,7 +130,8 @@ def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
 def _row(column: FloatArray) -> Record:
     values, widths = column[1 : 1 + len(UNITS)].tolist(), column[1 + len(UNITS) :].tolist()
     pairs = {
-        name: [_plain(value), _plain(width)] for name, value, width in zip(UNITS, values, widths, strict=True)
+        name: [_plain(value), _plain(believed(value, width, stated=True) or 0.0)]
+        for name, value, width in zip(UNITS, values, widths, strict=True)
     }
     blocked = int(column[0]) == Regime.BLOCKED
     return {
@@ -151,7 +153,7 @@ def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
         return np.concatenate([values, np.full(values[1:].shape, np.nan)])
     function = partial(_values, near=TubeFlow.of(designs))
     values, effects = input_effects(designs.scene, function, each=designs.size)
-    variance = sum((np.square(np.nan_to_num(each)) for each in effects.values()), np.zeros(values.shape))
+    variance = sum((np.square(each) for each in effects.values()), np.zeros(values.shape))
     return np.concatenate([values, np.where(np.isnan(values), np.nan, np.sqrt(variance))[1:]])
 
 

@@ -33,6 +33,8 @@ _TOGETHER: Final = {True: 256, False: 1024}
 """Points that are answered in one batch, with intervals and without: of one composition, since a batch's last
 bits may depend on it.
 """
+_EDGE: Final = 0.02
+"""Of what was varied: nearer to its end, a value stands at it."""
 STORE: Final = "store"
 """Folder of kept answers in that of a sweep."""
 _OF_RUNS: Final = {
@@ -312,7 +314,9 @@ class Sweep(Result):
         for what, kept in self.resumed.items():
             found.append(Finding(code="sweep_resumed", values={"count": kept, "what": what}))
         if best is not None:
-            found.append(Finding(code="sweep_best", values={"row": best, "changes": self._change_text(best)}))
+            by = "settles first" if self.runs else "cancels most in any direction, nothing was run"
+            values = {"row": best, "by": by, "changes": self._change_text(best)}
+            found += [Finding(code="sweep_best", values=values), *self._edges(best)]
         if (nearest := self.nearest) is not None:
             fraction = self.driven[nearest]["fraction"]
             values = {"row": nearest, "changes": self._change_text(nearest), "fraction": fraction}
@@ -329,6 +333,15 @@ class Sweep(Result):
             worst = max(self.errors, key=lambda each: float(each["error"]))
             found.append(Finding(code="sweep_left_out", values={**worst, "tolerance": tolerance}))
         return found
+
+    def _edges(self, row: int) -> Iterator[Finding]:
+        """Keys that stand at an end of what was varied."""
+        for path in (path for axis in self.plan.axes if not axis.names for path in axis.paths):
+            values = [value for point in self.points if isinstance(value := point.get(path), float)]
+            here, low, high = self.points[row].get(path), min(values, default=0.0), max(values, default=0.0)
+            for end in (low, high):
+                if low < high and isinstance(here, float) and abs(here - end) <= _EDGE * (high - low):
+                    yield Finding(code="sweep_edge", values={"path": path, "end": setting_text(path, end)})
 
     def _change_text(self, row: int) -> str:
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)
@@ -364,7 +377,7 @@ class Sweep(Result):
             (name, Quantity(key=name, name=name, value=value, unit=unit, lower=low, upper=high).text)
             for name, ((value, width), unit) in answers.items()
             if value is not None
-            for low, high in (around(value, width or 0.0),)
+            for low, high in (around(value, width, stated=bool(self.scene.uncertainty)),)
         ]
         if self.runs:
             shown = ("fraction low", "fraction", "fraction high", "settling_time")

@@ -73,9 +73,9 @@ class OperatingPoint:
     velocity_uncertainty: float
     """Expanded uncertainty (95 %), m/s."""
     loss_velocity: float
-    """Velocity at which k is given: u or, when blocked, that of a primed tube, m/s; zero if none."""
+    """|u|, at which k is given, m/s; zero where it is blocked."""
     k: float | None
-    """Loss coefficient there; None without any velocity."""
+    """Loss coefficient there; None where it is blocked."""
     k_uncertainty: float | None
     """Expanded uncertainty (95 %)."""
     k_model_uncertainty: float | None
@@ -105,8 +105,7 @@ class OperatingPoint:
         """
         x, pressure = law.max_fill_ratio / 2, scene.gas.pressure
         flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
-        full = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
-        u = abs(float(flow.velocity)) or abs(float(full.velocity))
+        u = abs(float(flow.velocity))
         loss = tube_loss(scene, u) if u > 0 else None
         hump = HumpProfile.of(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
         vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")

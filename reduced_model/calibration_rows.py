@@ -101,13 +101,13 @@ def _quantities(calibration: Calibration) -> Iterator[Quantity]:
         ("returned_volume", "liquid that falls back", "m^3", tube.returned_volume, None),
     )
     for key, name, unit, value, total in rows:
-        low, high = around(value, _known(calibration, value, total) or 0.0)
+        low, high = around(value, total, stated=bool(calibration.scene.uncertainty))
         yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, digits=3)
 
 
 def _of_budget(calibration: Calibration, key: str, budget: Budget) -> Quantity:
     name, symbol = _NAMES[key]
-    low, high = around(budget.value, _known(calibration, budget.value, budget.total) or 0.0)
+    low, high = around(budget.value, budget.total, stated=bool(calibration.scene.uncertainty))
     return Quantity(
         key=key,
         name=name,

@@ -53,7 +53,7 @@ class Answers:
     velocity: FloatArray
     """u of that flow, m/s; zero where it is blocked."""
     drag_coefficient: FloatArray
-    """k at u or, blocked, at the velocity of a primed tube; u follows."""
+    """k at u; NaN where it is blocked."""
     crest_pressure: FloatArray
     """At the end of the crest's arc in that flow, gauge, Pa."""
     cavitation_margin: FloatArray
@@ -108,7 +108,6 @@ class Answers:
         equal, uneven = tube.ends(half, half), tube.ends(0 * full, full)
         flow = tube.flow(equal, primed=np.zeros(designs.size, dtype=np.bool_))
         primed = tube.flow(equal, primed=True)
-        at = np.where(flow.velocity > 0, flow.velocity, primed.velocity)
         rest = tube.flow(tube.ends(half, half, driven=False), primed=True)
         running = np.where(rest.primed, primed.velocity, flow.velocity)
         residual = _residual_fill(tube, top)
@@ -135,7 +134,7 @@ class Answers:
             moment_per_mass=ratio[0],
             regime=np.where(flow.velocity > 0, separated, Regime.BLOCKED).astype(np.int64),
             velocity=flow.velocity,
-            drag_coefficient=tube.drag_coefficient(at),
+            drag_coefficient=tube.drag_coefficient(flow.velocity),
             crest_pressure=lowest[0],
             cavitation_margin=lowest[1],
             stall_pressure=np.maximum(stall_pressure(tube.path, uneven), 0.0) / tube.gas_factor,

@@ -238,7 +238,7 @@ class Holding:
 
     @property
     def finding(self) -> Finding | None:
-        """That a correction does not, or may not, last, and the crest that holds it; None where it is sure."""
+        """That a correction does not or may not last, and the crest that holds it; None where it is sure."""
         if self.holds:
             return None
         if self.largest_hump_radius is None:

@@ -38,7 +38,6 @@ from ringbalance.reports.sections import CASES_VIEW, PREFIXES, drawings_in, numb
 from ringbalance.reports.traced import (
     FILTERS,
     finished,
-    known_width,
     listing_of,
     placed,
     states_uncertainty,
@@ -46,6 +45,7 @@ from ringbalance.reports.traced import (
 )
 from ringbalance.results.numbers import (
     PLUS_MINUS,
+    believed,
     measured,
 )
 from ringbalance.results.rows import series
@@ -143,7 +143,7 @@ def _frame(evidence: Record) -> Record:
     """What every template looks at."""
     return {
         "e": placed(evidence),
-        "known": partial(known_width, stated=states_uncertainty(evidence)),
+        "known": partial(believed, stated=states_uncertainty(evidence)),
         "named": partial(named_with_origin, evidence),
         "unstated": UNSTATED,
         "scene": evidence["scene"],

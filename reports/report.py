@@ -188,8 +188,8 @@ def _drag_map(drag: Record) -> Record:
     return {
         "bore [m]": np.repeat(bores, len(viscosities)).tolist(),
         "kinematic viscosity [m^2/s]": np.tile(viscosities, len(bores)).tolist(),
-        "k [1]": np.ravel(drag["k"]).tolist(),
-        "expanded uncertainty of k [1]": np.ravel(drag["k_uncertainty"]).tolist(),
+        "k [1]": [k or None for k in np.ravel(drag["k"]).tolist()],
+        "expanded uncertainty of k [1]": [k or None for k in np.ravel(drag["k_uncertainty"]).tolist()],
     }
 
 

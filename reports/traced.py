@@ -17,7 +17,6 @@ from markupsafe import Markup, escape
 
 from ringbalance.reports.prose import typeset
 from ringbalance.results import numbers
-from ringbalance.results.numbers import believed
 from ringbalance.results.result import Table
 
 Form = Literal["measured", "given", "percent", "change", "fixed"]
@@ -41,8 +40,6 @@ UNITS: Final = MappingProxyType(
     }
 )
 """Units by the endings of the evidence's keys, the longest first."""
-_EXACT: Final = 1e-6
-"""Relative total below which a number is a closed form of inputs that are taken as exact."""
 _SYMBOL: Final = re.compile(r"(?<![\w.])([A-Za-zα-ωΑ-Ω])_([A-Za-zΩ]{1,3})(?!\w)")
 
 
@@ -245,15 +242,6 @@ def listing_of(text: str, heads: Sequence[str], caption: str = "", style: str = 
     rows = [[cell.strip() for cell in line.split("::")] for line in text.splitlines() if "::" in line]
     said = [row for row in rows if any(cell not in {"", numbers.MISSING} for cell in row[1:])]
     return Table(caption=caption, heads=[Markup(head) for head in heads], rows=said, style=style)
-
-
-def known_width(value: float | None, width: float | None, *, stated: bool) -> float | None:
-    """The half-width to print: none of a closed form of exact inputs, or finer than unstated inputs leave.
-
-    Args: `stated`: whether the scene states the uncertainty of any input.
-    """
-    total = believed(value, width, stated=stated)
-    return None if value is None or total is None or total < _EXACT * abs(value) else total
 
 
 def _part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str:

@@ -23,6 +23,8 @@ _TABLE_DIGITS: Final = 9
 _UNSTATED_DIGITS: Final = 4
 _INPUT_ROUNDING: Final = 5e-4
 """Relative half-width of an input of three digits, the fewest that scene files have."""
+_EXACT: Final = 1e-6
+"""Relative half-width that is round-off, or of a closed form of inputs that are taken as exact."""
 _LOPSIDED: Final = 0.1
 """By which the two sides of an interval differ, of the larger, before they are printed apart."""
 _TYPEWRITER: Final = str.maketrans({"\u202f": " ", "\u00a0": " ", "\u2212": "-", "µ": "u"})
@@ -51,12 +53,15 @@ def last_place(total: float) -> int:
 
 
 def believed(value: float | None, total: float | None, *, stated: bool) -> float | None:
-    """A value's total uncertainty; None where it is finer than inputs of which the scene says nothing.
+    """A value's total uncertainty; None without a value, of round-off, and where it is finer than inputs of
+    which the scene says nothing.
 
     Args: `stated`: whether the scene states the uncertainty of any input.
     """
-    fine = value is not None and total and total <= _INPUT_ROUNDING * abs(value)
-    return None if fine and not stated else total
+    if value is None or total is None:
+        return None
+    fine = 0.0 < total <= (_EXACT if stated else _INPUT_ROUNDING) * abs(value)
+    return None if fine else total
 
 
 def rounded(value: float, total: float | None) -> str:

@@ -43,6 +43,10 @@ _NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
 """A text that begins like a number, behind tags."""
 
 
+_FORMULA: Final = re.compile(r"[=+\-@\t\r]")
+"""With which a formula begins in a spreadsheet."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Table:
     """Texts in rows and columns, whatever they are written to."""
@@ -94,12 +98,21 @@ def models_table(models_used: Iterable[_ModelUsed]) -> Table:
 
 
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
-    """Columns of one length as comma-separated values below a line of their names; None is an empty cell."""
+    """Columns of one length as comma-separated values below a line of their names; None is an empty cell.
+
+    A text that a spreadsheet would take for a formula stands behind an apostrophe; a carriage return, which
+    would end the line, becomes a line feed.
+    """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
+    rows: tuple[Iterable[Any], ...] = (columns, *zip(*columns.values(), strict=True))
+    for row in rows:
+        writer.writerow([_text_cell(cell) if isinstance(cell, str) else cell for cell in row])
     return text.getvalue()
+
+
+def _text_cell(text: str) -> str:
+    return (f"'{text}" if _FORMULA.match(text) else text).replace("\r", "\n")
 
 
 def _findings_text(findings: Iterable[Finding], *, headline: bool) -> Group:

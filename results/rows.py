@@ -16,7 +16,7 @@ from importlib.resources import files
 from string import Formatter
 from typing import Any, Literal, TypeVar
 
-from ringbalance.results.numbers import MISSING, Width, given, percent, plain, shown
+from ringbalance.results.numbers import MISSING, Width, believed, given, percent, plain, shown
 from ringbalance.scene.uncertain import NORMAL_95
 
 Made = TypeVar("Made")
@@ -96,9 +96,10 @@ class Quantity:
         return document
 
 
-def around(value: float, total: float) -> tuple[float | None, float | None]:
-    """Ends of an interval as wide on both sides; none without an uncertainty."""
-    return (value - total, value + total) if total else (None, None)
+def around(value: float, total: float | None, *, stated: bool = True) -> tuple[float | None, float | None]:
+    """Ends of an interval as wide on both sides; none without an uncertainty that is `believed`."""
+    known = believed(value, total, stated=stated)
+    return (value - known, value + known) if known else (None, None)
 
 
 Severity = Literal["info", "warning", "error"]

@@ -12,6 +12,7 @@ import shutil
 from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,10 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
 from ringbalance.controller.judging.judge import FRESH, judged_all
+from ringbalance.design.static import UNITS, _row
 from ringbalance.design.store import Store
 from ringbalance.design.work import bundle_size
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.results.numbers import given
 from ringbalance.scene.models import Scene
 
@@ -99,6 +102,38 @@ def test_runs_that_end_early_meet_the_same() -> None:
             assert demand.met(early).tolist() == demand.met(whole).tolist()
         met += demands[0].met(early).tolist()
     assert {*met} == {True, False}
+
+
+def test_where_nothing_flows_there_is_no_drag_coefficient(paper_scene: Scene) -> None:
+    """Just below the pressure that starts a flow, and where a primed tube would run, k has no value."""
+    found = rb.sweep(paper_scene, {"gas.pressure": [0.301e6, 0.3336e6, 0.35e6]}, check=3)
+    columns = found.columns()
+    assert [velocity > 0 for velocity in columns["velocity [m/s]"]] == [False, False, True]
+    for name in ("drag_coefficient [1]", "drag_coefficient half-width [1]"):
+        assert [value is None for value in columns[name]] == [True, True, False]
+    assert [row["drag_coefficient [1]"] == "" for row in table(found)] == [True, True, False]
+
+
+def test_round_off_is_no_interval_of_a_sweep(paper_scene: Scene) -> None:
+    size = len(UNITS)
+    row = _row(np.array([Regime.SEPARATED, *size * [10.75625], *size * [5.7e-14]], dtype=float))
+    assert row["values"]["velocity"] == [10.75625, 0.0]
+    found = rb.sweep(paper_scene, {"tube.bore": [1e-3]})
+    row["values"]["velocity"] = [10.75625, 5.7e-14]
+    shown = replace(found, static=({**found.static[0], "values": row["values"]},)).rows()
+    (best,) = [each.rows for each in shown.tables if each.caption.startswith("Best")]
+    assert ("velocity", "10.76\u202fm/s") in best
+
+
+def test_the_best_row_says_that_it_stands_at_the_end(paper_scene: Scene) -> None:
+    ends = rb.sweep(paper_scene, {"tube.bore": "0.6mm:2mm:15"}, intervals=False)
+    values = [each.values for each in ends.rows().findings if each.code == "sweep_edge"]
+    assert values == [{"path": "tube.bore", "end": "0.6 mm"}]
+    (best,) = [each.text for each in ends.rows().findings if each.code == "sweep_best"]
+    assert "nothing was run" in best
+    inside = rb.sweep(paper_scene, {"gas.pressure": "0.3MPa:5MPa:10"}, intervals=False)
+    assert inside.best not in (0, 9)
+    assert "sweep_edge" not in {each.code for each in inside.rows().findings}
 
 
 def test_a_store_says_what_it_answered(paper_scene: Scene, tmp_path: Path) -> None:

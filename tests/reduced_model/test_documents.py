@@ -110,3 +110,8 @@ def test_blocked_scene_still_makes_a_clean_document(table_1_scene: Scene) -> Non
     assert document["operating_point"]["regime"] == "blocked"
     assert document["operating_point"]["k"] is None
     assert document["operating_point"]["priming_pressure_vented_Pa"] == pytest.approx(0.5417e6, rel=1e-3)
+    # 0.3 MPa drives a primed tube, and lifts nothing over the crest of an empty one.
+    lower = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=0.3e6))
+    found = calibrate(lower)
+    assert calibration_document(found)["operating_point"]["k"] is None
+    assert "drag_coefficient" not in {each.key for each in found.rows().quantities}

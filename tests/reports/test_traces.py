@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 from check_traces import SAME, agrees, apart, printed, traces
 
-from ringbalance.reports.traced import _marked_up, evidence_at, known_width, marked, placed
+from ringbalance.reports.traced import _marked_up, evidence_at, marked, placed
 from ringbalance.reports.traced import printed as traced
+from ringbalance.results.numbers import believed
 
 Record = dict[str, Any]
 
@@ -65,6 +66,6 @@ def test_a_number_is_printed_with_its_place_and_markup_is_not_obeyed() -> None:
 
 def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said() -> None:
     fine, wide = 1e-5, 1e-3
-    assert known_width(0.123456, fine, stated=True) == fine
-    assert known_width(0.123456, fine, stated=False) is None
-    assert known_width(0.123456, wide, stated=False) == wide
+    assert believed(0.123456, fine, stated=True) == fine
+    assert believed(0.123456, fine, stated=False) is None
+    assert believed(0.123456, wide, stated=False) == wide

@@ -148,7 +148,9 @@ def test_a_value_is_printed_to_two_digits_of_its_total(value: float, total: floa
 @pytest.mark.parametrize(
     ("value", "total", "stated", "text"),
     [
-        (75.3982237, 7.5e-11, True, "75.39822 ± 7.5 × 10^-11"),
+        (75.3982237, 7.5e-11, True, "75.40"),
+        (75.3982237, 7.6e-5, True, "75.39822 ± 7.6 × 10^-5"),
+        (10.75625, 5.7e-14, True, "10.76"),
         (75.3982237, 7.5e-11, False, "75.40"),
         (99.5917, 0.0047, False, "99.59"),
         (99.5917, 0.051, False, "99.592 ± 0.051"),
@@ -156,7 +158,7 @@ def test_a_value_is_printed_to_two_digits_of_its_total(value: float, total: floa
         (0.0, 0.0, False, "0"),
     ],
 )
-def test_an_interval_finer_than_unstated_inputs_leaves_four_digits(
+def test_round_off_and_an_interval_finer_than_unstated_inputs_leave_four_digits(
     value: float, total: float, stated: bool, text: str
 ) -> None:
     assert plain(measured(value, believed(value, total, stated=stated))) == text

@@ -79,6 +79,15 @@ def test_a_short_text_has_title_quantity_and_finding() -> None:
     assert finding.strip() == Answer().rows().findings[0].text
 
 
+@pytest.mark.parametrize("name", ["=cmd|calc!A0", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1"])
+def test_csv_has_no_formula_of_a_name(name: str) -> None:
+    text = csv_text({"gas.name": [name, "MHA2", -0.5], name: ["-", "1/0.5-2", None]})
+    (head, *rows) = csv.reader(io.StringIO(text, newline=""))
+    cell = f"'{name}".replace("\r", "\n")
+    assert head == ["gas.name", cell]
+    assert rows == [[cell, "'-"], ["MHA2", "1/0.5-2"], ["-0.5", ""]]
+
+
 def test_csv_holds_every_cell() -> None:
     text = csv_text({"time [s]": [0.1, 2e-9], "name, short": ["a", None]})
     assert list(csv.reader(io.StringIO(text))) == [["time [s]", "name, short"], ["0.1", "a"], ["2e-09", ""]]
@@ -117,3 +126,5 @@ def test_parts_add_as_squares() -> None:
     assert total == 3.0
     assert around(5.0, total) == (2.0, 8.0)
     assert around(5.0, 0.0) == (None, None)
+    assert around(10.75625, 5.7e-14) == (None, None)
+    assert around(10.75625, 1e-3, stated=False) == (None, None)

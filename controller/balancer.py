@@ -21,7 +21,7 @@ from ringbalance.controller.trials import DrawnInput, Information, Trials, drawn
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.kinds import scene_kind
@@ -326,6 +326,10 @@ class Balancer(ABC):
     def information(self, scene: SceneFile) -> Information:  # noqa: ARG002
         """What is known without a run of its loop under a scene with other settings."""
         return Information()
+
+    def beyond_capacity(self, scene: SceneFile, ended: Sequence[str]) -> tuple[Finding, ...]:  # noqa: ARG002
+        """What is said of devices whose runs ended for want of capacity under a scene with other settings."""
+        return ()
 
     def drawn_input(self, name: str) -> DrawnInput:
         """What kind of thing an input of `Outcomes.inputs` is."""

@@ -151,20 +151,24 @@ def _residual_fills(scene: Scene, law: FlowLaw, depths: Sequence[float]) -> Floa
     return first_gas(scene, drawn, top=np.full(factor.shape, scene.disc.max_fill_ratio))
 
 
-def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> float:
+def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs: bool = False) -> float:
     """Fill ratio at which an injection moves no liquid any more; total/2 where it moves none at equal fills.
 
     An injection starts with what the tube holds while the gas is off. Over a crest where no column holds
     that is p_gas = rho omega^2 (a^2 - r_m^2)/2 with vented gas, of a full siphon that of `stall_pressure`. A
     long injection whose flow has carried the gas off the crest goes on to a lower fill, from which no
     injection could correct any further.
+    Args: `runs`: of that flow instead.
     """
 
     def moves(_: IntArray, fills: FloatArray) -> BoolArray:
         opposite = total - fills
         rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
         flow = law.evaluate(
-            fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=gas_pressure, primed=rest.primed
+            fill_ratio=fills,
+            opposite_fill_ratio=opposite,
+            gas_pressure=gas_pressure,
+            primed=runs or rest.primed,
         )
         return flow.velocity > 0
 

@@ -60,6 +60,7 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
         "own": None if own is None else judgement_record(own) | {"longer": _longer(balancer)},
         "recommended": recommended if own is None or best.settings else None,
         "moved": _moved(tuning),
+        "capacity": [each.document() for each in tuning.capacity],
         **{name: document[name] for name in ("along", "ranking", "remedies")},
         "measures": [each.document() for each in measures],
     }

@@ -22,6 +22,7 @@ from ringbalance.controller.judging.search import (
 )
 from ringbalance.controller.judging.tuning import LONGER, BestOfKind, Tuning
 from ringbalance.results.requirements import MET
+from ringbalance.results.rows import Finding
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import value_at, with_values_at
 
@@ -70,11 +71,22 @@ def tuned(
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
         information=balancer.information(with_values_at(balancer.scene, best.settings)),
+        capacity=_capacity(balancer, *([] if own is None else [own]), best),
         ranking=ranked(balancer, best),
         remedies=tried_remedies(balancer, best, search=settings, told=told) if mends else (),
         choices=tried_choices(balancer, search=settings, told=told) if remedies else (),
         open_choice=bool(balancer.choices()),
     )
+
+
+def _capacity(balancer: Balancer, *judged: Judgement) -> tuple[Finding, ...]:
+    """What is said of capacity where it decides a verdict, of the first of the settings where it does."""
+    for each in judged:
+        scene = with_values_at(balancer.scene, each.settings)
+        found = () if each.verdict == MET else balancer.beyond_capacity(scene, each.outcomes.ended)
+        if found:
+            return found
+    return ()
 
 
 def _agreeing(level: Along, best: Judgement, recommended: float | None) -> Along:

@@ -66,6 +66,8 @@ class Tuning(Result):
     information: Information = field(default_factory=Information)
     remedies: tuple[Remedied, ...] = ()
     """What remedies come to, the best first; tried where what is required is not met."""
+    capacity: tuple[Finding, ...] = ()
+    """What a machine moves beyond the capacity that decides a verdict."""
     ranking: Ranking = field(default_factory=Ranking)
     """Which input decides what the recommended settings come to."""
     choices: tuple[Remedied, ...] = ()
@@ -256,6 +258,7 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
         yield Finding(code="tuned_longer", values=values)
     if best.verdict != MET and (causes := causes_of(best)):
         yield Finding(code="tuned_causes", values={"causes": causes})
+    yield from tuning.capacity
     if not tuning.remedies and tuning.along and best.verdict != MET:
         yield Finding(code="tuned_no_level", values={"key": tuning.along_name})
     yield from assumed_rotor(tuning.scene)

@@ -29,6 +29,7 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.judging.judge import MOST_DRAWS
+from ringbalance.controller.liquid_ring.capacity import beyond_capacity
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
@@ -305,6 +306,10 @@ class LiquidRingBalancer(Balancer):
     def information(self, scene: SceneFile) -> Information:
         """See `Balancer`."""
         return loop_information(liquid_ring_scene(scene), self.model)
+
+    def beyond_capacity(self, scene: SceneFile, ended: Sequence[str]) -> tuple[Finding, ...]:
+        """See `Balancer`."""
+        return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended))
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from scipy.optimize import brentq
+from paper_disc import CREST, VAPOUR, level, pressure
 
 from ringbalance.controller.document import conventions
 from ringbalance.controller.loop import simulate
@@ -27,31 +26,14 @@ def test_unbalances_and_vibrations_follow_from_the_amplitudes(paper_scene: Scene
     assert values["gas_per_correction"] < run.gas.normal_volume
 
 
-_WALL, _INNER, _CREST, _PLATE, _HALF = 44.5e-3, 20.5e-3, 31.5e-3, 2.777e-3, math.pi / 4
-"""Of the paper's disc, m: radii, and plates beside a chamber of 90 degrees."""
-_PULL = 998.2 * (10_000 * math.pi / 30) ** 2 / 2
-_VAPOUR = 2339.0 - 101_325.0
-"""Of water at 20 degC, gauge, Pa."""
-
-
-def _level(fill: float) -> float:
-    """Radius of the surface over a fill of the space between two flat plates, m."""
-
-    def area(radius: float) -> float:
-        r = np.linspace(radius, _WALL, 2001)
-        return float(np.trapezoid(2 * r * (_HALF - np.arcsin(_PLATE / r)), r))
-
-    return float(brentq(lambda r: area(r) - fill * area(_INNER), _INNER, _WALL))
-
-
 @pytest.mark.parametrize(("fill", "sure", "perhaps"), [(0.42, 7200, 5090), (0.436, 7470, 5280)])
 def test_a_correction_is_sure_to_last_down_to_the_speed_that_vapour_leaves(
     paper_scene: Scene, fill: float, sure: float, perhaps: float
 ) -> None:
     """A full tube parts over the crest where (D_m - P) (n/n_0)^2 exceeds ambient less cavity pressure."""
     found = Holding.of(paper_scene, fill_ratio=fill)
-    missing = _PULL * (_level(fill) ** 2 - _CREST**2)
-    for speed, cavity, rpm in ((found.sure_speed, _VAPOUR, sure), (found.likely_speed, _VAPOUR / 2, perhaps)):
+    missing = pressure(CREST) - pressure(level(fill))
+    for speed, cavity, rpm in ((found.sure_speed, VAPOUR, sure), (found.likely_speed, VAPOUR / 2, perhaps)):
         by_hand = 10_000 * math.sqrt(-cavity / missing)
         assert by_hand == pytest.approx(rpm, rel=1e-3)
         assert (speed or 0.0) * 30 / math.pi == pytest.approx(by_hand, rel=1e-3)

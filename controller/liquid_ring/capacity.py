@@ -1,0 +1,61 @@
+"""What a machine moves beyond the fills at which runs end: there capacity is a wall, in a machine a slope."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from ringbalance.controller.simulation import Outcome
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.reduced_model.tube.path import crest_middle, crest_span
+from ringbalance.results.rows import Finding, Value
+from ringbalance.scene.models import Scene
+
+_NOTICEABLE: Final = 1e-3
+"""Fill by which a running flow must go further to be worth a word."""
+
+
+def beyond_capacity(scene: Scene, model: BalancerModel, ended: Sequence[str]) -> Iterator[Finding]:
+    """What is said where devices end for want of capacity. Args: `ended`: how each one's run did."""
+    total, law = 2 * scene.disc.initial_fill, model.flow
+    influence = scene.rotor.influence_coefficient
+    residual = residual_fill_ratio(scene, law=law)
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+
+    def moment(least: float) -> float:
+        """Of a pair with a chamber emptied to a fill, kg m."""
+        high = min(total - min(least, total / 2), law.max_fill_ratio)
+        return abs(complex(model.moment.pair_vector(fill_ratio=high, opposite_fill_ratio=total - high)))
+
+    if count := ended.count(Outcome.CAPACITY_EXCEEDED.value):
+        pulse = moment(max(residual - crest_fill(scene, model), 0.0)) - moment(residual)
+        values: dict[str, Value] = {"count": count, "moment": pulse, "vibration": influence * pulse}
+        if pulse > 0:
+            yield Finding(code="capacity_creeps", values=values)
+    if count := ended.count(Outcome.STALLED.value):
+        further = max(running_fill(scene, model), residual)
+        if further < stalled - _NOTICEABLE:
+            values = {"count": count, "counted": moment(stalled), "reached": moment(further)}
+            yield Finding(code="stall_passed", values=values)
+
+
+def crest_fill(scene: Scene, model: BalancerModel) -> float:
+    """Fill of a chamber that lies on the far half of the siphon crest's circle as a pulse ends, with the tube
+    full there: what nothing pulls back runs over.  A crest shaped as a point keeps nothing.
+    """
+    if scene.tube.hump_radius is None:
+        return 0.0
+    half = crest_span(scene.tube)[1] - crest_middle(scene.tube)
+    return scene.tube.area * scene.tube.length * half / model.chamber_volume
+
+
+def running_fill(scene: Scene, model: BalancerModel) -> float:
+    """Fill down to which the gas drives a chamber whose flow never stops; at equal fills where that does not
+    carry the gas off the crest."""
+    total, law, gas = 2 * scene.disc.initial_fill, model.flow, scene.gas.pressure
+    rest = law.evaluate(fill_ratio=total / 2, gas_pressure=0.0, primed=True)
+    start = law.evaluate(fill_ratio=total / 2, gas_pressure=gas, primed=bool(rest.primed))
+    if not bool(start.primed):
+        return total / 2
+    return stalled_fill_ratio(law=law, total=total, gas_pressure=gas, runs=True)

@@ -1,0 +1,49 @@
+"""What is said where capacity decides a verdict, beside hand formulas of the paper's disc."""
+
+from __future__ import annotations
+
+import pytest
+from paper_disc import CREST, DENSITY, INFLUENCE, VAPOUR, arm, crest_volume, level, pressure
+
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.liquid_ring.capacity import beyond_capacity, running_fill
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
+from ringbalance.scene.models import Scene
+
+_TOTAL = 0.5
+
+
+def test_a_pulse_at_the_residual_fill_sends_over_what_lies_behind_the_middle_of_the_crest(
+    paper_scene: Scene,
+) -> None:
+    balancer = balancer_of(paper_scene)
+    ended = ("settled", "capacity_exceeded", "capacity_exceeded")
+    (found,) = beyond_capacity(paper_scene, balancer.model, ended)
+    least = residual_fill_ratio(paper_scene, law=balancer.model.flow)
+    by_hand = DENSITY * crest_volume() * (arm(level(least)) + arm(level(_TOTAL - least)))
+    assert found.code == "capacity_creeps"
+    assert found.values["count"] == 2
+    assert found.values["moment"] == pytest.approx(by_hand, rel=5e-3)
+    # An own plant, with its own flow, crept by 0.036 um a pulse.
+    assert found.values["vibration"] == pytest.approx(INFLUENCE * by_hand, rel=1e-2)
+    assert found.values["vibration"] == pytest.approx(0.036e-6, rel=0.04)
+
+
+@pytest.mark.parametrize("gas", [0.42e6, 0.45e6])
+def test_a_long_injection_goes_on_below_the_stall_until_the_column_parts_over_a_cavity(
+    paper_scene: Scene, gas: float
+) -> None:
+    """It lasts while p + P(x) exceeds D_m + p_c, and a new one starts while it exceeds D_m."""
+    weak = paper_scene.with_values({"gas.pressure": gas})
+    assert isinstance(weak, Scene)
+    model = balancer_of(weak).model
+    fill = running_fill(weak, model)
+    # The gas itself weighs a little on the liquid.
+    assert pressure(CREST) + VAPOUR / 2 - pressure(level(fill)) == pytest.approx(gas, rel=5e-3)
+    (found,) = beyond_capacity(weak, model, ("stalled",))
+    assert found.code == "stall_passed"
+    assert found.values["reached"] > 1.2 * found.values["counted"]  # type: ignore[operator]
+
+
+def test_nothing_is_said_where_no_device_ends_for_want_of_capacity(paper_scene: Scene) -> None:
+    assert not [*beyond_capacity(paper_scene, balancer_of(paper_scene).model, ("settled", "hovering"))]

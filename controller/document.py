@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.liquid_ring.loop_factor import vibration_left
 from ringbalance.controller.simulation import GasUse, Injection, Sample, Simulation
 from ringbalance.physics import balancing
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
@@ -52,6 +53,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "loop_factor_limit": simulation.loop.limit,
         "vibration_rate_m_per_s": simulation.loop.rate,
         "stationary_deviation_m": finite(simulation.loop.deviation),
+        "vibration_left_m": vibration_left(scene, simulation.loop),
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
@@ -300,7 +302,6 @@ def command_document(nominal: Simulation) -> dict[str, Any]:
     return simulation_document(nominal) | {"gas_line_runs": runs}
 
 
-_DEVIATIONS: Final = 3.0
 _HOUR: Final = 3600.0
 
 
@@ -324,21 +325,13 @@ def _unbalances(run: Simulation) -> Iterator[Quantity]:
         "unbalance reduction ratio (ISO 21940-21)",
         balancing.unbalance_reduction_ratio(before=before, after=after) if before > 0 else None,
     )
+    left = vibration_left(run.scene, run.loop)
     yield _row(
-        "minimum_achievable_unbalance",
-        "minimum achievable residual unbalance (ISO 21940-21)",
-        _achievable(run) / influence,
+        "unbalance_left",
+        "unbalance that noise leaves at most with this run's settings",
+        None if left is None else left / influence,
         "kg m",
     )
-
-
-def _achievable(run: Simulation) -> float:
-    """Vibration that is left for sure, m: three standard deviations of what noise sustains, or what the
-    shortest injections of two pairs leave, half a step each, where that is more.
-    """
-    step = run.scene.controller.minimum_gas_time * run.loop.rate
-    noise = run.loop.deviation or 0.0
-    return max(_DEVIATIONS * noise if math.isfinite(noise) else 0.0, step / math.sqrt(2.0))
 
 
 def _vibrations(run: Simulation) -> Iterator[Quantity]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.liquid_ring.loop_factor import default_gain
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
@@ -38,7 +39,14 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
         code = unmoved.get(outcome, code)
     numbers = _numbers(run)
     ended = Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
-    return (ended, *_required(run), *_causes(run), *_shortened(run), *assumed_rotor(run.scene))
+    return (ended, *_required(run), *_causes(run), *_shortened(run), *_assumed(run))
+
+
+def _assumed(run: Simulation) -> Iterator[Finding]:
+    """What the result rests on without being in the scene."""
+    yield from assumed_rotor(run.scene)
+    if run.loop.fixed:
+        yield from default_gain(run.scene)
 
 
 def _required(run: Simulation) -> Iterator[Finding]:

@@ -78,14 +78,15 @@ def _end(gas: Gas, name: str, place: int) -> LineEnd:
 
 
 def line_text(answers: tuple[LineAnswer, ...]) -> str:
-    """The smallest correction that the line can deliver, in one phrase."""
+    """What the shortest opening that primes the tube at equal fills corrects, in one phrase."""
     if not answers[0].holds:
         return "what an injection moves runs back while the gas is off"
     if any(answer.smallest_correction is None for answer in answers):
         return "the gas starts no flow at equal fills"
     whose = "the scene's" if answers[0].end == "given" else "not in the scene, default range"
     each = [f"{1e6 * (answer.smallest_correction or 0.0):.2g} um{_which(answer)}" for answer in answers]
-    return f"{whose}: smallest correction {' or '.join(each)}"
+    what = "the shortest opening that primes the tube at equal fills corrects"
+    return f"{whose}: {what} {' or '.join(each)}, shorter ones less"
 
 
 def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
@@ -113,7 +114,8 @@ def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
 
 
 def _which(answer: LineAnswer) -> str:
+    opening = f"{1e3 * (answer.shortest_opening or 0.0):.2g} ms"
     if answer.end == "given":
-        return ""
-    numbers = f"{1e8 * answer.conductance:.2g} l/(s bar), {1e3 * answer.valve_lag:.2g} ms lag"
+        return f" in {opening}"
+    numbers = f"{opening}; {1e8 * answer.conductance:.2g} l/(s bar), {1e3 * answer.valve_lag:.2g} ms lag"
     return f" ({answer.end}: {numbers})"

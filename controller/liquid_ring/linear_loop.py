@@ -20,9 +20,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, loop_rate
+from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, default_gain, loop_rate
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.results.rows import Finding
+from ringbalance.scene.arrays import ComplexArray, FloatArray, finite
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.registry import registered
@@ -79,6 +80,8 @@ class LinearLoop:
     """i = dt/Ti."""
     derivative: float
     """q = Td/dt."""
+    findings: tuple[Finding, ...]
+    """That all that is said of it holds for a gain that the scene does not give."""
 
     def __repr__(self) -> str:
         """What it says of the loop, without its matrices."""
@@ -87,9 +90,23 @@ class LinearLoop:
             f"Linear loop, {'stable' if self.stable else 'unstable'}, sampled every {plant.dt:g} s",
             f"  disk margin {self.disk_margin:.3g} of 2",
             f"  peak of the sensitivity {self.sensitivity_peak:.3g}, zone {self.zone}",
+            *(each.text for each in self.findings),
             f"  plant: {', '.join(plant.inputs)} -> {', '.join(plant.outputs)}; the controller the other way",
         ]
         return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gain, margins and findings, without matrices, as a JSON document in SI; null where unbounded."""
+        return {
+            "stable": self.stable,
+            "gain": [self.gain.real, self.gain.imag],
+            "integral": self.integral,
+            "derivative": self.derivative,
+            "disk_margin": self.disk_margin,
+            "sensitivity_peak": finite(self.sensitivity_peak),
+            "zone": self.zone,
+            "findings": [each.document() for each in self.findings],
+        }
 
     @property
     def stable(self) -> bool:
@@ -174,6 +191,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - scene.rotor.lag_angle),
         integral=integral,
         derivative=derivative,
+        findings=tuple(default_gain(scene)),
     )
 
 

@@ -45,12 +45,13 @@ from ringbalance.reduced_model.injection.line_answers import line_answers
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.models import Scene
 
 _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
+_DEVIATIONS: Final = 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +108,21 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
         limit=2.0 * max(math.cos(error), 0.0),
         deviation=None if value is None else deviation,
     )
+
+
+def default_gain(scene: Scene) -> Iterator[Finding]:
+    """That a loop is judged by a gain that its scene does not give."""
+    if scene.origin_of("controller.proportional") == "default":
+        yield Finding(code="default_gain", values={"proportional": scene.controller.proportional})
+
+
+def vibration_left(scene: Scene, loop: LoopFactor) -> float | None:
+    """Vibration that is left at most, m: three standard deviations of what noise sustains, or what the
+    shortest injections of two pairs leave, half a step each, where that is more; None where it grows.
+    """
+    noise = loop.deviation or 0.0
+    step = scene.controller.minimum_gas_time * loop.rate
+    return max(_DEVIATIONS * noise, step / math.sqrt(2.0)) if math.isfinite(noise) else None
 
 
 def _noise_at_limit(scene: Scene) -> float:
@@ -286,6 +302,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
         "loop_factor_limit": loop.limit,
         "vibration_rate_m_per_s": loop.rate,
         "stationary_deviation_m": finite(loop.deviation),
+        "vibration_left_m": vibration_left(scene, loop),
         "margins": None
         if margins is None
         else {name: finite(value) for name, value in asdict(margins).items()},
@@ -297,7 +314,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
         "models_used": [asdict(each) for each in used],
     }
     return Information(
-        quantities=tuple(_quantities(loop, margins)),
+        quantities=tuple(_quantities(scene, loop, margins)),
         facts=[
             ("flow law", model.name),
             ("algorithm", settings.kind.replace("_", " ")),
@@ -321,12 +338,15 @@ def _margins(scene: Scene, loop: LoopFactor) -> Margins | None:
     )
 
 
-def _quantities(loop: LoopFactor, margins: Margins | None) -> Iterator[Quantity]:
+def _quantities(scene: Scene, loop: LoopFactor, margins: Margins | None) -> Iterator[Quantity]:
     rows: list[tuple[str, str, str, float | None]] = [
         ("loop_factor", "loop factor", "1", loop.value),
         ("loop_factor_limit", "loop factor from which a residual grows", "1", loop.limit),
         ("stationary_deviation", "standard deviation that noise leaves", "m", finite(loop.deviation)),
     ]
+    if (left := vibration_left(scene, loop)) is not None:
+        left /= scene.rotor.influence_coefficient
+        rows.append(("unbalance_left", "unbalance that noise leaves at most", "kg m", left))
     if margins is not None:
         rows += [
             ("gain_margin", "gain margin, factor", "1", finite(margins.gain_factor)),

@@ -70,6 +70,7 @@ _RUN: Final = (
     "loop_factor",
     "settling_time_s",
     "stationary_deviation_m",
+    "vibration_left_m",
     "gas",
     "overshoots",
     "misadjustments",

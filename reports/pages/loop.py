@@ -142,13 +142,15 @@ def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str
 
 
 def _frames_of(run: Record) -> list[tuple[str, float]]:
-    """Titles and times, s, of the start, the first injections and the end."""
-    last = float(run["time_s"][-1])
+    """Titles and times, s, of the start, of the rest after the first injections, and of the end."""
+    last, groups = float(run["time_s"][-1]), _together(run["injections"])
+    # Liquid flows on for a while after a valve has closed.
+    rests = [*(start for start, _, _ in groups[1:]), last]
     after = [
-        (f"{series(letters)}, {shown(start, 's', digits=2)}", min(end, last))
-        for start, end, letters in _together(run["injections"])[: _FRAMES - 2]
+        (f"{series(letters)}, {shown(start, 's', digits=2)}", min(rest, last))
+        for (start, _, letters), rest in zip(groups, rests, strict=False)
     ]
-    return [("start", 0.0), *after, ("end", last)]
+    return [("start", 0.0), *after[: _FRAMES - 2], ("end", last)]
 
 
 def _rings(run: Record, disc: Record) -> Drawing:

@@ -117,7 +117,13 @@ def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: S
     assert slow.filling_time == pytest.approx(5 * fast.filling_time)
     # What moves while the chamber vents is in proportion, what moves while the front passes the crest is not.
     assert 2 < (slow.smallest_correction or 0.0) / (fast.smallest_correction or 1.0) < 5
-    assert "not in the scene" in line_text((slow, fast))
+    text = line_text((slow, fast))
+    assert "not in the scene" in text
+    for each in (slow, fast):
+        opening, corrected = (each.shortest_opening or 0.0), each.smallest_correction or 0.0
+        assert f"corrects {1e6 * corrected:.2g} um" in text or f"or {1e6 * corrected:.2g} um" in text
+        assert f"({each.end}: {1e3 * opening:.2g} ms; " in text
+    assert "opening that primes the tube at equal fills" in text
 
 
 def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, scene: Scene) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -149,6 +151,27 @@ def test_without_python_control_it_is_named(
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(ImportError, match="pip install control"):
         rb.linear_loop(scene, flow_law=law).plant.to_control()
+
+
+def test_a_gain_that_the_scene_does_not_give_is_named(scene: Scene, law: CompleteLaw, tmp_path: Path) -> None:
+    """The same disc with no line of the gain: margins are those of 0.08 s/um, and both say so."""
+    given = rb.linear_loop(scene, flow_law=law)
+    assert (given.findings, given.to_dict()["findings"]) == ((), [])
+    text, gains = re.subn(
+        r"(?m)^proportional = .*\n", "", rb.bundled_scene("six_chamber").read_text(encoding="utf-8")
+    )
+    assert gains == 2
+    (tmp_path / "bare.toml").write_text(text)
+    bare = rb.load_scene(tmp_path / "bare.toml")
+    assert isinstance(bare, Scene)
+    loop = rb.linear_loop(bare, flow_law=law)
+    found = loop.to_dict()
+    assert found["disk_margin"] == loop.disk_margin
+    assert [(each["code"], each["values"]) for each in found["findings"]] == [
+        ("default_gain", {"proportional": pytest.approx(0.08e6)})
+    ]
+    assert "gives no controller.proportional" in repr(loop)
+    assert "default_gain" in {each.code for each in rb.simulate(bare).findings}
 
 
 def test_another_controller_has_no_linear_loop(scene: Scene, law: CompleteLaw) -> None:

@@ -18,11 +18,12 @@ RUN: dict[str, Any] = {
 }
 
 
-def test_injections_that_begin_together_are_one_frame() -> None:
+def test_injections_that_begin_together_are_one_frame_at_rest_before_the_next() -> None:
+    """Liquid flows on after a valve has closed, at 0.4 s and 2.1 s."""
     assert [(title.split(",")[0], time) for title, time in _frames_of(RUN)] == [
         ("start", 0.0),
-        ("B and C", 0.4),
-        ("A", pytest.approx(2.1)),
+        ("B and C", 2.0),
+        ("A", 30.0),
         ("end", 30.0),
     ]
     assert _injections_until(RUN) == pytest.approx(2.1)

@@ -327,8 +327,11 @@ class Balancer(ABC):
         """What is known without a run of its loop under a scene with other settings."""
         return Information()
 
-    def beyond_capacity(self, scene: SceneFile, ended: Sequence[str]) -> tuple[Finding, ...]:  # noqa: ARG002
-        """What is said of devices whose runs ended for want of capacity under a scene with other settings."""
+    def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:  # noqa: ARG002
+        """What is said of devices whose runs ended for want of capacity under a scene with other settings.
+
+        Args: `settings`: what to call these.
+        """
         return ()
 
     def drawn_input(self, name: str) -> DrawnInput:

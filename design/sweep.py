@@ -23,7 +23,7 @@ from ringbalance.results.numbers import given as given_text
 from ringbalance.results.numbers import percent
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
-from ringbalance.results.rows import Finding, Quantity, around
+from ringbalance.results.rows import Finding, Quantity, Value, around
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
@@ -315,7 +315,7 @@ class Sweep(Result):
             found.append(Finding(code="sweep_resumed", values={"count": kept, "what": what}))
         if best is not None:
             by = "settles first" if self.runs else "cancels most in any direction, nothing was run"
-            values = {"row": best, "by": by, "changes": self._change_text(best)}
+            values: dict[str, Value] = {"row": best, "by": by, "changes": self._change_text(best)}
             found += [Finding(code="sweep_best", values=values), *self._edges(best)]
         if (nearest := self.nearest) is not None:
             fraction = self.driven[nearest]["fraction"]

@@ -152,16 +152,18 @@ def _mesh_findings(scene: Scene) -> Iterator[Finding]:
 
 def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
     point, rest, budgets = calibration.operating_point, calibration.residual, calibration.budgets
+    known = {each.key: each for each in _quantities(calibration)}
     if point.regime is Regime.BLOCKED:
         names = ("priming_pressure_vented", "stall_pressure")
-        needed = max(budgets[name].value for name in names if name in budgets)
+        needed = max(budgets[name].value + budgets[name].total for name in names if name in budgets)
         yield Finding(code="blocked", values={"gas_pressure": point.gas_pressure, "pressure": needed})
     if rest.least_fill_ratio > 0:
         code = "draw_down" if rest.limited_by == "draw_down" else "gas_stalls"
-        yield Finding(code=code, values={"fill_ratio": rest.least_fill_ratio, "depth": rest.depth})
+        values = {"fill_ratio": known["least_fill_ratio"], "depth": known["residual_depth"]}
+        yield Finding(code=code, values=values)
     if point.cavitation_margin is not None:
-        margin, known = point.cavitation_margin, budgets.get("cavitation_margin")
-        width = (point.cavitation_margin_uncertainty or 0.0) if known is None else known.total
+        margin, budget = point.cavitation_margin, budgets.get("cavitation_margin")
+        width = (point.cavitation_margin_uncertainty or 0.0) if budget is None else budget.total
         held = "crest_column_holds" if margin > 0 else "crest_column_separates"
         yield Finding(
             code="crest_column_undecided" if abs(margin) < width else held,

@@ -71,7 +71,7 @@ def tuned(
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
         information=balancer.information(with_values_at(balancer.scene, best.settings)),
-        capacity=_capacity(balancer, *([] if own is None else [own]), best),
+        capacity=_capacity(balancer, own, best),
         ranking=ranked(balancer, best),
         remedies=tried_remedies(balancer, best, search=settings, told=told) if mends else (),
         choices=tried_choices(balancer, search=settings, told=told) if remedies else (),
@@ -79,13 +79,13 @@ def tuned(
     )
 
 
-def _capacity(balancer: Balancer, *judged: Judgement) -> tuple[Finding, ...]:
-    """What is said of capacity where it decides a verdict, of the first of the settings where it does."""
-    for each in judged:
-        scene = with_values_at(balancer.scene, each.settings)
-        found = () if each.verdict == MET else balancer.beyond_capacity(scene, each.outcomes.ended)
-        if found:
-            return found
+def _capacity(balancer: Balancer, own: Judgement | None, best: Judgement) -> tuple[Finding, ...]:
+    """What is said of capacity where it decides a verdict, of the scene's settings first."""
+    for name, each in (("the scene's settings", own), ("the recommended settings", best)):
+        if each is not None and each.verdict != MET:
+            scene = with_values_at(balancer.scene, each.settings)
+            if found := balancer.beyond_capacity(scene, each.outcomes.ended, name):
+                return found
     return ()
 
 

@@ -307,9 +307,9 @@ class LiquidRingBalancer(Balancer):
         """See `Balancer`."""
         return loop_information(liquid_ring_scene(scene), self.model)
 
-    def beyond_capacity(self, scene: SceneFile, ended: Sequence[str]) -> tuple[Finding, ...]:
+    def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:
         """See `Balancer`."""
-        return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended))
+        return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended, settings=settings))
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""

@@ -16,8 +16,14 @@ _NOTICEABLE: Final = 1e-3
 """Fill by which a running flow must go further to be worth a word."""
 
 
-def beyond_capacity(scene: Scene, model: BalancerModel, ended: Sequence[str]) -> Iterator[Finding]:
-    """What is said where devices end for want of capacity. Args: `ended`: how each one's run did."""
+def beyond_capacity(
+    scene: Scene, model: BalancerModel, ended: Sequence[str], *, settings: str = "these settings"
+) -> Iterator[Finding]:
+    """What is said where devices end for want of capacity.
+
+    Args: `ended`: how each one's run did. `settings`: what to call those of the scene.
+    """
+    which = {"settings": settings}
     total, law = 2 * scene.disc.initial_fill, model.flow
     influence = scene.rotor.influence_coefficient
     residual = residual_fill_ratio(scene, law=law)
@@ -30,13 +36,13 @@ def beyond_capacity(scene: Scene, model: BalancerModel, ended: Sequence[str]) ->
 
     if count := ended.count(Outcome.CAPACITY_EXCEEDED.value):
         pulse = moment(max(residual - crest_fill(scene, model), 0.0)) - moment(residual)
-        values: dict[str, Value] = {"count": count, "moment": pulse, "vibration": influence * pulse}
+        values: dict[str, Value] = {**which, "count": count, "moment": pulse, "vibration": influence * pulse}
         if pulse > 0:
             yield Finding(code="capacity_creeps", values=values)
     if count := ended.count(Outcome.STALLED.value):
         further = max(running_fill(scene, model), residual)
         if further < stalled - _NOTICEABLE:
-            values = {"count": count, "counted": moment(stalled), "reached": moment(further)}
+            values = {**which, "count": count, "counted": moment(stalled), "reached": moment(further)}
             yield Finding(code="stall_passed", values=values)
 
 

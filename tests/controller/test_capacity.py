@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from paper_disc import CREST, DENSITY, INFLUENCE, VAPOUR, arm, crest_volume, level, pressure
 
-from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.capacity import beyond_capacity, running_fill
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.models import Scene
@@ -16,7 +16,7 @@ _TOTAL = 0.5
 def test_a_pulse_at_the_residual_fill_sends_over_what_lies_behind_the_middle_of_the_crest(
     paper_scene: Scene,
 ) -> None:
-    balancer = balancer_of(paper_scene)
+    balancer = LiquidRingBalancer(paper_scene)
     ended = ("settled", "capacity_exceeded", "capacity_exceeded")
     (found,) = beyond_capacity(paper_scene, balancer.model, ended)
     least = residual_fill_ratio(paper_scene, law=balancer.model.flow)
@@ -36,7 +36,7 @@ def test_a_long_injection_goes_on_below_the_stall_until_the_column_parts_over_a_
     """It lasts while p + P(x) exceeds D_m + p_c, and a new one starts while it exceeds D_m."""
     weak = paper_scene.with_values({"gas.pressure": gas})
     assert isinstance(weak, Scene)
-    model = balancer_of(weak).model
+    model = LiquidRingBalancer(weak).model
     fill = running_fill(weak, model)
     # The gas itself weighs a little on the liquid.
     assert pressure(CREST) + VAPOUR / 2 - pressure(level(fill)) == pytest.approx(gas, rel=5e-3)
@@ -46,4 +46,4 @@ def test_a_long_injection_goes_on_below_the_stall_until_the_column_parts_over_a_
 
 
 def test_nothing_is_said_where_no_device_ends_for_want_of_capacity(paper_scene: Scene) -> None:
-    assert not [*beyond_capacity(paper_scene, balancer_of(paper_scene).model, ("settled", "hovering"))]
+    assert not [*beyond_capacity(paper_scene, LiquidRingBalancer(paper_scene).model, ("settled", "hovering"))]

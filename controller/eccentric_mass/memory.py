@@ -102,7 +102,7 @@ _COMPLEX: Final = (
     "aim",  # for which the present targets are, kg m
     "position",  # smoothed, m, as velocity, angle and rate
     "velocity",
-    "imbalance",  # as estimated, kg m
+    "imbalance",  # as estimated, later as the vibration at rest shows it, kg m
     "mass_vector",  # p = b sum exp(j phi_i) at the imbalance filter's last sample, kg m
     "mass_pace",  # its time derivative
 )

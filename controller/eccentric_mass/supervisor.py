@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, Motion, friction_needed
+from ringbalance.controller.eccentric_mass.imbalance_filter import mass_vector
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
     CHECK,
@@ -58,7 +59,9 @@ from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 _HOLDS_FOR_SURE: Final = 0.7
-"""Share of the friction known to be there that the drives may be switched off on."""
+"""Share of the friction known to be there beyond which the drives do not stay off."""
+_HOLDS_AGAIN: Final = 0.5
+"""The same, below which drives that hold are switched off again."""
 STALLED_SHARE: Final = 0.5
 """Of the friction stage, beyond which its failure is blamed on the drive."""
 _STILL_TIME: Final = 1.0
@@ -90,7 +93,7 @@ def supervise(
     elif memory.stage == CORRECTION:
         _correction(gates, memory, motion, time)
     elif memory.stage == FINE_TUNING:
-        _fine_tuning(gates, memory, motion, time)
+        _fine_tuning(gates, law, memory, motion, time)
     else:
         _rest(gates, law, memory, motion, time)
 
@@ -227,8 +230,18 @@ def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: fl
     if memory.averaging == NOT_YET:
         _average_from(memory, time + gates.wait)
     if _averaged(gates, memory, motion, time):
-        mean = memory.total / memory.averaged
-        _correct(gates, memory, mean, _influence_of(law, motion.speed), time)
+        mean, influence = memory.total / memory.averaged, _influence_of(law, motion.speed)
+        _correct(gates, memory, mean, influence, time)
+        if memory.residual == mean:
+            _learn(law, memory, mean, influence)
+
+
+@in_place
+def _learn(law: DriveLaw, memory: Record, mean: complex, influence: complex) -> None:
+    """Take the imbalance from the best mean vibration so far, U = z/alpha - p, for the drives to go by."""
+    if influence != 0:
+        place, _ = mass_vector(law.track.moment, (memory.angle[0], memory.angle[1]), (0.0, 0.0))
+        memory.imbalance = mean / influence - place
 
 
 @in_place
@@ -303,7 +316,7 @@ def _correction(gates: Gates, memory: Record, motion: Motion, time: float) -> No
 
 
 @in_place
-def _fine_tuning(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
+def _fine_tuning(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
     """A trial counts from where friction leaves the masses, even if not quite where they should be."""
     if not is_constant(motion):
         _return(memory, memory.base, time, SPEED_CHANGED)
@@ -314,7 +327,10 @@ def _fine_tuning(gates: Gates, memory: Record, motion: Motion, time: float) -> N
         if _over(gates, memory, time):
             _average_from(memory, time + gates.wait)
     elif _averaged(gates, memory, motion, time):
-        next_trial(memory, abs(memory.total) / memory.averaged, gates.margin, gates.tuning_stop)
+        mean = memory.total / memory.averaged
+        next_trial(memory, abs(mean), gates.margin, gates.tuning_stop)
+        if memory.least == abs(mean):
+            _learn(law, memory, mean, _influence_of(law, motion.speed))
         memory.objective = memory.least
         if memory.least <= gates.limit:
             _return(memory, memory.base, time, BALANCED)
@@ -338,16 +354,20 @@ def _try(gates: Gates, memory: Record, time: float) -> None:
 
 @in_place
 def _rest(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
-    """Bring the masses home; then the drives rest while friction holds for sure, or hold from then on."""
+    """Bring the masses home; then the drives rest while friction holds for sure, and hold while it does not."""
     _watch_arrival(gates, memory, time, gates.tuning_near)
     if memory.hold == MOVING and _over(gates, memory, time):
         memory.hold, memory.short = RELEASED, _distance(memory)
         # Where friction has the masses is their place from now on, if that is far short of their goal.
         if memory.short > gates.arrival_angle:
             set_pair(memory.goal, memory.angle[0], memory.angle[1])
-    astray = _distance(memory) > 2 * gates.arrival_angle
-    if memory.hold == RELEASED and (astray or _holding_load(law, memory, motion) > _HOLDS_FOR_SURE):
+    if memory.hold == MOVING:
+        return
+    astray, load = _distance(memory) > 2 * gates.arrival_angle, _holding_load(law, memory, motion)
+    if astray or load > _HOLDS_FOR_SURE:
         memory.hold = HELD
+    elif load < _HOLDS_AGAIN and (_there(gates, memory, time) or _held(gates, memory, time)):
+        memory.hold = RELEASED
 
 
 @in_place

@@ -102,7 +102,7 @@ _COMPLEX: Final = (
     "aim",  # for which the present targets are, kg m
     "position",  # smoothed, m, as velocity, angle and rate
     "velocity",
-    "imbalance",  # as estimated, later as the vibration at rest shows it, kg m
+    "imbalance",  # as estimated, at last as the balanced rotor shows it, kg m
     "mass_vector",  # p = b sum exp(j phi_i) at the imbalance filter's last sample, kg m
     "mass_pace",  # its time derivative
 )
@@ -114,6 +114,9 @@ _PAIRS: Final = (
     "angle",
     "rate",
     "torque",  # known torques summed over the samples since the friction filter's last step, N m
+    "motor",  # torques of the motors at standstill over the time of the friction stage, N m s
+    "back_emf",  # what their back-EMF took of these, likewise, N m s
+    "arm_doubt",  # standard deviation of the friction arms by the constants of motor and masses, m
     "last_rate",  # as measured at that step
     "voltage",
 )

@@ -20,10 +20,8 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     whirl_transition,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import filter_settings
+from ringbalance.controller.eccentric_mass.settings import filter_settings, off_by_one
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.origins import value_at, with_values_at
-from ringbalance.scene.uncertain import NORMAL_95
 
 _LONGEST_STEPS = 2_000
 """Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""
@@ -40,8 +38,8 @@ def rotor_covariance(
     Returns: Shape (2, 2), along the rotor's axes; zero without stated uncertainties, and for a rotor at rest.
     """
     found = np.zeros((2, 2))
-    stated = [each for each in scene.uncertainty if each.quantity in _INPUTS]
-    if speed == 0 or not stated:
+    plants = list(off_by_one(scene, _INPUTS))
+    if speed == 0 or not plants:
         return found
     step = max(scene.imbalance_filter.step, duration / _LONGEST_STEPS)
     count = max(round(duration / step), 1)
@@ -57,10 +55,7 @@ def rotor_covariance(
         return np.asarray(states[-1, 4:6])
 
     middle = estimated(scene)
-    for each in stated:
-        value = value_at(scene, each.quantity)
-        off = value + each.absolute(value) / NORMAL_95
-        plant = with_values_at(scene, {each.quantity: off})
+    for plant in plants:
         change = estimated(plant) - middle
         found += np.outer(change, change)
     return found

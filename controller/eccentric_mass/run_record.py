@@ -38,6 +38,7 @@ from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
 from ringbalance.results.result import PresentedResult
 from ringbalance.results.rows import Finding, Value, sentences
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Records
+from ringbalance.scene.uncertain import NORMAL_95
 
 _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""
@@ -272,6 +273,13 @@ class EccentricRun(PresentedResult):
     def imbalance_covariance(self) -> FloatArray:
         """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
         return np.asarray(self.history["imbalance_covariance"][-1] + self.rotor_covariance)
+
+    @property
+    def friction_half_width(self) -> FloatArray:
+        """Of the friction arms as estimated at the end (95 %), from noise and from what is stated of motor and
+        masses, m, shape (2,)."""
+        doubt = np.square(self.memory["arm_doubt"])
+        return np.asarray(NORMAL_95 * np.sqrt(self.history["friction_variance"][-1] + doubt))
 
     @property
     def stages(self) -> tuple[StageSpan, ...]:

@@ -61,6 +61,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
             "imbalance_half_width_kg_m": (NORMAL_95 * np.sqrt(np.diag(run.imbalance_covariance))).tolist(),
             "friction_arm_m": run.history["friction_arm"][kept].T.tolist(),
             "friction_variance": run.history["friction_variance"][kept].T.tolist(),
+            "friction_half_width_m": run.friction_half_width.tolist(),
         },
         **run.rows().document(),
     }
@@ -150,9 +151,9 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
         ("imbalance_angle", "angle of the imbalance", "rad", math.atan2(y, x) % math.tau, 0.0),
         ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
     ]
-    for number, arm in enumerate(run.history["friction_arm"][-1], start=1):
-        wide = NORMAL_95 * math.sqrt(run.history["friction_variance"][-1][number - 1])
-        rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), wide))
+    arms = zip(run.history["friction_arm"][-1], run.friction_half_width, strict=True)
+    for number, (arm, wide) in enumerate(arms, start=1):
+        rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), float(wide)))
     for number, angle in enumerate(run.mass_angle[:, -1], start=1):
         place = float(angle) % math.tau
         rows.append((f"mass_angle_{number}", f"mass {number} at", "rad", place, 0.0))

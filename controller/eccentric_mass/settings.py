@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
+
+import numpy as np
 
 from ringbalance.controller.eccentric_mass.control_records import Supervisor
 from ringbalance.controller.eccentric_mass.drive_law import (
@@ -16,7 +19,11 @@ from ringbalance.controller.eccentric_mass.drive_law import (
 )
 from ringbalance.controller.eccentric_mass.friction_filter import FrictionNoise, TrackModel
 from ringbalance.controller.eccentric_mass.imbalance_filter import FilterSettings
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.origins import value_at, with_values_at
+from ringbalance.scene.uncertain import NORMAL_95
 
 _DWELL_TIME = 0.2
 """For which a mass must have arrived, s."""
@@ -32,6 +39,11 @@ _LONGEST_TRIAL_MOVE = 10.0
 """s."""
 _CERTAIN = 5.0
 """Standard deviations of a smoothed rate beyond which a mass moves."""
+_CONSTANTS = (
+    *("motor.torque_constant", "motor.back_emf_constant", "motor.resistance"),
+    *("masses.mass", "masses.guide_radius"),
+)
+"""Inputs that a friction arm is as well known as."""
 _FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
 
@@ -57,6 +69,8 @@ class Gates(NamedTuple):
     """Relative standard deviation."""
     friction_gate: float
     """Relative standard deviation."""
+    constants: tuple[float, float, float]
+    """Relative variances and covariance of B_add/b and C_add/b, see `_constants_covariance`."""
     friction_torque: float
     """Standard deviation of the friction torque that makes no difference to arrival, N m."""
     least_estimate: float
@@ -94,6 +108,7 @@ class Gates(NamedTuple):
             dwell=_DWELL_TIME,
             imbalance_gate=scene.imbalance_filter.gate,
             friction_gate=scene.friction_filter.gate,
+            constants=_constants_covariance(scene),
             friction_torque=_FRICTION_ERROR * law.position_gain * keys.arrival_angle,
             least_estimate=_least_estimate(scene),
             least_drive=_LEAST_DRIVE_TIME,
@@ -223,3 +238,30 @@ def _least_estimate(scene: EccentricScene) -> float:
     whirl = believed_whirl(scene)
     longest = _LONGEST_ESTIMATE * scene.supervisor.imbalance_time
     return min(_DECAYS * 2 * whirl.mass / whirl.damping, longest) if whirl.damping > 0 else longest
+
+
+def off_by_one(scene: EccentricScene, inputs: Collection[str]) -> Iterator[EccentricScene]:
+    """Yield the scene with each of these inputs, if stated uncertain, one standard deviation off."""
+    for each in scene.uncertainty:
+        if each.quantity in inputs:
+            value = value_at(scene, each.quantity)
+            yield with_values_at(scene, {each.quantity: value + each.absolute(value) / NORMAL_95})
+
+
+def _constants_covariance(scene: EccentricScene) -> tuple[float, float, float]:
+    """Relative variance of B_add/b, covariance of it with C_add/b, and variance of that, by what is stated of
+    motor and masses.
+
+    While the masses go round, B_add V = C_add w + mu b (W + w)^2 + load, and the rotor's load has the factor
+    b: a friction arm is as well known as these two, however little noise there is.
+    """
+
+    def ratios(plant: EccentricScene) -> FloatArray:
+        constants = PlantParameters.of(plant)
+        return np.array([constants.drive_gain, constants.drive_damping]) / constants.moment
+
+    middle, found = ratios(scene), np.zeros((2, 2))
+    for plant in off_by_one(scene, _CONSTANTS):
+        change = np.divide(ratios(plant) - middle, middle, out=np.zeros(2), where=middle > 0)
+        found += np.outer(change, change)
+    return float(found[0, 0]), float(found[0, 1]), float(found[1, 1])

@@ -40,7 +40,7 @@ from ringbalance.controller.eccentric_mass.memory import (
     EccentricMeasurement,
 )
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.supervisor import arm_deviation, enter, is_constant, supervise
+from ringbalance.controller.eccentric_mass.supervisor import arm_noise, enter, is_constant, supervise
 from ringbalance.controller.eccentric_mass.targets import set_pair, wrapped
 from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import compiled, in_place
@@ -97,7 +97,10 @@ def strategy_step(settings: StrategySettings, memory: Record, measurement: Eccen
         # What the friction filter knows of; accelerations are its own matter.
         load = rotor_load(settings.law, motion, memory.imbalance, (0.0, 0.0))
         for i in range(2):
-            memory.torque[i] = memory.torque[i] + settings.law.torque_per_volt * memory.voltage[i] - load[i]
+            motor = settings.law.torque_per_volt * memory.voltage[i]
+            memory.torque[i] = memory.torque[i] + motor - load[i]
+            memory.motor[i] += settings.step * motor
+            memory.back_emf[i] += settings.step * settings.law.track.damping * motion.rate[i]
 
 
 @in_place
@@ -258,7 +261,8 @@ def _pair_torques(settings: StrategySettings, motion: Motion) -> Pair:
 @in_place
 def _friction_of(settings: StrategySettings, memory: Record, motion: Motion, mass: int) -> float:
     """Torque that makes up for a mass's friction as estimated, N m."""
-    distance, deviation = memory.goal[mass] - memory.angle[mass], arm_deviation(memory, mass)
+    # A motor that is stronger than assumed made the arm smaller, and now gives as much more than asked.
+    distance, deviation = memory.goal[mass] - memory.angle[mass], arm_noise(memory, mass)
     if memory.stage == FRICTION:
         # The paper's law of the pair compensates nothing.
         if settings.friction.pair_gain == 0:

@@ -174,10 +174,11 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
         memory.driven += 1
         memory.stalled += 1 if min(abs(memory.rate[0]), abs(memory.rate[1])) < gates.stall_rate else 0
     for i in range(2):
-        arm, deviation = memory.friction[i].arm, arm_deviation(memory, i)
+        arm, deviation = memory.friction[i].arm, arm_noise(memory, i)
+        memory.arm_doubt[i] = _doubt_of(gates, memory, motion.speed + memory.rate[i], elapsed, i)
         relative = deviation <= gates.friction_gate * arm
         # Friction does not drive: an arm well below zero contradicts the filter's model.
-        possible = arm >= -2 * deviation
+        possible = arm >= -2 * arm_deviation(memory, i)
         little = deviation * gates.moment * motion.speed**2 <= gates.friction_torque
         known = known and possible and (relative or little)
     if known and elapsed >= gates.least_drive:
@@ -191,9 +192,29 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
 
 
 @in_place
-def arm_deviation(memory: Record, mass: int) -> float:
-    """Standard deviation of an estimated friction arm, m."""
+def arm_noise(memory: Record, mass: int) -> float:
+    """Standard deviation of an estimated friction arm by noise, m."""
     return math.sqrt(max(memory.friction[mass].arm_variance, 0.0))
+
+
+@in_place
+def arm_deviation(memory: Record, mass: int) -> float:
+    """The same by noise and by the constants of motor and masses, m."""
+    return math.hypot(arm_noise(memory, mass), memory.arm_doubt[mass])
+
+
+@in_place
+def _doubt_of(gates: Gates, memory: Record, speed: float, elapsed: float, mass: int) -> float:
+    """Standard deviation that the constants give an arm (T - C w)/(b (W + w)^2) less the rotor's load, m.
+
+    Args: `speed`: W + w, rad/s. `elapsed`: of the stage, s.
+    """
+    if elapsed <= 0 or speed == 0:
+        return 0.0
+    motor, back = memory.motor[mass] / elapsed, memory.back_emf[mass] / elapsed
+    of_motor, of_both, of_back = gates.constants
+    variance = motor * motor * of_motor - 2 * motor * back * of_both + back * back * of_back
+    return math.sqrt(max(variance, 0.0)) / (gates.moment * speed * speed)
 
 
 @in_place
@@ -232,13 +253,17 @@ def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: fl
     if _averaged(gates, memory, motion, time):
         mean, influence = memory.total / memory.averaged, _influence_of(law, motion.speed)
         _correct(gates, memory, mean, influence, time)
-        if memory.residual == mean:
+        if memory.stage == REST:
             _learn(law, memory, mean, influence)
 
 
 @in_place
 def _learn(law: DriveLaw, memory: Record, mean: complex, influence: complex) -> None:
-    """Take the imbalance from the best mean vibration so far, U = z/alpha - p, for the drives to go by."""
+    """Stay here, with the imbalance that the mean vibration shows, U = z/alpha - p, for the drives to go by.
+
+    While the masses go from place to place an error of the filter's estimate holds them off all goals alike.
+    """
+    set_pair(memory.goal, memory.angle[0], memory.angle[1])
     if influence != 0:
         place, _ = mass_vector(law.track.moment, (memory.angle[0], memory.angle[1]), (0.0, 0.0))
         memory.imbalance = mean / influence - place
@@ -329,11 +354,10 @@ def _fine_tuning(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, ti
     elif _averaged(gates, memory, motion, time):
         mean = memory.total / memory.averaged
         next_trial(memory, abs(mean), gates.margin, gates.tuning_stop)
-        if memory.least == abs(mean):
-            _learn(law, memory, mean, _influence_of(law, motion.speed))
         memory.objective = memory.least
         if memory.least <= gates.limit:
-            _return(memory, memory.base, time, BALANCED)
+            _learn(law, memory, mean, _influence_of(law, motion.speed))
+            enter(memory, REST, time, BALANCED)
         else:
             _try(gates, memory, time)
 

@@ -55,7 +55,8 @@ def _estimate_rows(estimates: Record, truth: Record) -> list[Record]:
     covariance = np.asarray(estimates["imbalance_covariance"][-1])
     covariance = covariance + np.asarray(estimates["imbalance_rotor_covariance"])
     last = [row[-1] for row in estimates["imbalance_kg_m"]]
-    arms, variances = ([row[-1] for row in estimates[key]] for key in ("friction_arm_m", "friction_variance"))
+    arms = [row[-1] for row in estimates["friction_arm_m"]]
+    variances = [(width / DEVIATIONS) ** 2 for width in estimates["friction_half_width_m"]]
     plant = truth["friction_arm_m"]
     entries = [
         ("imbalance along x", "kg m", last[0], covariance[0, 0], true[0]),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from eccentric_runs import bundled
 from scipy.integrate import solve_ivp
 
+from ringbalance.controller.eccentric_mass.devices import device
 from ringbalance.controller.eccentric_mass.friction_filter import (
     FRICTION_FILTER,
     FrictionNoise,
@@ -16,6 +19,12 @@ from ringbalance.controller.eccentric_mass.friction_filter import (
     friction_restart,
     friction_step,
 )
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.supervisor import arm_deviation
+from ringbalance.scene.draws import run_noise
+from ringbalance.scene.origins import InputUncertainty
+from ringbalance.verification.papers import at_constant_speed, changed
 
 TRACK = TrackModel(0.0112, 0.16, 0.0414)
 SPEED = 10.47
@@ -150,3 +159,35 @@ def test_the_printed_jacobian_is_that_of_a_mass_without_a_motor() -> None:
     assert abs(printed - right) > 2e-3
     bare = TrackModel(inertia, gamma, TRACK.moment)
     assert printed == pytest.approx(_friction_flow(bare, rate, arm, SPEED, 0.0, STEP, True)[1])
+
+
+@pytest.mark.parametrize(("name", "time_limit"), [("eccentric_mass_paper", 8.0), ("washing_machine", 5.0)])
+def test_intervals_of_friction_arms_hold_the_arms_of_built_machines(name: str, time_limit: float) -> None:
+    """Constants of motor and masses are in them; noise alone covers a quarter."""
+    scene = at_constant_speed(bundled(name), time_limit=time_limit)
+    told, within, alone = StrategySettings.of(scene), [], []
+    for number in range(40):
+        plant = device(scene, number).scene
+        run = simulate_eccentric(plant, seed=run_noise(scene.run.seed, number), settings=told)
+        error = np.abs(run.history["friction_arm"][-1] - plant.masses.friction_arm)
+        within += list(error <= run.friction_half_width)
+        alone += list(error <= 1.96 * np.sqrt(run.history["friction_variance"][-1]))
+    assert 0.90 <= np.mean(within) <= 0.98
+    assert np.mean(alone) < 0.5
+
+
+def test_a_motor_that_is_off_moves_the_arms_by_what_the_drives_allow_for() -> None:
+    """One standard deviation of a torque constant known to 5 %, in the margins of breaking away and holding."""
+    scene = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=8.0)
+    stated = InputUncertainty(quantity="motor.torque_constant", half_width=0.05, relative=True)
+    doubtful = replace(scene, uncertainty=(stated,))
+    plant = changed(scene, {"motor.torque_constant": scene.motor.torque_constant * (1 + 0.05 / 1.96)})
+    told = StrategySettings.of(doubtful)
+    same, off = (simulate_eccentric(each, settings=told) for each in (doubtful, plant))
+    moved = np.abs(off.history["friction_arm"][-1] - same.history["friction_arm"][-1])
+    doubt = same.memory["arm_doubt"]
+    np.testing.assert_allclose(moved, doubt, rtol=0.15, atol=2e-5)
+    assert doubt.max() > 2e-4
+    for mass in range(2):
+        noise = same.history["friction_variance"][-1][mass]
+        assert arm_deviation(same.memory, mass) == pytest.approx(math.sqrt(noise + doubt[mass] ** 2))

@@ -64,6 +64,8 @@ EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
     }
 )
 """What `run_row` gives, of a point without runs."""
+_CEILING: Final = ", at most"
+"""End of a name of a quantity that only limits what is set."""
 FAULTS: Final = (ValueError, ArithmeticError, RuntimeError)
 """Besides `SceneError`, how a point may break down."""
 
@@ -165,7 +167,7 @@ def _values(designs: Designs, *, near: TubeFlow | None = None) -> FloatArray:
 
 def _of_balancer(scene: SceneFile) -> Record:
     """What a balancer without the array core knows of itself without a run."""
-    known = {each.key: each for each in balancer_of(scene).quantities() if each.value is not None}
+    known = {_column(each): each for each in balancer_of(scene).quantities() if each.value is not None}
     return {
         "sha256": scene.sha256,
         "values": {name: [_plain(each.value or 0.0), _half_width(each)] for name, each in known.items()},
@@ -173,6 +175,11 @@ def _of_balancer(scene: SceneFile) -> Record:
         "status": "ok",
         "finding": None,
     }
+
+
+def _column(quantity: Quantity) -> str:
+    """Name that cannot be taken for a setting where the quantity is the most that a setting may be."""
+    return quantity.key + _CEILING * quantity.name.endswith(_CEILING)
 
 
 def _half_width(quantity: Quantity) -> float | None:

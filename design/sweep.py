@@ -26,6 +26,7 @@ from ringbalance.results.result import Result, Rows, Table, csv_text, extra
 from ringbalance.results.rows import Finding, Quantity, Value, around
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
 
@@ -102,13 +103,19 @@ class Sweep(Result):
         """Whether each point meets what the scene requires or, without runs, has a flow."""
         return tuple(verdict == (MET if self.runs else "ok") for verdict in self.verdicts)
 
+    @property
+    def _flows(self) -> bool:
+        """Whether a static row tells if liquid flows."""
+        return scene_kind(self.scene.balancer).arrays
+
     @cached_property
     def best(self) -> int | None:
-        """The feasible point that settles first or, without runs, reaches the largest unbalance."""
+        """The feasible point that settles first or, without runs, reaches the largest unbalance by a flow."""
         if self.runs:
             ranked = [(each["settling_time"], i) for i, each in enumerate(self.driven)]
         else:
-            ranked = [(reach_of(row), i) for i, row in enumerate(self.static)]
+            # The reach decides between rows with a flow; of other balancers nothing is judged without runs.
+            ranked = [(reach_of(row), i) for i, row in enumerate(self.static) if self._flows]
             ranked = [(None if value is None else -value, i) for value, i in ranked]
         return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
 
@@ -310,7 +317,8 @@ class Sweep(Result):
     def _findings(self) -> list[Finding]:
         count, total, best = sum(self.feasible), len(self.points), self.best
         numbers = {"count": count, "total": total, "runs": self.runs}
-        found = [Finding(code="sweep_met" if self.runs else "sweep_flows", values=numbers)]
+        code = "sweep_met" if self.runs else "sweep_flows" if self._flows else "sweep_not_judged"
+        found = [Finding(code=code, values=numbers)]
         for what, kept in self.resumed.items():
             found.append(Finding(code="sweep_resumed", values={"count": kept, "what": what}))
         if best is not None:

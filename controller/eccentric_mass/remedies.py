@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.balancer import Outcomes, Remedy, Settings
+from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -26,8 +27,10 @@ _SPARE: Final = (1.05, 1.5)
 """Times the masses that cancel the imbalance of nearly every device."""
 _NEARLY: Final = 0.99
 """Of the devices, whose imbalance masses are sized by."""
-_FINER: Final = (0.5, 0.25)
-"""Times the noise of a sensor."""
+_FINER: Final = {"": (0.5, 0.25), "finer_": (0.05,)}
+"""Times the noise of a sensor; where half of it serves none, a twentieth is tried all the same."""
+_SHORTER: Final = (0.5, 0.25, 0.125)
+"""Times the wait before the vibration is averaged, which sets the pace of the strategy."""
 _LIMITS: Final = (1.2, 2.0)
 """Times the largest amplitude that the drawn devices come down to."""
 _BLIND: Final = frozenset(
@@ -38,6 +41,7 @@ _BLIND: Final = frozenset(
         EccentricOutcome.IMBALANCE_UNCERTAIN,
         EccentricOutcome.FRICTION_UNCERTAIN,
         EccentricOutcome.NOT_ARRIVED,
+        EccentricOutcome.TIME_LIMIT,
     }
 )
 """Ends of runs that less noise may mend."""
@@ -55,6 +59,7 @@ _STRONGER: Final = ("friction_filter.speed_gain", "friction_filter.drive_speed",
 _WALKS: Final = ("friction_filter.rate_walk", "friction_filter.friction_walk")
 _BY_END: Final[Mapping[EccentricOutcome, tuple[tuple[Mapping[str, float | str], ...], ...]]] = {
     EccentricOutcome.TIME_LIMIT: (tuple({"run.time_limit": factor} for factor in (2.0, 4.0, 16.0)),),
+    EccentricOutcome.RISES_AGAIN: (({"supervisor.correction": "measured"},),),
     EccentricOutcome.TUNING_TIME: (({"supervisor.fine_tuning_time": 4.0, "run.time_limit": 2.0},),),
     EccentricOutcome.MASSES_MOVE: (
         ({"motor.maximum_voltage": 4.0},),
@@ -98,6 +103,7 @@ def remedies_of(
         *first,
         *_of_loops(scene),
         *_of_ends(scene, ended),
+        *_of_pace(scene, drawn),
         *_of_sensors(scene, drawn),
         *_of_limit(scene, drawn),
     )
@@ -105,16 +111,30 @@ def remedies_of(
 
 def _of_loops(scene: EccentricScene) -> Iterator[Remedy]:
     """Gains that the drives bear, and the transition that bears every step."""
-    if not all(loop.stable for loop in RecommendedGains.of(scene).loops):
+    if not _stable(scene):
         yield Remedy(code="gains", changes=advised(scene))
     if scene.imbalance_filter.discretisation == "euler":
         yield Remedy(code="discretisation", changes={"imbalance_filter.discretisation": "exact"})
+
+
+def _stable(scene: EccentricScene) -> bool:
+    return all(loop.stable for loop in RecommendedGains.of(scene).loops)
+
+
+def _of_pace(scene: EccentricScene, drawn: Outcomes) -> Iterator[Remedy]:
+    """A shorter wait, where devices settle later than the scene requires."""
+    required, wait = scene.requirement.settling_time, scene.fine_tuning.wait
+    if required is not None and wait > 0 and np.any(drawn.settled & (drawn.settling_time > required)):
+        yield from (Remedy(code="wait", changes={"fine_tuning.wait": factor * wait}) for factor in _SHORTER)
 
 
 def _of_ends(scene: EccentricScene, ended: Counter[str]) -> Iterator[Remedy]:
     """For the commonest end first; none that sets what the scene has, or that it leaves open."""
     kinds: dict[str, list[Settings]] = {}
     for end, _ in ended.most_common():
+        # Drives that are unstable do not come to an end in any time.
+        if end == EccentricOutcome.TIME_LIMIT and not _stable(scene):
+            continue
         for sizes in _BY_END.get(EccentricOutcome(end), ()):
             changed: list[Settings] = [new for size in sizes if (new := _changed(scene, size))]
             kinds.setdefault(_code(sizes[0]), changed)
@@ -153,21 +173,26 @@ def _of_sensors(scene: EccentricScene, drawn: Outcomes) -> Iterator[Remedy]:
     for code, paths in _SENSORS.items():
         values = {path: value_at(scene, path) for path in paths}
         if any(value > 0 for path, value in values.items() if path.startswith("sensor.")):
-            for factor in _FINER:
+            for prefix, factor in ((prefix, each) for prefix, some in _FINER.items() for each in some):
                 finer = {path: factor * value for path, value in values.items() if value > 0}
-                yield Remedy(code=code, changes=finer)
+                yield Remedy(code=prefix + code, changes=finer)
 
 
 def _of_limit(scene: EccentricScene, drawn: Outcomes) -> Iterator[Remedy]:
-    """As high as what is reached; where the scene requires a residual, as low as that."""
+    """As high as what is reached, below the vibration without balancing; or as low as a required residual."""
     limit, residual = scene.supervisor.limit, scene.requirement.residual
     reached = float(np.max(drawn.final_amplitude))
     if residual is not None:
         if residual < limit:
             yield Remedy(code="limit", changes={"supervisor.limit": residual})
     elif limit < reached < math.inf:
-        for factor in _LIMITS:
-            yield Remedy(code="limit", changes={"supervisor.limit": _rounded_up(factor * reached)})
+        speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
+        before = (
+            abs(PlantParameters.of(scene).steady_whirl(speed, scene.masses.initial_angle)) if speed else 0.0
+        )
+        for value in (_rounded_up(factor * reached) for factor in _LIMITS):
+            if value < before:
+                yield Remedy(code="limit", changes={"supervisor.limit": value})
 
 
 def _rounded_up(value: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import ClassVar, Final
@@ -15,14 +15,15 @@ from ringbalance.controller.eccentric_mass.drive_law import believed_whirl
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
     CAUSE_NAMES,
-    CHECK,
-    CORRECTION,
+    FAILED,
     FRICTION,
     HELD,
     IMBALANCE,
+    LOCKED_MASSES,
     NONE,
     POSITIONING,
     RELEASED,
+    REST,
     SPEED_CHANGED,
     SPEED_NOT_CONSTANT,
     STAGE_NAMES,
@@ -72,6 +73,22 @@ class EccentricOutcome(StrEnum):
     TIME_LIMIT = "time_limit"
     DIVERGED = "diverged"
     LOCKED = "locked"
+
+
+_OF_DRIVES: Final = frozenset(
+    {
+        EccentricOutcome.TIME_LIMIT,
+        EccentricOutcome.NOT_ARRIVED,
+        EccentricOutcome.MASSES_MOVE,
+        EccentricOutcome.STALLED,
+        EccentricOutcome.FRICTION_UNCERTAIN,
+    }
+)
+"""Ends that drives bring about which are unstable or give more than friction takes."""
+_OFTEN: Final = 0.5
+"""Share of a run with a voltage at its limit, beyond which that is what keeps masses from their goals."""
+_RUN_AWAY: Final = 5.0
+"""Turns of a mass beyond which it does not come to its goal: all moves together are shorter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,17 +221,16 @@ class EccentricRun(PresentedResult):
 
     @cached_property
     def outcome(self) -> EccentricOutcome:
-        """SETTLED only when the strategy was content and the true amplitude stays within the limit after."""
+        """SETTLED when the true amplitude stays within the limit to the end, whatever the strategy does."""
         if self.diverged:
             return EccentricOutcome.DIVERGED
         cause = int(self.history["cause"][-1])
-        kept = self.within_since is not None and self.left is None
-        if cause == BALANCED:
-            return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
-        # What was measured to be within the limit may be made better still as the run ends.
-        correcting = self.stage in {CHECK, CORRECTION} and self.memory["objective"] <= self.limit
-        if kept and (cause == SPEED_CHANGED or correcting):
+        if cause == LOCKED_MASSES:
+            return EccentricOutcome.LOCKED
+        if self.within_since is not None and self.left is None:
             return EccentricOutcome.SETTLED
+        if cause == BALANCED:
+            return EccentricOutcome.RISES_AGAIN
         cause = self._shown_cause(cause)
         return EccentricOutcome.TIME_LIMIT if cause == NONE else EccentricOutcome(CAUSE_NAMES[cause])
 
@@ -276,7 +292,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def friction_half_width(self) -> FloatArray:
-        """Of the friction arms as estimated at the end (95 %), from noise and from what is stated of motor and
+        """Of the friction arms as estimated (95 %), from noise and from what is stated of motor and
         masses, m, shape (2,)."""
         doubt = np.square(self.memory["arm_doubt"])
         return np.asarray(NORMAL_95 * np.sqrt(self.history["friction_variance"][-1] + doubt))
@@ -343,12 +359,25 @@ class EccentricRun(PresentedResult):
         first, second = self.mass_angle
         return float(np.min(np.abs(np.pi - np.mod(np.pi - (second - first), 2 * np.pi))))
 
+    @property
+    def run_away(self) -> float:
+        """Turns that a mass has made from where it first set out to its goal, to where it is at the end."""
+        if not self.friction_known:
+            return 0.0
+        start = int(np.argmax(self.history["stage"] == POSITIONING))
+        return float(np.max(np.abs(self.mass_angle[:, -1] - self.mass_angle[:, start]))) / (2 * np.pi)
+
     @cached_property
     def ended(self) -> Finding:
         """How the run ended, with its numbers."""
         code = f"masses_{self.outcome.value}"
-        if self.outcome is EccentricOutcome.RISES_AGAIN and self.left is None:
-            code = "masses_not_kept"
+        if self.outcome is EccentricOutcome.RISES_AGAIN:
+            code = "masses_not_kept" if self.left is None else _risen(self, self.left)
+        if self.outcome in _OF_DRIVES and (unstable := next(_unstable(self.scene), None)):
+            numbers = {**_numbers(self), **unstable.values}
+            return replace(_finding("masses_unstable", numbers), change=unstable.change)
+        if self.outcome in _OF_DRIVES and self.run_away > _RUN_AWAY:
+            code = "masses_run_away" if self.saturation > _OFTEN * self.end else "masses_turn"
         if self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"
         return _finding(code, _numbers(self))
@@ -369,6 +398,20 @@ class EccentricRun(PresentedResult):
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, as sentences."""
         return tuple(each.text for each in self.warned)
+
+
+def _risen(run: EccentricRun, worst: int) -> str:
+    """Why a balanced rotor has left its limit: masses that moved, or the speed that magnifies what they left.
+
+    Args: `worst`: sample of the largest vibration.
+    """
+    first = int(np.argmax(run.history["cause"] == BALANCED))
+    moved = np.abs(run.mass_angle[:, first : worst + 1] - run.mass_angle[:, [first]])
+    still = np.max(moved, initial=0.0) <= run.scene.supervisor.arrival_angle
+    if not still or run.speed[worst] == run.speed[first]:
+        return "masses_rises_again"
+    by_trials = run.scene.supervisor.correction == "trials"
+    return "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
 
 
 def _finding(code: str, numbers: Mapping[str, Value]) -> Finding:
@@ -407,7 +450,10 @@ def _unstable(scene: EccentricScene) -> Iterator[Finding]:
 def _due(run: EccentricRun) -> dict[str, bool]:
     """Whether each warning is."""
     unlike = run.innovation is not None and run.innovation > _WRONG_MODEL
+    settled = run.outcome is EccentricOutcome.SETTLED
     return {
+        "strategy_not_finished": settled and run.stage not in {REST, FAILED},
+        "strategy_failed": settled and run.stage == FAILED,
         "drive_nearly_stalled": _stalled(run) > _NOTICEABLE_STALL and not run.friction_known,
         "voltage_at_limit": run.saturation > 0,
         "euler_too_coarse": _by_euler(run),
@@ -451,6 +497,8 @@ def _numbers(run: EccentricRun) -> dict[str, Value]:
         "friction_gate": scene.friction_filter.gate,
         "positioning_time": supervisor.positioning_time,
         "stage": STAGE_NAMES[run.stage],
+        "turns": run.run_away,
+        "cause": CAUSE_NAMES[int(run.history["cause"][-1])].replace("_", " "),
         "stalled_fraction": _stalled(run),
         "saturation": run.saturation,
         "euler_limit": _euler_limit(run),

@@ -152,8 +152,10 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
         ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
     ]
     arms = zip(run.history["friction_arm"][-1], run.friction_half_width, strict=True)
-    for number, (arm, wide) in enumerate(arms, start=1):
-        rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), float(wide)))
+    for number, (arm, half) in enumerate(arms, start=1):
+        rows.append(
+            (f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), float(half))
+        )
     for number, angle in enumerate(run.mass_angle[:, -1], start=1):
         place = float(angle) % math.tau
         rows.append((f"mass_angle_{number}", f"mass {number} at", "rad", place, 0.0))

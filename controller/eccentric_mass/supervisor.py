@@ -378,7 +378,7 @@ def _try(gates: Gates, memory: Record, time: float) -> None:
 
 @in_place
 def _rest(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
-    """Bring the masses home; then the drives rest while friction holds for sure, and hold while it does not."""
+    """Bring the masses home; then the drives rest while friction surely holds, and hold while it does not."""
     _watch_arrival(gates, memory, time, gates.tuning_near)
     if memory.hold == MOVING and _over(gates, memory, time):
         memory.hold, memory.short = RELEASED, _distance(memory)

@@ -171,6 +171,17 @@ def test_eccentric_masses_have_their_own_rows() -> None:
     assert all(0 <= run["fraction"] <= 1 for run in found.driven)
 
 
+def test_masses_without_runs_are_not_judged_and_their_ceilings_are_named_so() -> None:
+    scene = rb.load_scene(rb.bundled_scene("washing_machine"))
+    found = rb.sweep(scene, {"masses.mass": [0.4, 0.8]})
+    assert [each.code for each in found.rows().findings] == ["sweep_not_judged"]
+    assert found.best is None
+    settings = {"lqr.state_weight", "friction_filter.speed_gain", "friction_filter.pair_gain", "voltage_hold"}
+    names = {name.partition(" [")[0] for name in found.columns()}
+    assert {f"{each}, at most" for each in settings} <= names
+    assert not settings & names
+
+
 def test_a_point_that_is_refused_is_a_row(paper_scene: Scene) -> None:
     found = rb.sweep(paper_scene, {"tube.hump_radius": ["30 mm", "500 mm"]}, runs=1)
     assert [row["status"] for row in found.static] == ["ok", "point_refused"]

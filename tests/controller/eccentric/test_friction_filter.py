@@ -176,8 +176,8 @@ def test_intervals_of_friction_arms_hold_the_arms_of_built_machines(name: str, t
     assert np.mean(alone) < 0.5
 
 
-def test_a_motor_that_is_off_moves_the_arms_by_what_the_drives_allow_for() -> None:
-    """One standard deviation of a torque constant known to 5 %, in the margins of breaking away and holding."""
+def test_a_motor_that_is_off_moves_the_arms_by_what_the_drives_take_off_them() -> None:
+    """One standard deviation of a torque constant known to 5 %, in the margin of what friction holds."""
     scene = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=8.0)
     stated = InputUncertainty(quantity="motor.torque_constant", half_width=0.05, relative=True)
     doubtful = replace(scene, uncertainty=(stated,))

@@ -46,7 +46,7 @@ def paper() -> EccentricScene:
     return at_constant_speed(bundled("eccentric_mass_paper"), time_limit=40.0)
 
 
-def settling(scene: EccentricScene, count: int, *, within: float = math.inf) -> int:
+def settling(scene: EccentricScene, count: int, *, within: float = 1e9) -> int:
     """Devices, of `count` that sized nothing, that settle."""
     return int(np.sum(balancer_of(scene).run({}, Draws.block(1 << 22, count)).settling_time <= within))
 

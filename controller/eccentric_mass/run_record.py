@@ -227,12 +227,13 @@ class EccentricRun(PresentedResult):
         cause = int(self.history["cause"][-1])
         if cause == LOCKED_MASSES:
             return EccentricOutcome.LOCKED
-        if self.within_since is not None and self.left is None:
+        shown = self._shown_cause(cause)
+        # The amplitude of a rotor that hardly turns tells nothing.
+        if shown != TOO_SLOW and self.within_since is not None and self.left is None:
             return EccentricOutcome.SETTLED
         if cause == BALANCED:
             return EccentricOutcome.RISES_AGAIN
-        cause = self._shown_cause(cause)
-        return EccentricOutcome.TIME_LIMIT if cause == NONE else EccentricOutcome(CAUSE_NAMES[cause])
+        return EccentricOutcome.TIME_LIMIT if shown == NONE else EccentricOutcome(CAUSE_NAMES[shown])
 
     def _shown_cause(self, cause: int) -> int:
         """Of the end; a run that ends within a stage may show already why the stage would have failed."""

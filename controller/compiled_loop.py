@@ -180,12 +180,12 @@ def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
     above_first = run.last_seen - run.first_seen > loop.noise_floor
     if run.rises > loop.rises_tolerated or (run.rises == loop.rises_tolerated and above_first):
         return RISING
-    if run.idle >= loop.idle_tolerated:
-        return IDLE
     ends = run.cut == 0 and loop.to_time_limit == 0 and run.resting > 0 and loop.exact > 0
     if ends and _rests(loop, plant, run, motions):
         return AT_REST
-    return TIME if time_left(loop, run) <= 0.0 else NONE
+    if time_left(loop, run) > 0.0:
+        return NONE
+    return IDLE if run.idle >= loop.idle_tolerated else TIME
 
 
 @in_place

@@ -38,7 +38,7 @@ CHUNK: Final = 128
 ALLOWED: Final = 0.01
 """Fraction of the samples in that time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
-"""Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
+"""Commands in a row, beyond one for each chamber, from which on a run that ends is said to move nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -42,7 +42,7 @@ NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
 """Why a loop stopped cycling; it goes on, or
 
     the amplitude rose after more operations in a row than the algorithm can explain,
-    the longest injections of several commands in a row moved no liquid,
+    the time is up, and the longest injections of the last commands moved no liquid,
     the controller rests, the sensor is exact and no liquid can move: nothing will change,
     the time is up,
     there are as many samples as a run may have,

@@ -14,6 +14,7 @@ from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.tuning import (
     causes_of,
+    if_exact,
     judgement_document,
     plain_settings,
     required_document,
@@ -143,7 +144,8 @@ def _findings(design: Design) -> Iterator[Finding]:
         yield from _refusals(static.refusals, static.points)
         return
     changes = {path: value for path, value in design.point.items() if isinstance(value, float | int | str)}
-    yield Finding(code=_CODES[judgement.verdict], values=share_values(judgement), change=changes)
+    code = _CODES[judgement.verdict] + if_exact(design.given, judgement)
+    yield Finding(code=code, values=share_values(judgement), change=changes)
     times = times_of(judgement)
     if times["p50"] is not None:
         code = "tuned_half" if times["p90"] is None else "tuned_times"

@@ -39,6 +39,8 @@ _MOVED: Final = 0.05
 """By which a key is moved to either side, relative."""
 _DEVICES: Final = 256
 """On which a moved key is answered."""
+_TAKEN: Final = 3
+"""Designs at most, each the next larger, of which the verdict is asked on devices that have chosen none."""
 _FRONT: Final = 6
 _APART: Final = 0.05
 """Relative difference in size, time or gas that makes another design worth a line."""
@@ -140,14 +142,16 @@ def run_design(
         found = hunt(space, asked=asked, needed=needed, executor=crew, told=told, seed=start)
         races, raced = found.races, len(found.races.candidates)
         judged = judged_designs(found)
-        best = _taken(judged, sized=space.sized)
+        best: Judged | None = None
         judgement: Judgement | None = None
         effects: tuple[Effect, ...] = ()
-        if best is not None:
+        for best in _taken(judged, sized=space.sized):
             told("the verdict, and what changes of it would do")
             settings = best.judgement.settings
             whole = partial(judged_design, scene, best.point, settings=settings, whole=True)
             effects, judgement = _effects(space, best, settings, crew, whole)
+            if judgement is not None and judgement.verdict == MET:
+                break
         sized = best if space.sized else None
         doubt = _doubt(races, sized) if sized else None
     return Design(
@@ -179,15 +183,15 @@ def _reach(space: Space, point: Point) -> float | None:
     return reach_of(row)
 
 
-def _taken(judged: Sequence[Judged], *, sized: bool) -> Judged | None:
-    """The smallest that meets what is required, of one size that with the least gas; else the one that serves
-    most devices."""
+def _taken(judged: Sequence[Judged], *, sized: bool) -> list[Judged]:
+    """The first that meet what is required, the smallest first, of one size that with the least gas; else the
+    one that serves most devices."""
 
     def order(each: Judged) -> float:
         return each.size if sized else float(np.nanmedian(each.judgement.outcomes.energy))
 
-    best = min((each for each in judged if each.met), key=order, default=None)
-    return best or max(judged, key=lambda each: each.judgement.fraction.value, default=None)
+    met = sorted((each for each in judged if each.met), key=order)[:_TAKEN]
+    return met or sorted(judged, key=lambda each: -each.judgement.fraction.value)[:1]
 
 
 def _smaller(judged: Sequence[Judged], best: Judged) -> tuple[float, Proportion] | None:

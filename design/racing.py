@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import Balancer, Demand, Draws, Outcomes, Settings, quick_balancer
-from ringbalance.controller.judging.judge import FRESH, Judgement, judged_all
+from ringbalance.controller.judging.judge import CHOOSING, FRESH, Judgement, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
@@ -219,9 +219,9 @@ def judged_design(
 ) -> Judgement | None:
     """The settings that serve most devices of a design; None: it breaks down.
 
-    Judged on devices on which nothing was chosen, the same for every design.
+    Judged on devices on which no settings were chosen, the same for every design.
     Args: `place`, `settings`: some to judge; without any the scene's own. `search`: whether others
-        are looked for as `tune` does. `whole`: as `Draws`.
+        are looked for as `tune` does. `whole`: as `Draws`, and on devices that have chosen no design either.
     """
     try:
         balancer = quick_balancer(point_scene(scene, point))
@@ -252,7 +252,7 @@ def _judged(balancer: Balancer, settings: Sequence[Settings], *, whole: bool) ->
     best, running, first = None, list(settings), 0
     done: list[Judgement] = []
     for last in sorted({few, min(_CHOSEN, most), most}):
-        count, start = last - first, FRESH + first
+        count, start = last - first, (FRESH if whole else CHOOSING) + first
         ran = judged_all(balancer, running, first=count, most=count, start=start, whole=whole)
         done = [a.joined(b) for a, b in zip(done, ran, strict=True)] if done else list(ran)
         best = max(done, key=lambda each: each.fraction.value, default=None)

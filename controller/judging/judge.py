@@ -18,6 +18,9 @@ MOST_DRAWS: Final = 1024
 """Devices after which a verdict that is still open stays so, of a balancer whose runs are fast."""
 FRESH: Final = 1 << 20
 """Number of the first device that judges: settings are chosen on the devices from 0 on."""
+CHOOSING: Final = 1 << 19
+"""Number of the first device that chooses between settings, remedies or designs that a search has found: the
+best of several on the devices that judge them would promise too much."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,11 +74,23 @@ def judged(
     settings: Settings,
     *,
     most: int | None = None,
+    start: int = FRESH,
     further: float = FURTHER,
     progress: Callable[[str], None] | None = None,
 ) -> Judgement:
     """One setting; see `judged_all`."""
-    return judged_all(balancer, [settings], most=most, further=further, progress=progress)[0]
+    return judged_all(balancer, [settings], most=most, start=start, further=further, progress=progress)[0]
+
+
+def best_of(
+    balancer: Balancer, settings: Sequence[Settings], *, progress: Callable[[str], None] | None = None
+) -> Settings:
+    """Those that serve most of some devices that judge nothing; the earlier of equals."""
+    if len(settings) == 1:
+        return settings[0]
+    few = balancer.verdict_draws[0]
+    tried = judged_all(balancer, settings, first=few, most=few, start=CHOOSING, progress=progress)
+    return max(tried, key=lambda each: each.fraction.value).settings
 
 
 def judged_all(

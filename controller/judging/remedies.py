@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any, Final
 
 from ringbalance.controller.balancer import Balancer, Remedy, Settings
-from ringbalance.controller.judging.judge import Judgement, judged, judged_all
+from ringbalance.controller.judging.judge import CHOOSING, FRESH, Judgement, judged, judged_all
 from ringbalance.results.requirements import MET, MISSED, Proportion
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.faults import SceneError
@@ -88,7 +88,8 @@ def tried_remedies(
 
     Of one kind, alternatives are tried from the smallest change on until one meets, none meets at all, or
     fewer devices meet than before; where no device of the scene as it is does, until one kind meets.  Where
-    none meets by itself, the best two together follow.
+    none meets by itself, the best two together follow.  The best, and all that meet, are then judged on
+    devices on which nothing was chosen.
     Args: `own`: judgement of the best settings of the scene as it is. `search`: best settings.
     """
     kinds: dict[str, list[Remedy]] = {}
@@ -102,12 +103,13 @@ def tried_remedies(
             break
     if not any(row.met for row in rows):
         rows += trial.pair(rows)
-    return tuple(sorted(rows, key=lambda row: row.order))
+    rows.sort(key=lambda row: row.order)
+    return tuple(trial.afresh(row) if row.met or row is rows[0] else row for row in rows)
 
 
 def tried_choices(balancer: Balancer, *, search: Search, told: Told | None = None) -> tuple[Remedied, ...]:
     """What things that can be bought make of a scene that leaves them open."""
-    trial = _Trial(balancer=balancer, search=search, told=told or (lambda _: None))
+    trial = _Trial(balancer=balancer, search=search, told=told or (lambda _: None), start=FRESH)
     return tuple(row for each in balancer.choices() if (row := trial.of([each])) is not None)
 
 
@@ -126,23 +128,28 @@ class _Trial:
     balancer: Balancer
     search: Search
     told: Told
+    start: int = CHOOSING
+    """Number of the first device."""
 
     def of(self, remedies: Sequence[Remedy]) -> Remedied | None:
         """Remedies made together; None: the scene refuses them."""
         changes = _merged(remedies)
         try:
-            scene = rechecked(self.balancer.scene).with_values(changes, origin="inferred")
-            changed = self.balancer.on_scene(scene)
+            changed = self._changed(changes)
             self.told(f"trying {', '.join(each.name or each.code for each in remedies)}")
             settings = self.search(changed)
-            first = judged_all(changed, [settings], first=_FIRST, most=_FIRST)[0]
-            too_few = first.verdict == MISSED and first.fraction.value < _TOO_FEW * first.asked
-            judgement = (
-                first if too_few else judged(changed, settings, most=min(_MOST, changed.verdict_draws[1]))
-            )
+            judgement = _judged(changed, settings, self.start)
         except SceneError:
             return None
         return Remedied(remedies=tuple(remedies), judgement=judgement, size=_size(self.balancer, changes))
+
+    def afresh(self, row: Remedied) -> Remedied:
+        """On devices on which nothing was chosen."""
+        return replace(row, judgement=_judged(self._changed(row.changes), row.judgement.settings, FRESH))
+
+    def _changed(self, changes: Settings) -> Balancer:
+        scene = rechecked(self.balancer.scene).with_values(changes, origin="inferred")
+        return self.balancer.on_scene(scene)
 
     def series(self, alternatives: Sequence[Remedy], own: Proportion) -> Iterator[Remedied]:
         """Alternatives of one kind, from the smallest change on."""
@@ -181,6 +188,14 @@ class _Trial:
                 if row is not None:
                     yield row
                 return
+
+
+def _judged(changed: Balancer, settings: Settings, start: int) -> Judgement:
+    """On few devices where far too few of these meet what is asked."""
+    (first,) = judged_all(changed, [settings], first=_FIRST, most=_FIRST, start=start)
+    if first.verdict == MISSED and first.fraction.value < _TOO_FEW * first.asked:
+        return first
+    return judged(changed, settings, most=min(_MOST, changed.verdict_draws[1]), start=start)
 
 
 def _merged(remedies: Sequence[Remedy]) -> dict[str, Any]:

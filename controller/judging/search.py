@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
@@ -47,8 +47,8 @@ _SETTLED: Final = 0.9
 """Of the devices that the best settings serve: by when these have settled decides between equals."""
 _ROUNDS: Final = 6
 """In which neighbours are tried."""
-_ALONG: Final = 3
-"""The same at a level of an axis, from the best of the level beside it."""
+_ALONG: Final = 4
+"""The same at a level of an axis, from the best of a level beside it."""
 _CURVE: Final = tuple(Draws.block(256 + first, count, whole=False) for first, count in ((0, 16), (16, 48)))
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
 none of the first settle is answered by them."""
@@ -127,6 +127,10 @@ class Tried:
         return float(np.sort(self.judgement.outcomes.settling_time)[max(count, 1) - 1])
 
 
+_Ran = dict[object, Tried | None]
+"""What candidates came to, by key; None: not on every device."""
+
+
 def search(
     balancer: Balancer, trials: Sequence[Trials], *, along: float | None = None, progress: Progress
 ) -> tuple[Tried, ...]:
@@ -134,22 +138,33 @@ def search(
 
     Args: `along`: level on `Trials.along`; default the scene's.
     """
-    found = [best for each in trials if (best := _best_of(balancer, each, along, progress)) is not None]
-    own = found[:1] if found and found[0].candidate.trials is trials[0] else []
-    return tuple(sorted(found, key=lambda each: each.fraction + _MORE * (each in own), reverse=True))
+    best = (_best_of(balancer, each, along, progress) for each in trials)
+    return _ordered([each for each in best if each is not None], trials)
+
+
+def _ordered(found: Sequence[Tried], trials: Sequence[Trials]) -> tuple[Tried, ...]:
+    """The best of every kind of controller, the kind to take first."""
+    own = trials[0].kind
+    return tuple(sorted(found, key=lambda each: -each.fraction - _MORE * (each.candidate.trials.kind == own)))
 
 
 def _best_of(balancer: Balancer, trials: Trials, along: float | None, progress: Progress) -> Tried | None:
-    coarse = [
+    tried: _Ran = {}
+    _climb(balancer, tried, _coarse(trials, along), rounds=_ROUNDS, progress=progress)
+    return _final(balancer, [each for each in tried.values() if each])
+
+
+def _coarse(trials: Trials, along: float | None) -> list[Candidate]:
+    return [
         Candidate(trials=trials, places=places, along=along)
         for places in product(*(axis.first for axis in trials.axes))
     ]
-    return _final(balancer, _climbed(balancer, coarse, rounds=_ROUNDS, progress=progress))
 
 
-def _climbed(balancer: Balancer, field: list[Candidate], *, rounds: int, progress: Progress) -> list[Tried]:
-    """All that ran on every device, of a field and of the neighbours of the best again and again."""
-    tried: dict[object, Tried | None] = {}
+def _climb(
+    balancer: Balancer, tried: _Ran, field: list[Candidate], *, rounds: int, progress: Progress
+) -> None:
+    """Add what a field comes to, and the neighbours of the best again and again."""
     for _ in range(rounds):
         fresh = [each for each in field if each.key not in tried]
         if not fresh:
@@ -159,7 +174,6 @@ def _climbed(balancer: Balancer, field: list[Candidate], *, rounds: int, progres
         tried |= {each.key: None for each in fresh} | {each.candidate.key: each for each in ran}
         starts = _starts([each for each in tried.values() if each])
         field = [near for each in starts for near in each.candidate.neighbours()]
-    return [each for each in tried.values() if each]
 
 
 def _starts(tried: Sequence[Tried]) -> list[Tried]:
@@ -255,57 +269,126 @@ class Along:
         return float(low), float(middle), float(high)
 
 
-def searched_along(balancer: Balancer, best: Tried, *, progress: Progress) -> tuple[Along, ...]:
-    """Settings near the best ones at every level of an axis, wider until the best level is within them."""
-    axis = best.candidate.trials.along
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """What an axis comes to under the best settings at each level."""
+
+    levels: tuple[Along, ...]
+    top: Along
+    """The level to take."""
+    searched: Sequence[Tried]
+    """The best of every kind of controller there, the kind to take first."""
+
+
+def searched_along(
+    balancer: Balancer, trials: Sequence[Trials], found: Sequence[Tried], *, progress: Progress
+) -> Curve | None:
+    """The best settings at every level of an axis, on more levels until the best is within them; None: there
+    is no axis.
+
+    The level to take is searched as widely as the scene's, and then the others once more from what serves
+    there, so that the answer does not depend on the level from which the search set out.
+    Args: `found`: the best of every kind of controller at the scene's own level.
+    """
+    axis = trials[0].along
     if axis is None:
-        return ()
-    own = value_at(balancer.scene, axis.name)
-    chosen_at: dict[int, Tried] = {}
-    found: dict[int, Along] = {}
+        return None
+    level = value_at(balancer.scene, axis.name)
+    own = min(range(len(axis.levels)), key=lambda at: abs(axis.levels[at] - level))
+    searched = {own: found} if axis.levels[own] == level else {}
+    levels = _Levels(balancer=balancer, trials=trials, axis=axis, searched=searched)
+    answered: dict[int, Along] = {}
     places: Sequence[int] = axis.first
-    while places:
-        progress(f"{len(places)} levels of {axis.name}")
-        for at in _outwards(axis, places, own if best.candidate.along is None else best.candidate.along):
-            chosen_at[at] = _beside(balancer, best, chosen_at, at=at, axis=axis)
-        found |= _answered(balancer, {at: chosen_at[at].candidate for at in places}, axis)
-        top = _top(found)
-        places = [at for at in (top - 1, top + 1) if at not in found and 0 <= at < len(axis.levels)]
-    return tuple(found[at] for at in sorted(found))
+    while True:
+        levels.add(sorted(places, key=lambda at: abs(at - own)))
+        progress(f"{len(answered)} levels of {axis.name}")
+        answered |= levels.answered(answered)
+        top = _top(answered)
+        served = answered[top].judgement.fraction.count > 0
+        beside = (top - 1, top + 1) if served else (min(answered) - 1, max(answered) + 1)
+        places = [at for at in beside if at not in answered and 0 <= at < len(axis.levels)]
+        if not places:
+            if top in levels.searched or not served:
+                break
+            levels.searched[top] = search(balancer, trials, along=axis.levels[top], progress=progress)
+    along = tuple(answered[at] for at in sorted(answered))
+    return Curve(levels=along, top=answered[top], searched=levels.searched.get(top, ()))
 
 
-def _outwards(axis: Axis, places: Sequence[int], along: float) -> list[int]:
-    """Places of levels from that of the best settings on."""
-    start = min(range(len(axis.levels)), key=lambda at: abs(axis.levels[at] - along))
-    return sorted(places, key=lambda at: abs(at - start))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Levels:
+    """What serves at the levels of an axis."""
+
+    balancer: Balancer
+    trials: Sequence[Trials]
+    axis: Axis
+    searched: dict[int, Sequence[Tried]]
+    """By place of a level that was searched widely: the best of every kind of controller."""
+    ran: dict[int, dict[str, _Ran]] = field(default_factory=dict)
+    """By place of another level and kind of controller: what ran there."""
+    serving: dict[int, dict[str, Tried]] = field(default_factory=dict)
+    """Likewise the best of it, where that serves any device."""
+
+    def add(self, places: Sequence[int]) -> None:
+        """Search levels from what serves at the nearest; then each from both beside it."""
+        for at in places:
+            for trials in self.trials:
+                known = [place for place in self._known if trials.kind in self._serving(place)]
+                self._climb(at, trials, min(known, key=lambda place: abs(place - at), default=None))
+        known = self._known
+        for before, at in (*pairwise(known), *pairwise(reversed(known))):
+            for trials in self.trials:
+                if trials.kind in self._serving(before):
+                    self._climb(at, trials, before)
+
+    @property
+    def _known(self) -> list[int]:
+        return sorted({*self.searched, *self.ran})
+
+    def _serving(self, at: int) -> dict[str, Tried]:
+        """The best of every kind of controller that serves any device."""
+        widely = {each.candidate.trials.kind: each for each in self.searched.get(at, ()) if each.count}
+        return widely if at in self.searched else self.serving.get(at, {})
+
+    def _climb(self, at: int, trials: Trials, near: int | None) -> None:
+        """From what serves at another level; from all that is tried at first where nothing does."""
+        level, kind = self.axis.levels[at], trials.kind
+        if at in self.searched:
+            return
+        start = _coarse(trials, level) if near is None else [self._serving(near)[kind].candidate.at(level)]
+        ran = self.ran.setdefault(at, {}).setdefault(kind, {})
+        _climb(self.balancer, ran, start, rounds=_ALONG, progress=lambda _: None)
+        best = chosen(each for each in ran.values() if each)
+        if best is not None and best.count:
+            self.serving.setdefault(at, {})[kind] = best
+
+    def answered(self, before: Mapping[int, Along]) -> dict[int, Along]:
+        """Levels on devices of their own, but those that have been under the same settings."""
+        settings: dict[int, Settings] = {}
+        for at in self._known:
+            level = self.axis.levels[at]
+            best = _ordered(list(self._serving(at).values()), self.trials)
+            asked = (best[0].candidate.at(level).settings if best else None) or {self.axis.name: level}
+            if at not in before or before[at].judgement.settings != asked:
+                settings[at] = asked
+        return _answered(self.balancer, settings, self.axis)
 
 
-def _beside(balancer: Balancer, best: Tried, chosen_at: Mapping[int, Tried], *, at: int, axis: Axis) -> Tried:
-    """The best at a level, from the best at the nearest level that serves any device."""
-    serving = {place: each for place, each in chosen_at.items() if each.count}
-    near = serving[min(serving, key=lambda place: abs(place - at))] if serving else best
-    start = near.candidate.at(axis.levels[at])
-    ran = _climbed(balancer, [start, *start.neighbours()], rounds=_ALONG, progress=lambda _: None)
-    return chosen(ran) or replace(near, candidate=start)
-
-
-def _answered(balancer: Balancer, kept: Mapping[int, Candidate], axis: Axis) -> dict[int, Along]:
-    settings = [each.settings or _bare(each, axis) for each in kept.values()]
+def _answered(balancer: Balancer, settings: Mapping[int, Settings], axis: Axis) -> dict[int, Along]:
     asked, demands = balancer.asked_fraction(), balancer.demands()
     few, more = _CURVE
-    judged = [
-        Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome)
-        for setting, outcome in zip(settings, balancer.run_all(settings, few), strict=True)
-    ]
-    serving = [i for i, each in enumerate(judged) if each.fraction.count]
+    judged = {
+        at: Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome)
+        for (at, setting), outcome in zip(
+            settings.items(), balancer.run_all(list(settings.values()), few), strict=True
+        )
+    }
+    serving = [at for at, each in judged.items() if each.fraction.count]
     if serving:
-        for i, outcome in zip(serving, balancer.run_all([settings[i] for i in serving], more), strict=True):
-            judged[i] = replace(judged[i], outcomes=judged[i].outcomes.joined(outcome))
-    return {at: Along(level=axis.levels[at], judgement=each) for at, each in zip(kept, judged, strict=True)}
-
-
-def _bare(candidate: Candidate, axis: Axis) -> Settings:
-    return {axis.name: candidate.along}
+        ran = balancer.run_all([settings[at] for at in serving], more)
+        for at, outcome in zip(serving, ran, strict=True):
+            judged[at] = replace(judged[at], outcomes=judged[at].outcomes.joined(outcome))
+    return {at: Along(level=axis.levels[at], judgement=each) for at, each in judged.items()}
 
 
 def _top(found: dict[int, Along]) -> int:
@@ -314,11 +397,6 @@ def _top(found: dict[int, Along]) -> int:
     near = {at: sum(count.get(at + by, 0) for by in (-1, 0, 1)) for at in found}
     most = max(count.values())
     return max((at for at in found if count[at] >= most - 1), key=lambda at: (near[at], count[at]))
-
-
-def top_level(levels: Sequence[Along]) -> Along:
-    """The level to take."""
-    return levels[_top(dict(enumerate(levels)))]
 
 
 def searched(

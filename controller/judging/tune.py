@@ -8,17 +8,17 @@ from functools import partial
 from typing import Final
 
 from ringbalance.controller.balancer import Balancer, Settings
-from ringbalance.controller.judging.judge import Judgement, judged_all
+from ringbalance.controller.judging.judge import Judgement, best_of, judged, judged_all
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import (
     Along,
+    Curve,
     Progress,
     Tried,
     search,
     searched,
     searched_along,
-    top_level,
 )
 from ringbalance.controller.judging.tuning import LONGER, BestOfKind, Tuning
 from ringbalance.results.requirements import MET
@@ -49,9 +49,9 @@ def tuned(
     found: Sequence[Tried] = search(balancer, trials, progress=told) if trials else ()
     stated = not trials or trials[0].stated
     own, best = _judged(balancer, found, own=stated, progress=told)
-    curve: tuple[Along, ...] = ()
+    curve: Curve | None = None
     if found and (along or best.verdict != MET):
-        curve = searched_along(balancer, found[0], progress=told)
+        curve = searched_along(balancer, trials, found, progress=told)
         best, found = _better(balancer, best, found, curve, progress=told)
     # Of devices of which none settles, none stays so for longer.
     watched = balancer.watched_to_end or not best.fraction.count
@@ -67,7 +67,10 @@ def tuned(
         own=own,
         longer=longer,
         tried=tuple(BestOfKind(kind=each.candidate.trials.kind, judgement=each.judgement) for each in found),
-        along=tuple(_agreeing(each, best, own_level if level is None else level) for each in curve),
+        along=tuple(
+            _agreeing(each, best, own_level if level is None else level)
+            for each in (curve.levels if curve else ())
+        ),
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
         information=balancer.information(with_values_at(balancer.scene, best.settings)),
@@ -97,12 +100,13 @@ def _agreeing(level: Along, best: Judgement, recommended: float | None) -> Along
 def _judged(
     balancer: Balancer, found: Sequence[Tried], *, own: bool, progress: Progress
 ) -> tuple[Judgement | None, Judgement]:
-    """Of the scene's own settings and of the best, on the same devices."""
+    """Of the scene's own settings and of the best, on the same devices, on which nothing was chosen."""
     stated: list[Settings] = [{}] if own or not found else []
-    others = [each for each in _to_judge(found) if each not in stated]
-    judged = judged_all(balancer, stated + others, progress=progress)
-    best, given = _best(judged[len(stated) :] or judged), judged[0] if own else None
-    return given, given if given is not None and given.fraction.value > best.fraction.value else best
+    best = best_of(
+        balancer, [*(each for each in _to_judge(found) if each not in stated), *stated], progress=progress
+    )
+    judged = judged_all(balancer, stated + [each for each in [best] if each not in stated], progress=progress)
+    return judged[0] if own else None, judged[-1]
 
 
 def _longer(balancer: Balancer, settings: Settings, *, progress: Progress) -> Judgement:
@@ -117,25 +121,12 @@ def _to_judge(found: Sequence[Tried]) -> list[Settings]:
     return [each.candidate.settings or {} for each in kept]
 
 
-def _best(judged: Sequence[Judgement]) -> Judgement:
-    """Most devices; the earlier of equals."""
-    return max(judged, key=lambda each: each.fraction.value)
-
-
 def _better(
-    balancer: Balancer,
-    best: Judgement,
-    found: Sequence[Tried],
-    curve: tuple[Along, ...],
-    *,
-    progress: Progress,
+    balancer: Balancer, best: Judgement, found: Sequence[Tried], curve: Curve | None, *, progress: Progress
 ) -> tuple[Judgement, Sequence[Tried]]:
     """The best settings at the best level, where these serve more devices."""
-    if not curve:
+    there = [] if curve is None else _to_judge(curve.searched)
+    chosen = best_of(balancer, [best.settings, *there], progress=progress)
+    if curve is None or chosen == best.settings:
         return best, found
-    top = top_level(curve)
-    if top.judgement.fraction.count == 0 or top.judgement.fraction.value <= best.fraction.low:
-        return best, found
-    again = search(balancer, balancer.trials(), along=top.level, progress=progress)
-    _, there = _judged(balancer, again, own=False, progress=progress)
-    return (there, again) if there.fraction.value > best.fraction.value else (best, found)
+    return judged(balancer, chosen, progress=progress), curve.searched

@@ -27,6 +27,8 @@ from ringbalance.scene.origins import SceneFile, raw_value_at, with_values_at
 LONGER: Final = 300.0
 """s, for which devices under the recommended settings are watched once more."""
 _CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
+_EXACT: Final = "_exact"
+"""After the code of a verdict that is met by devices of which the scene states no uncertainty."""
 _SETTLED: Final = "settled"
 _MOST_CAUSES: Final = 3
 
@@ -242,7 +244,9 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
         for path, value in best.settings.items()
         if value is not None
     }
-    yield Finding(code=_CODES[best.verdict], values=share_values(best), change=changes)
+    yield Finding(
+        code=_CODES[best.verdict] + if_exact(tuning.given, best), values=share_values(best), change=changes
+    )
     times = times_of(best)
     if times["p50"] is not None:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
@@ -268,10 +272,12 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
 def _mending(tuning: Tuning) -> Iterator[Finding]:
     """The best remedy, what to measure, and what the answer leaves open."""
     best, clipped = tuning.recommended, tuning.recommended.outcomes.clipped
-    for each in tuning.remedies[:1]:
+    meeting = [each for each in tuning.remedies if each.met]
+    for each in (meeting or tuning.remedies)[:1]:
         code = "remedy_meets" if each.met else "remedy_best"
-        values = {**share_values(each.judgement), "what": _changes_text(each.changes, ", ")}
-        yield Finding(code=code, values=values, change=each.changes)
+        changes = {**each.changes, **_level_of(tuning, each.judgement)}
+        values = {**share_values(each.judgement), "what": _changes_text(changes, ", ")}
+        yield Finding(code=code, values=values, change=changes)
     if best.verdict != MET:
         yield from tuning.ranking.findings()
     states = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
@@ -282,6 +288,11 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
     if clipped:
         values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
         yield Finding(code="inputs_clipped", values=values)
+
+
+def _level_of(tuning: Tuning, judgement: Judgement) -> Settings:
+    """The level of the axis that settings move, such as the supply's pressure: a part of a remedy as well."""
+    return {path: value for path, value in judgement.settings.items() if path == tuning.along_name}
 
 
 def _changes_text(changes: Settings, between: str = "\n") -> str:
@@ -304,6 +315,11 @@ def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
     if not any(each.judgement.settings for each in tried):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     return Table(caption=caption, heads=heads, rows=rows)
+
+
+def if_exact(scene: SceneFile, judgement: Judgement) -> str:
+    """The ending of the code of a verdict that rests on exact parts."""
+    return _EXACT if judgement.verdict == MET and not (scene.uncertainty or scene.fitted.quantities) else ""
 
 
 def share_values(judgement: Judgement) -> dict[str, Value]:

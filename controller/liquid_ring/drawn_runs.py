@@ -46,8 +46,9 @@ whichever are asked for, and of a design that four devices refuse no more are ma
 _KEPT: Final = 32
 """Groups of devices, and groups under a pressure."""
 _OUT_OF_REACH: Final = 2.0
-"""Times the limit that remain with the liquid at its best, from which on a run need not be carried
-out: none settles, and each would take its whole time limit."""
+"""Times the limit that remain with chambers emptied to their residual fills, from which on a run need not
+be carried out: none settles, and each would take its whole time limit.  Beyond the fill where the gas stalls
+a long injection still takes some liquid."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,8 +123,8 @@ class DrawnRuns:
         self, under: _Under, asked: Sequence[_Setting], draws: Draws, further: float
     ) -> Iterator[tuple[int, RunResult]]:
         """Place of a setting and how the device's run under it ended."""
-        if not draws.whole and under.unreachable > _OUT_OF_REACH * self.limit:
-            yield from ((each.place, _at_best(under, limit=self.limit)) for each in asked)
+        if not draws.whole and under.beyond_disc > _OUT_OF_REACH * self.limit:
+            yield from ((each.place, _at_best(under)) for each in asked)
             return
         for settings, tried in _grouped(asked, lambda each: replace(each.scene.controller, proportional=1)):
             plan = LoopPlan.of(
@@ -274,16 +275,15 @@ def _result(under: _Under, run: np.void, *, limit: float) -> RunResult:
     )
 
 
-def _at_best(under: _Under, *, limit: float) -> RunResult:
-    """With the liquid at its best, of a device that this does not bring to the limit."""
-    beyond = under.beyond_disc > limit
+def _at_best(under: _Under) -> RunResult:
+    """With the liquid at its best, of a device whose chambers cannot bring it to the limit."""
     return RunResult(
         settling_time=math.inf,
         final_amplitude=under.unreachable,
         energy=math.nan,
         usable_moment=under.usable_moment,
         unbalance=under.unbalance,
-        ended=str(Outcome.CAPACITY_EXCEEDED if beyond else Outcome.STALLED),
+        ended=str(Outcome.CAPACITY_EXCEEDED),
     )
 
 

@@ -14,8 +14,6 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, Final
 
-import numpy as np
-
 from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.liquid_ring.devices import AMPLITUDE, CAVITY, FITTED, LOSS, MOMENT, PHASE
 from ringbalance.controller.liquid_ring.loop_factor import loop_rate
@@ -41,10 +39,38 @@ _OFFSET: Final = Axis(
 _INTEGRAL: Final = Axis(
     name="period over integral time", levels=(0.0, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7), first=(2, 4, 6)
 )
-_PRESSURES: Final = tuple(float(f) for f in np.round(1.1 ** np.arange(-12, 13), 3))
-"""Times the scene's."""
-_FIRST: Final = tuple(range(6, 19))
-"""Of these, 0.56 to 1.8 times the scene's."""
+_SERIES: Final = (
+    10,
+    11,
+    12,
+    13,
+    15,
+    16,
+    18,
+    20,
+    22,
+    24,
+    27,
+    30,
+    33,
+    36,
+    39,
+    43,
+    47,
+    51,
+    56,
+    62,
+    68,
+    75,
+    82,
+    91,
+)
+_PRESSURES: Final = tuple(rounded(each * 10.0**power) for power in range(1, 8) for each in _SERIES)
+"""Levels, Pa, alike for all scenes: the series E24 of IEC 60063, of steps of about a tenth."""
+_REACH: Final = 3.2
+"""Times the scene's pressure, up and down, of the levels that may be tried."""
+_NEAR: Final = 1.8
+"""The same of those that are tried at first."""
 _OFFSET_STEP: Final = 1e-4
 """s, to which an offset is rounded."""
 _OWN: Final = {"target_vector": (_GAIN, _OFFSET, _INTEGRAL), "law_based": (_OFFSET,), "trial": ()}
@@ -108,14 +134,14 @@ def _settings(
 
 
 def _pressures(scene: Scene) -> Axis:
-    """Around the scene's, up to the highest that is available where [design] states one."""
+    """The scene's and levels around it, up to the highest that is available where [design] states one."""
     own, available = scene.gas.pressure, scene.design.pressure
-    levels = [rounded(factor * own) for factor in _PRESSURES]
-    levels[len(levels) // 2] = own
+    levels = {own, *(each for each in _PRESSURES if own / _REACH <= each <= own * _REACH)}
     if available is not None:
-        levels = [*(each for each in levels if each < available), available]
-    first = tuple(at for at in _FIRST if at < len(levels)) or (len(levels) - 1,)
-    return Axis(name=PRESSURE, levels=tuple(levels), first=first, unit="Pa")
+        levels = {available, *(each for each in levels if each < available)}
+    ascending = tuple(sorted(levels))
+    first = tuple(at for at, each in enumerate(ascending) if own / _NEAR <= each <= own * _NEAR)
+    return Axis(name=PRESSURE, levels=ascending, first=first or (len(ascending) - 1,), unit="Pa")
 
 
 def _at(scene: Scene, pressure: float) -> Scene:

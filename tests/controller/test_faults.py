@@ -108,5 +108,5 @@ def test_gas_that_is_gone_before_it_presses_is_reported(scene: Scene, calibrated
     run = simulate(short, calibrated)
     assert run.outcome is Outcome.GAS_TIME_TOO_SHORT
     assert "4 ms of gas" in run.status
-    assert run.time[-1] < scene.run.time_limit
+    assert run.time[-1] == pytest.approx(scene.run.time_limit)
     assert all(fill[-1] == 0.25 for fill in run.fill_ratio.values())

@@ -64,8 +64,8 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return cast("Scene", ringbalance.load_scene(file))
 
 
-def own(scene: Scene, count: int, *, offset: float = 0.0, patience: float | None = None) -> Share:
-    settings = settings_of(scene, offset=offset, patience=patience)
+def own(scene: Scene, count: int, *, offset: float = 0.0) -> Share:
+    settings = settings_of(scene, offset=offset)
     return Share.of(np.isfinite(settling_times(scene, settings, numbers=count, seed=SEED)))
 
 
@@ -83,15 +83,15 @@ def both(scene: Scene, count: int, *, offset: float = 0.0) -> tuple[Share, Share
 LIGHT: Final = {
     "paper's disc at 0.42 MPa": (PAPER, {"gas.pressure": "0.42 MPa"}, 0.0, 32, 0.0, 0.02),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 128, 0.80, 0.88),
-    "six chambers at their own gain": (SIX, {}, 0.0, 128, 0.78, 0.86),
-    "six chambers with a valve": (SIX, VALVE, 15e-3, 64, 0.0, 1.0),
+    "six chambers at their own gain": (SIX, {}, 0.0, 128, 0.97, 1.0),
+    "six chambers with a valve": (SIX, VALVE, 17e-3, 64, 0.0, 1.0),
 }
 HEAVY: Final = {
     "paper's disc at 0.56 MPa": (PAPER, {"gas.pressure": "0.56 MPa"}, 1.2e-3, 256, 0.9, 1.0),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 512, 0.80, 0.88),
-    "six chambers at their own gain": (SIX, {}, 0.0, 512, 0.78, 0.86),
+    "six chambers at their own gain": (SIX, {}, 0.0, 512, 0.97, 1.0),
     "six chambers with an offset": (SIX, {}, 2e-3, 256, 0.97, 1.0),
-    "six chambers with a valve": (SIX, VALVE, 15e-3, 128, 0.0, 1.0),
+    "six chambers with a valve": (SIX, VALVE, 17e-3, 128, 0.0, 1.0),
     "narrow tube with a valve": (CALIBRATED, VALVE, 30e-3, 128, 0.0, 1.0),
     "paper's disc with a valve": (PAPER, VALVE, 20e-3, 128, 0.0, 1.0),
 }
@@ -130,16 +130,15 @@ def test_a_crest_decides_whether_a_correction_lasts(shown: Scene) -> None:
     assert theirs.value == mine.value == 0.0
 
 
-def test_a_loop_that_goes_on_trying_settles_later() -> None:
-    """What keeps six chambers from settling at their own gain is that a run is given up.
-
-    Commands too short to move liquid end it after 3 + n of them in a row. The own plant without that rule
-    settles: the integral grows, and noise moves what rests just above the limit.
-    """
-    six = bundled(SIX)
-    assert own(six, 128, patience=math.inf).low > own(six, 128).high
-    ended = outcomes(six, 64).ended
-    assert set(ended) == {"settled", "gas_time_too_short"}
+@pytest.mark.parametrize(("name", "values"), [(SIX, {}), (PAPER, {"gas.pressure": "0.55 MPa"})])
+def test_a_loop_that_goes_on_trying_settles(name: str, values: dict[str, object]) -> None:
+    """Commands too short to move liquid end no run: the integral grows, and noise moves what rests just above
+    the limit, so that all devices settle within seconds, in both plants."""
+    scene = bundled(name, values)
+    found = outcomes(scene, 64)
+    assert set(found.ended) == {"settled"}
+    assert own(scene, 64).low >= ASKED
+    assert float(np.quantile(found.settling_time, 0.9)) < 8.0
 
 
 @pytest.mark.parametrize("name", [PAPER, SIX, CALIBRATED])

@@ -15,7 +15,6 @@ FURTHER: Final = 60.0
 """s, after the hold time, of whose samples 99 % are within the limit."""
 ALLOWED: Final = 0.01
 _NEAR: Final = 1e-3
-_MOVED: Final = 1e-7
 """Of a fill."""
 _INTEGRAL, _BEFORE, _TIME, _PHASE = 0, 1, 2, 3
 _SINCE, _JUDGED, _ABOVE = 0, 1, 2
@@ -37,11 +36,10 @@ class Settings(NamedTuple):
     amplitude_noise: float
     phase_noise: float
     time_limit: float
-    patience: float  # commands in a row that move nothing, after which a run is given up
 
 
-def settings_of(scene: Scene, *, offset: float = 0.0, patience: float | None = None) -> Settings:
-    """Of a scene; one offset for all chambers, s. The program gives up after 3 + n idle commands."""
+def settings_of(scene: Scene, *, offset: float = 0.0) -> Settings:
+    """Of a scene; one offset for all chambers, s."""
     c = scene.controller
     return Settings(
         proportional=c.proportional,
@@ -57,7 +55,6 @@ def settings_of(scene: Scene, *, offset: float = 0.0, patience: float | None = N
         amplitude_noise=scene.sensor.amplitude_noise,
         phase_noise=scene.sensor.phase_noise,
         time_limit=scene.run.time_limit,
-        patience=3 + scene.disc.chambers if patience is None else patience,
     )
 
 
@@ -141,7 +138,7 @@ def _settled(c: Any, held: Floats, time: float, amplitude: float) -> bool:
 def _loop(d: Any, tables: Any, moment: Floats, c: Any, noise: Floats, trace: Floats) -> float:
     """The closed loop; time and amplitude of every sample are left in `trace`. Returns: settling time."""
     n = int(d.chambers)
-    half, time, idle = n // 2, 0.0, 0
+    half, time = n // 2, 0.0
     pairs, empty = np.zeros((half, STATES)), np.zeros(n, np.bool_)
     pairs[:, X] = d.total / 2
     memory, held = np.array([0.0, 0.0, math.inf, 0.0]), np.array([math.inf, math.inf, 0.0])
@@ -150,19 +147,16 @@ def _loop(d: Any, tables: Any, moment: Floats, c: Any, noise: Floats, trace: Flo
         trace[k, 0], trace[k, 1] = time, abs(z)
         if _settled(c, held, time, abs(z)):
             return float(held[_SINCE])
-        if idle >= c.patience or (time > c.time_limit and held[_SINCE] > c.time_limit):
+        if time > c.time_limit and held[_SINCE] > c.time_limit:
             break
         asked = _command(d, c, memory, time, z, noise[k], empty)
-        longest, working = np.max(asked), np.argmax(asked) % half
-        filled = pairs[working, X]
+        longest = np.max(asked)
         for i in range(half):
             side = 1 if asked[i + half] > 0 else 0
             carry(d, pairs[i], tables, side, asked[i] + asked[i + half], longest + c.period)
             empty[i] = pairs[i, X] <= d.residual * (1 + _NEAR)
             empty[i + half] = d.total - pairs[i, X] <= d.residual * (1 + _NEAR)
         time += longest + c.period
-        if longest > 0.0:
-            idle = idle + 1 if abs(pairs[working, X] - filled) < _MOVED else 0
     return math.inf
 
 

@@ -161,3 +161,15 @@ def test_a_scene_without_uncertainties_says_so(evidence: Record, said: Said) -> 
     assert "states no uncertainty" not in said(evidence, "summary")
     evidence["scene"]["states_uncertainty"] = False
     assert "states no uncertainty" in said(evidence, "summary")
+
+
+def test_what_is_met_without_uncertainties_is_met_if_the_parts_are_exact(
+    evidence: Record, said: Said
+) -> None:
+    """In the verdict itself."""
+    for each in (evidence["summary"]["own"], evidence["summary"]["recommended"]):
+        if each:
+            each["verdict"] = "met"
+    assert "if the parts are exact" not in said(evidence, "summary")
+    evidence["scene"]["states_uncertainty"] = False
+    assert "met if the parts are exact" in said(evidence, "summary")

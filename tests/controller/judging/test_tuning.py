@@ -16,10 +16,9 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.judging.judge import judged
-from ringbalance.controller.judging.search import _outwards, search, searched
+from ringbalance.controller.judging.search import search, searched
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
-from ringbalance.controller.trials import Axis
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -75,7 +74,7 @@ def test_too_little_pressure_is_told_from_capacity() -> None:
 def test_six_chambers_work_with_settings_of_their_own() -> None:
     found = rb.tune(bundled("six_chamber"))
     assert found.own is not None
-    assert found.own.verdict == MISSED
+    assert found.own.verdict == MET
     assert found.recommended.fraction.value >= 0.99
     assert found.along == ()
     assert found.recommended.settings["controller.gas_time_offset"]
@@ -94,12 +93,6 @@ def test_no_pressure_above_the_one_that_is_available_is_searched() -> None:
     assert set(capped.levels) - {0.6e6} == {each for each in free.levels if each < 0.6e6}
     assert list(capped.first) == [at for at in free.first if at < len(capped.levels)]
     assert (below.levels, below.first) == ((0.1e6,), (0,))
-
-
-def test_levels_follow_each_other_from_the_start() -> None:
-    axis = Axis(name="gas.pressure", levels=(1.0, 2.0, 3.0, 4.0), first=(0, 1, 2, 3))
-    assert _outwards(axis, axis.first, 3.9) == [3, 2, 1, 0]
-    assert _outwards(axis, axis.first, 2.1) == [1, 0, 2, 3]
 
 
 def test_a_limit_follows_from_the_grade() -> None:

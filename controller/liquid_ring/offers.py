@@ -39,33 +39,10 @@ _OFFSET: Final = Axis(
 _INTEGRAL: Final = Axis(
     name="period over integral time", levels=(0.0, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7), first=(2, 4, 6)
 )
-_SERIES: Final = (
-    10,
-    11,
-    12,
-    13,
-    15,
-    16,
-    18,
-    20,
-    22,
-    24,
-    27,
-    30,
-    33,
-    36,
-    39,
-    43,
-    47,
-    51,
-    56,
-    62,
-    68,
-    75,
-    82,
-    91,
+_SERIES: Final = "10 11 12 13 15 16 18 20 22 24 27 30 33 36 39 43 47 51 56 62 68 75 82 91"
+_PRESSURES: Final = tuple(
+    rounded(int(each) * 10.0**power) for power in range(1, 8) for each in _SERIES.split()
 )
-_PRESSURES: Final = tuple(rounded(each * 10.0**power) for power in range(1, 8) for each in _SERIES)
 """Levels, Pa, alike for all scenes: the series E24 of IEC 60063, of steps of about a tenth."""
 _REACH: Final = 3.2
 """Times the scene's pressure, up and down, of the levels that may be tried."""

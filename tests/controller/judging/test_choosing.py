@@ -69,6 +69,9 @@ class Machine:
         del scene
         return Information()
 
+    def beyond_capacity(self, *_: object) -> None:
+        pass
+
     def drawn_input(self, name: str) -> DrawnInput:
         return DrawnInput(common=False, measure="", path=name)
 

@@ -308,6 +308,12 @@ class Review:
         return (*named, *unexplained, *(each.text for each in self.ranges if each.fails))
 
     @property
+    def undecided(self) -> tuple[str, ...]:
+        """Senses of angles that the data do not tell, those of most files first, each in one sentence."""
+        senses = sorted((each for each in self.readings if each.undecided), key=lambda r: -len(r.files))
+        return tuple({each.code: each.text for each in reversed(senses) if not each.named}.values())
+
+    @property
     def describes(self) -> bool:
         """Whether the fit describes the data, as they are read."""
         return self.criticism.describes and not self._read_wrongly

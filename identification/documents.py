@@ -94,7 +94,9 @@ def _criticism(told: Review) -> dict[str, Any]:
 
 def _parameter(found: FittedParameter) -> dict[str, Any]:
     return {
-        **_chosen(found, "name path value at_bound before before_interval contradicts doubts text"),
+        **_chosen(
+            found, "name path value at_bound before before_interval before_source contradicts doubts text"
+        ),
         "interval": [finite(end) for end in found.interval],
         "verdict": found.verdict.value,
     }
@@ -159,6 +161,7 @@ def _review(told: Review) -> Iterator[Finding]:
     for outcome, text in summaries(told.laws):
         code = "other_law_fits_better" if outcome == "other" else "laws_compared"
         yield Finding(code=code, values={"text": text})
+    yield from (Finding(code="sense_undecided", values={"text": text}) for text in told.undecided)
 
 
 def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:

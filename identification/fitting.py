@@ -29,6 +29,7 @@ from ringbalance.identification.parameters import (
     path_of,
 )
 from ringbalance.identification.reading import KINDS, kinds_of
+from ringbalance.identification.reading_likelihood import passive
 from ringbalance.results.rows import Finding, text_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.narrowing import AnyScene
@@ -38,6 +39,13 @@ from ringbalance.scene.uncertain import NORMAL_95
 _LAMBDA_FAR: Final = 2**0.25
 """Factor on lambda, or its inverse, from which it is doubted: halfway, in logarithms, from 1 to the square
 root of two that rms amplitudes are wrong by where zero to peak is stated."""
+
+
+_FAR: Final = 3.0
+"""Standard deviations by which data may disagree with what is known beforehand."""
+_TOLD: Final = 0.1
+"""Of what is known beforehand, by which data must be able to move a value to disagree."""
+Source = Literal["[uncertainty]", "geometry"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +60,9 @@ class FittedParameter:
     before: float
     """Of the scene."""
     before_interval: tuple[float, float] | None
-    """By the scene's [uncertainty]; None where nothing is known beforehand."""
+    """None where nothing is known beforehand."""
+    before_source: Source | None
+    """Where that interval comes from."""
     verdict: Identified
     text: str
     """The verdict with its reason, in one sentence."""
@@ -69,27 +79,46 @@ class FittedParameter:
     @property
     def origin(self) -> Origin:
         """Of the value in a saved scene."""
-        return "measured" if self.verdict is Identified.IDENTIFIED else "inferred"
+        sound = self.verdict is Identified.IDENTIFIED and not self._impossible
+        return "measured" if sound else "inferred"
 
     @property
     def contradicts(self) -> bool:
-        """Whether the value lies outside what was known before: [uncertainty] or the data are wrong."""
+        """Whether the value lies outside what was known before: that or the data are wrong."""
         low, high = self.before_interval or (-math.inf, math.inf)
         return not low <= self.value <= high
+
+    @property
+    def _disagrees(self) -> bool:
+        """Whether the data alone would have the value far outside what was known before.
+
+        Of data that agree with a prior of standard deviation p, of which the fit leaves q, the value is off
+        its middle by (p^2 - q^2)^(1/2).
+        """
+        if self.before_interval is None:
+            return False
+        known = (self.before_interval[1] - self.before) / NORMAL_95
+        left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
+        moved = math.sqrt(max(known**2 - left**2, 0.0))
+        return moved > _TOLD * known and abs(self.value - self.before) > _FAR * moved
+
+    @property
+    def _impossible(self) -> bool:
+        """Whether it is a lag that no passive rotor has, and that the scene does not have either."""
+        is_lag = self.path.rpartition(".")[2] == "lag_angle" and passive(self.before)
+        return is_lag and not any(map(passive, (self.value, *self.interval)))
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the value, each in one sentence."""
         found = []
-        if self.contradicts:
-            found.append(
-                "the fitted value lies outside what the scene's [uncertainty] states; one of the two is wrong"
-            )
-        if self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR:
-            found.append(
-                "lambda follows from the geometry within a few percent, and a value so far from 1 mostly has "
-                "another cause: how amplitudes are counted, a unit, the influence coefficient, or the law"
-            )
+        if self.before_source == "[uncertainty]" and (self.contradicts or self._disagrees):
+            found.append(text_of("outside_stated" if self.contradicts else "data_outside_stated"))
+        far = self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR
+        if far or (self.before_source == "geometry" and (self.contradicts or self._disagrees)):
+            found.append(text_of("outside_geometry"))
+        if self._impossible:
+            found.append(text_of("lag_impossible"))
         return tuple(found)
 
     @property
@@ -272,7 +301,9 @@ def _fitted(
     parameter: Parameter, t: float, found: Profile, verdict: Identified, products: Sequence[Combination]
 ) -> FittedParameter:
     before = None
+    source: Source | None = None
     if parameter.prior:
+        source = "geometry" if parameter.by_geometry else "[uncertainty]"
         width = NORMAL_95 * parameter.prior
         before = parameter.start - width, parameter.start + width
     return FittedParameter(
@@ -282,11 +313,19 @@ def _fitted(
         at_bound=(found.low_bound, found.high_bound),
         before=parameter.start,
         before_interval=before,
+        before_source=source,
         verdict=verdict,
         text=_verdict_text(parameter, verdict, products),
         profile=found,
         curve=tuple((parameter.value(at), rise / found.factor**2) for at, rise in found.points),
     )
+
+
+def _interval_from(parameter: Parameter) -> str:
+    """Code of the sentence that says where the interval comes from."""
+    if parameter.by_geometry:
+        return "interval_of_geometry"
+    return "interval_stated" if parameter.prior else "interval_unknown"
 
 
 def _verdict_text(parameter: Parameter, verdict: Identified, found: Sequence[Combination]) -> str:
@@ -297,7 +336,7 @@ def _verdict_text(parameter: Parameter, verdict: Identified, found: Sequence[Com
     sentences = [
         text_of("told_apart_by_none" if never else "hardly_narrowed", verdict=str(verdict)),
         *([text_of("products_identified", products=" and ".join(within))] if within else []),
-        text_of("interval_stated" if parameter.prior else "interval_unknown"),
+        text_of(_interval_from(parameter)),
     ]
     return "; ".join(sentences)
 

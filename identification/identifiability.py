@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -39,6 +39,8 @@ _ALIKE: Final = 2.0
 _ROUNDED: Final = 0.12
 """Part of the largest exponent by which whole ones may differ: that of a velocity changes as the fills do,
 and as liquid has to be lifted first, by a fifth of a short injection."""
+_BENT: Final = 1.5
+"""Ratio of what J has at an end of a profile to what the profile has there, from which J is not believed."""
 _SIGN: Final = 0.05
 """Part of the largest exponent from which one decides the sign of all."""
 _UNSEEN: Final = 1e-9
@@ -135,7 +137,9 @@ def combinations(
     """
     if all(verdict is Identified.IDENTIFIED for verdict in found):
         return ()
-    factor, allowed = max(p.factor for p in profiles), _allowed_widths(parameters, t)
+    # A product is what the data alone tell: the geometry bounds its part, and makes it no better known.
+    data = [replace(p, prior=None) if p.by_geometry else p for p in parameters]
+    factor, allowed = max(p.factor for p in profiles), _allowed_widths(data, t)
     weak = np.array([verdict is not Identified.IDENTIFIED for verdict in found])
     flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
@@ -154,14 +158,17 @@ def combinations(
 def _flattened(
     slopes: FloatArray, t: FloatArray, allowed: FloatArray, profiles: Sequence[Profile]
 ) -> FloatArray:
-    """J with no more information along the way to the ends of wide profiles than these show."""
+    """J with no more information along the way to the ends of wide profiles than these show.
+
+    Where it is J's own but for little, or less because a prior ends the profile, J stays as it is.
+    """
     for profile in profiles:
         for end in profile.ends:
             way = (np.array(end) - t) / allowed
             length = float(np.linalg.norm(way))
-            if length > 1 / math.sqrt(2):
+            scaled = slopes * allowed
+            if length > 1 / math.sqrt(2) and np.linalg.norm(scaled @ way) > _BENT * profile.factor:
                 along = way / length
-                scaled = slopes * allowed
                 without = scaled - np.outer(scaled @ along, along)
                 slopes = np.concatenate([without, (profile.factor / length) * along[None, :]]) / allowed
     return slopes

@@ -4,7 +4,8 @@ Positive quantities are fitted by their logarithm, ln x.  A loss coefficient act
 fitted by ln g (x + c): c = 1 for a prescribed k; for an extra loss such that it is ln(k + 1) to first order.
 Angles, positions and the pressure of the cavity are linear.  The prior of a parameter is the scene's
 [uncertainty]: a normal distribution of the quantity itself, of standard deviation U/1.96, which enters each
-fit once.
+fit once.  Where the scene states none of the factor on lambda, it is what the geometry tells: moments are
+hydrostatics of a known chamber.
 """
 
 from __future__ import annotations
@@ -15,15 +16,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Final
 
+import numpy as np
+
 from ringbalance.controller.balancer import Input, balancer_of
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
 from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
+from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import (
@@ -61,7 +65,9 @@ class Parameter:
     """SI."""
     highest: float
     prior: float | None
-    """Standard deviation that the scene states, SI; None: nothing is known beforehand."""
+    """Standard deviation, SI, of what is known beforehand; None: nothing is."""
+    by_geometry: bool = False
+    """Whether that follows from the geometry, and the scene states nothing."""
     offset: float = 0.0
     """c of ln(x + c), SI."""
     gain: float = 1.0
@@ -102,6 +108,8 @@ class Parameter:
                 f"the scene has no {UNCERTAIN_QUANTITIES[name]}.{name}: give a value to start from to fit it"
             )
         width = half_widths(scene).get(name)
+        by_geometry = width is None and name == "lambda_factor"
+        width = start * _geometry_width(scene.disc) if by_geometry else width
         (offset, gain), scale = _loss_scale(scene, name), _scale(scene, name)
         if offset == 0 and scale is None and start <= 0:
             raise FitError(f"{UNCERTAIN_QUANTITIES[name]}.{name} is zero: give a value above zero to fit it")
@@ -113,6 +121,7 @@ class Parameter:
             lowest=low,
             highest=high,
             prior=None if width is None else width / NORMAL_95,
+            by_geometry=by_geometry,
             offset=offset,
             gain=gain,
             scale=scale,
@@ -137,6 +146,16 @@ _FAR: Final = 1000.0
 START: Final = ("initial_amplitude", "initial_phase")
 """Parameters that belong to the measurement and not to the device."""
 _LOSS_STEP: Final = 0.01
+_GEOMETRY: Final = 0.05
+"""Relative expanded uncertainty (95 %) of lambda by a geometry of exact dimensions: fillets, ports and plates
+that no key has, liquid in the legs of the tube, and gravity, which `calibrate` puts at 0.1 % for the bundled
+discs. Tolerances of the dimensions are inputs of their own, and in all intervals."""
+
+
+def _geometry_width(disc: Disc) -> float:
+    """Relative expanded uncertainty (95 %) of lambda by the geometry; that of a mesh has facets, too."""
+    facets = drawing_shares(disc, np.array([disc.initial_fill])).moment
+    return math.hypot(_GEOMETRY, float(facets[0]))
 
 
 def _with_quantity(name: str, scene: Scene, value: float) -> Scene:

@@ -56,6 +56,8 @@ class Device:
     """On f, an error of the foreign law like the next three."""
     rotation_factor: float = 1.0
     """On what rotation adds to f."""
+    coasts: bool = True
+    """Whether liquid goes on over the crest once the gas is shut."""
     entrance_loss: float = 0.50
     bend_loss: float = 0.28
 
@@ -154,8 +156,11 @@ def injected(device: Device, fill: float, gauge: float, gas_time: float) -> floa
     moved = (far - start) * device.length * rate
     full = _run(_full(device, fill, gas), [moved, float(rising.y[1, -1])], gas_time - float(rising.t[-1]))
     _check_column(device, fill, gas, full.y)
+    left = (0.5 - start) * device.length * rate
+    if not device.coasts:
+        return float(full.y[0, -1]) - left
     parted = _run(_parted(device, fill), [float(v) for v in full.y[:, -1]], 1.0, until=lambda y: y[1] - 1e-3)
-    return float(parted.y[0, -1]) - (0.5 - start) * device.length * rate
+    return float(parted.y[0, -1]) - left
 
 
 def _run(

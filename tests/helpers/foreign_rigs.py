@@ -83,6 +83,13 @@ MACHINES: Final = {
     ),
 }
 """As designed."""
+VISCOUS: Final = replace(
+    MACHINES["water, six chambers"],
+    density=930.0,
+    kinematic_viscosity=5.0e-5,
+    bore=3.5e-3,
+)
+"""Whose tube holds 2 ml, of the 2 to 11 ml that an injection moves."""
 _RELATIVE: Final = {
     "density": 0.002,
     "kinematic_viscosity": 0.03,
@@ -119,6 +126,20 @@ def rig(number: int) -> Rig:
     kinds = KINDS[number // len(names) % len(KINDS)]
     files = {f"{kind}.csv": _RECORDS[kind](designed, device, random) for kind in kinds}
     return Rig(machine=machine, scene=_scene_text(machine, designed), files=files, device=device)
+
+
+def rig_of_known_geometry(number: int) -> Rig:
+    """One rig whose scene states nothing of lambda: each second one an oil over six chambers, and each second
+    of these does not coast."""
+    random = np.random.default_rng([1174, number])
+    names = list(MACHINES)
+    machine = "oil, six chambers" if number % 2 else names[number // 2 % len(names)]
+    designed = VISCOUS if number % 2 else MACHINES[machine]
+    device = replace(_built(designed, random), coasts=number % 4 < 3)
+    kinds = KINDS[number // 4 % 2 * 2]
+    files = {f"{kind}.csv": _RECORDS[kind](designed, device, random) for kind in kinds}
+    scene = _scene_text(machine, designed).replace("lambda_factor = 0.05\n", "")
+    return Rig(machine=machine, scene=scene, files=files, device=device)
 
 
 def _built(designed: Device, random: np.random.Generator) -> Device:

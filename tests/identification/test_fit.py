@@ -144,8 +144,8 @@ def injected(scene: Scene, *, sd: float) -> Observations:
 def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) -> FloatArray:
     """Means, then standard deviations, of bore and lambda factor by the density written out here.
 
-    The errors of the models are in the covariance.  The grid is sheared along the ridge, which keeps the area
-    of its cells.
+    Geometry gives lambda within 5 % (95 %).  The errors of the models are in the covariance.  The grid is
+    sheared along the ridge, which keeps the area of its cells.
     """
     kind, models = KINDS["injection"], Models.of(scene)
     covariance = sd**2 * np.eye(2 * len(data))
@@ -164,9 +164,8 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
             moved = with_value(scene=scene, quantity="bore", value=float(bore))
             moved = with_value(scene=moved, quantity="lambda_factor", value=float(factor))
             left = kind.numbers(data) - kind.predict(moved, data, models)
-            log_density[i, j] = (
-                -(left @ precision @ left + ((bore - scene.tube.bore) / (5e-5 / 1.96)) ** 2) / 2
-            )
+            known = ((bore - scene.tube.bore) / (5e-5 / 1.96)) ** 2 + ((factor - 1) / (0.05 / 1.96)) ** 2
+            log_density[i, j] = -(left @ precision @ left + known) / 2
     weight = np.exp(log_density - log_density.max())
     mean = np.tensordot(weight / weight.sum(), places, axes=2)
     spread = np.sqrt(np.tensordot(weight / weight.sum(), (places - mean) ** 2, axes=2))

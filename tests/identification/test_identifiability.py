@@ -129,7 +129,7 @@ def test_injections_alone_see_kappa_lambda(scene: Scene) -> None:
     """V = kappa lambda(...): the two columns are equal; the lag is the direction of V."""
     data = injections(scene, np.linspace(0.1, 0.4, 8), noise=1e-8, seed=1)
     found = fit(scene, data=[data], parameters=["influence_coefficient", "lambda_factor", "lag_angle"])
-    assert rank(found.optimum.slopes) == 2
+    assert rank(found.optimum.of_prediction) == 2
     assert verdicts(found)["lag_angle"] is Identified.IDENTIFIED
     assert [c.text for c in found.combinations] == ["kappa lambda"]
 
@@ -177,7 +177,7 @@ def check_end_rates(scene: Scene, loss: str, seed: int, same: bool) -> None:
     found = fit(scene, data=[data], parameters=["lambda_factor", loss])
     assert [c.text for c in found.combinations] == ["lambda^2/(k + 1)"]
     if same:
-        assert rank(found.optimum.slopes) == 1
+        assert rank(found.optimum.of_prediction) == 1
         assert set(verdicts(found).values()) == {Identified.STRUCTURALLY}
     else:
         assert Identified.STRUCTURALLY not in verdicts(found).values()

@@ -31,6 +31,7 @@ def fitted(path: str, value: float, width: float, **more: Any) -> FittedParamete
         "name": path,
         "before": 1.1 * value,
         "before_interval": (value, 1.2 * value),
+        "before_source": "[uncertainty]",
         "value": value,
         "interval": (value - width, value + width),
         "at_bound": (False, False),
@@ -52,7 +53,7 @@ def saved(name: str, *parameters: FittedParameter) -> AnyScene:
 
 
 BORE = fitted("tube.bore", 1.4e-3, 0.02e-3)
-FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=None)
+FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=None, before_source=None)
 
 
 def test_values_uncertainties_and_origins() -> None:

@@ -39,6 +39,8 @@ _LONGEST: Final = 1e-3
 """s, of a part of a step of the disc."""
 _LONGEST_FOLLOWED: Final = 5e-3
 """s, the same of the liquid that a controller follows."""
+_SHORTEST: Final = 1e-6
+"""s, of the longest part: below it a host's step of 10 ms would take more than 10,000 parts."""
 _OF_LINE: Final = 0.04
 """Of the line's time constant: near its end a pressure changes some fifty times as fast, and the method is
 stable up to 2.8 of the reciprocal."""
@@ -155,8 +157,8 @@ def _tabulation(law: CompactLaw) -> str:
 def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
     """Fills and gas of all chambers in time, and the vibration of the scene's rotor.
 
-    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack, or
-        inputs that were fitted together.
+    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack,
+        inputs that were fitted together, or a gas line that fills a chamber too fast to be followed.
     """
     gas, half = scene.gas, scene.disc.chambers // 2
     given = {FILLING: gas.conductance, LAG: gas.valve_lag}
@@ -213,7 +215,12 @@ def _disc_numbers(scene: Scene, law: CalibratedLaw, modelled: Collection[str]) -
     least = (1 - law.max_fill_ratio) * law.chamber_volume + dynamics.dead_volume
     longest = _LONGEST
     if dynamics.line is not None:
-        longest = min(longest, _OF_LINE * dynamics.line.time_constant(volume=least))
+        constant = dynamics.line.time_constant(volume=least)
+        longest = min(longest, _OF_LINE * constant)
+        if longest < _SHORTEST:
+            took = f"gas fills a chamber with a time constant of {constant:.2g} s"
+            allowed = f"at least {_SHORTEST / _OF_LINE:.2g} s, no gas.conductance, or --block law"
+            raise SceneError.of_file(scene.file, f"{took}, too short for a host's steps", allowed)
     ratio = float(plant["heat_capacity_ratio"])
     axes = chamber_directions(scene.disc.chambers)[:half]
     return (

@@ -15,9 +15,11 @@ from c_warnings import WARNINGS
 
 import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
+from ringbalance.export import disc
 from ringbalance.export.blocks import Block, controller_block, disc_block
 from ringbalance.export.hosts import c_files, python_files, st_files
 from ringbalance.export.reference import reference_files
+from ringbalance.reduced_model.pieces.point import BLOCK
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -155,6 +157,16 @@ def test_another_controller_is_refused() -> None:
     other = exact_scene("six_chamber", {"controller.kind": "trial"})
     with pytest.raises(SceneError, match=r"trial.*runs in this program alone.*\n?.*law_based"):
         controller_block(other)
+
+
+def test_a_gas_line_too_fast_for_a_hosts_steps_is_refused() -> None:
+    """A step of 10 ms takes at most 10,000 parts."""
+    law = rb.calibrate(exact_scene("grinding_spindle", {})).flow_law
+    with pytest.raises(SceneError, match=r"time constant of .* too short for a host's steps"):
+        disc_block(exact_scene("grinding_spindle", {"gas.conductance": "1e5 l/(s*bar)"}), law)
+    for conductance in ("1 l/(s*bar)", "30 l/(s*bar)"):
+        block = disc_block(exact_scene("grinding_spindle", {"gas.conductance": conductance}), law)
+        assert block.constants[int(block.constants[BLOCK]) + disc.LONGEST] >= 1e-2 / 10_000
 
 
 def test_headers_and_declarations_say_unit_range_and_meaning(blocks: dict[str, Block]) -> None:

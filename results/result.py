@@ -43,8 +43,8 @@ _NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
 """A text that begins like a number, behind tags."""
 
 
-_FORMULA: Final = re.compile(r"[=+\-@\t\r]")
-"""With which a formula begins in a spreadsheet."""
+_FORMULA: Final = re.compile(r"(?![+-]?[\d.]+(?:e[+-]?\d+)?\Z)[=+\-@\t\r]")
+"""With which a formula begins in a spreadsheet, unless the whole is a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +100,8 @@ def models_table(models_used: Iterable[_ModelUsed]) -> Table:
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
     """Columns of one length as comma-separated values below a line of their names; None is an empty cell.
 
-    A text that a spreadsheet would take for a formula stands behind an apostrophe; a carriage return, which
-    would end the line, becomes a line feed.
+    A text that a spreadsheet would take for a formula, which a number is not, stands behind an apostrophe; a
+    carriage return, which would end the line, becomes a line feed.
     """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")

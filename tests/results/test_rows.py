@@ -88,6 +88,12 @@ def test_csv_has_no_formula_of_a_name(name: str) -> None:
     assert rows == [[cell, "'-"], ["MHA2", "1/0.5-2"], ["-0.5", ""]]
 
 
+def test_csv_leaves_numbers_that_are_text_as_they_are() -> None:
+    """Numbers written in full, as reference results of a unit are."""
+    numbers = ["-8.518396615509643e-06", "-3", "+0.5", "-1e-300"]
+    assert csv_text({"x": numbers}).splitlines() == ["x", *numbers]
+
+
 def test_csv_holds_every_cell() -> None:
     text = csv_text({"time [s]": [0.1, 2e-9], "name, short": ["a", None]})
     assert list(csv.reader(io.StringIO(text))) == [["time [s]", "name, short"], ["0.1", "a"], ["2e-09", ""]]

@@ -24,7 +24,8 @@ from ringbalance.results.numbers import believed
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of, nameless
-from ringbalance.scene.designs import Designs, in_batches, input_effects
+from ringbalance.scene.designs import Designs, changes_of, in_batches
+from ringbalance.scene.errors import larger, uncertainties
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Scene
@@ -154,8 +155,9 @@ def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
         values = _values(designs)
         return np.concatenate([values, np.full(values[1:].shape, np.nan)])
     function = partial(_values, near=TubeFlow.of(designs))
-    values, effects = input_effects(designs.scene, function, each=designs.size)
-    variance = sum((np.square(each) for each in effects.values()), np.zeros(values.shape))
+    errors = uncertainties(designs.scene, models=False)
+    values, changes = changes_of(designs.scene, function, errors, each=designs.size)
+    variance = np.sum(np.square(larger(changes)), axis=0)
     return np.concatenate([values, np.where(np.isnan(values), np.nan, np.sqrt(variance))[1:]])
 
 

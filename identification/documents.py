@@ -17,13 +17,13 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.optimisation import Optimum
-from ringbalance.identification.parameters import MODEL_ERRORS
 from ringbalance.identification.reading import KINDS
 from ringbalance.results.numbers import rounded
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, IntArray, finite
 from ringbalance.scene.describe import in_usual_unit, si_unit, usual_unit
+from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.uncertain import NORMAL_95
 
 
@@ -251,7 +251,7 @@ def _listed(lines: Sequence[int]) -> str:
 
 def _causes(names: Iterable[str]) -> list[str]:
     """Causes of the errors of models among the names of inputs."""
-    return list(dict.fromkeys(MODEL_ERRORS[name][0] for name in names if name in MODEL_ERRORS))
+    return list(dict.fromkeys(MODEL_ERRORS[name] for name in names if name in MODEL_ERRORS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,8 +32,9 @@ from scipy.special import stdtrit
 
 from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum, searched
-from ringbalance.identification.parameters import MODEL_ERRORS, inputs_of
+from ringbalance.identification.parameters import inputs_of
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.fitted import LARGEST_ERROR
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.uncertain import NORMAL_95

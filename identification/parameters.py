@@ -22,11 +22,10 @@ from ringbalance.controller.balancer import Input, balancer_of
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
-from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.tube.regime import driving_pressure
+from ringbalance.scene.errors import MODEL_ERRORS, MODEL_KINDS
 from ringbalance.scene.faults import did_you_mean
-from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile, with_values_at
@@ -248,27 +247,6 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
     return start / reach, start * reach
 
 
-_OF_FLOW: Final = {
-    f"model: {cause}": (cause, 1.0, 0.0) for cause in (START_ERROR, CLEARING_ERROR, CAVITY_ERROR)
-}
-_OF_LOSS: Final = {
-    f"model: {cause}, {part}": (cause, even, 1.0 - even)
-    for cause in (*MODEL_CAUSES, *BUILT_CAUSES)
-    for part, even in (("even", 1.0), ("odd", 0.0))
-}
-MODEL_ERRORS: Final = {**_OF_FLOW, **_OF_LOSS}
-"""One standard deviation of each error of a scene's models, by name: inputs of a fit, held and uncertain.
-
-Each cause of k's uncertainty is a random function of Re, of two parts (`with_errors`): those of the
-correlations, and those of a tube as it was built, which give the shape of k(u) freedom of its own. What
-clears the crest and the pressure of the cavity there are known within the spans of
-`reduced_model.tube.regime`. The start of the flow has no measurements to compare with: the column's inertia,
-a valve that does not open as fast as it closes, and to which side liquid runs that stands on the crest when
-the gas is shut, up to half of the tube. The time L/2u in which the flow passes that half is taken for their
-expanded uncertainty (95 %).
-"""
-
-
 class _SceneInputs:
     """What a fit asks of a scene, through its `Balancer`: quantities go by their paths, such as
     "rotor.damping" and "masses.friction_arm[0]"."""
@@ -368,8 +346,8 @@ class _LiquidRing(_SceneInputs):
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """A prescribed k has no model."""
-        return tuple(MODEL_ERRORS if self.scene.tube.drag_coefficient is None else _OF_FLOW)
+        """Those of the scene's models, and of what was built."""
+        return tuple(name for name, cause in MODEL_ERRORS.items() if MODEL_KINDS[cause].applies(self.scene))
 
     def named(self, name: str) -> Sequence[str]:
         """A prescribed k stands in for the loss that it leaves out."""

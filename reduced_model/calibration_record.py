@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -11,27 +11,40 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import INPUT_PART, TubeLoss, tube_loss
+from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
-from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
+from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability, unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.gas_line import LineAnswer
-from ringbalance.reduced_model.law.calibrated_law import WIDTH, CalibratedLaw, DriveUncertainty
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.pressure_profile import HumpProfile, TubeLiquid
 from ringbalance.reduced_model.residual_liquid import Holding, ResidualLiquid
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.reduced_model.tube import regime
-from ringbalance.reduced_model.tube.regime import TubeEnds, gas_over_crest, possible_cavity, stall_pressure
+from ringbalance.reduced_model.tube.flow import Waves
+from ringbalance.reduced_model.tube.regime import stall_pressure
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.designs import Designs, input_effects
+from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.errors import (
+    MOMENT,
+    VOLUME,
+    WAVES,
+    Uncertainty,
+    both_sides,
+    by_group,
+    of_chamber,
+    uncertainties,
+    with_places,
+)
+from ringbalance.scene.fitted import MODEL
 from ringbalance.scene.models import HumpGas, Scene
 from ringbalance.scene.registry import registered
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES
 
 UNITS: Final = {
     "chamber_volume": "m^3",
@@ -78,8 +91,6 @@ class OperatingPoint:
     """Loss coefficient there; None where it is blocked."""
     k_uncertainty: float | None
     """Expanded uncertainty (95 %)."""
-    k_model_uncertainty: float | None
-    """Its part by correlations, without the inputs."""
     priming_vented: float | None
     """Gauge pressure that starts a flow, crest gas vented, driven chamber empty, Pa; None: no crest."""
     priming_trapped: float | None
@@ -119,7 +130,6 @@ class OperatingPoint:
             loss_velocity=u,
             k=None if loss is None else float(loss.k.value),
             k_uncertainty=None if loss is None else float(loss.k.uncertainty),
-            k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
             priming_vented=None if vented is None else float(vented),
             priming_trapped=None if trapped is None else float(trapped),
             stall=max(float(stall_pressure(law.path, law.ends(fill_ratio=0.0))) / law.gas_factor, 0.0),
@@ -158,10 +168,6 @@ def priming_pressure(
     return np.asarray(regime.priming_pressure(path, ends)) / law.gas_factor
 
 
-def _model_part(parts: Mapping[str, FloatArray]) -> float:
-    return math.hypot(*(float(part) for name, part in parts.items() if not name.startswith(INPUT_PART)))
-
-
 @dataclass(frozen=True, kw_only=True)
 class Budget:
     """A quantity with its expanded uncertainties (95 %) by cause, all in the quantity's SI unit."""
@@ -171,11 +177,30 @@ class Budget:
     value: float
     numerical: float
     """Rounding, quadrature, interpolation, and what finite elements contradict."""
-    model: float
-    """Correlations, terms that are left out or have no model, and what is undecided over the crest."""
+    models: Mapping[str, float]
+    """By error of a model, such as "model: ends"; those without any effect are not listed."""
     inputs: Mapping[str, float]
     """By path in the scene file, such as "tube.bore", "fitted" for all that were fitted together; those
     without any effect are not listed."""
+    lowered: float
+    """By how much inputs and models together may lower the value (95 %)."""
+    raised: float
+    """By how much they may raise it."""
+
+    @property
+    def lower(self) -> float:
+        """End of the interval (95 %)."""
+        return self.value - math.hypot(self.numerical, self.lowered)
+
+    @property
+    def upper(self) -> float:
+        """Other end of the interval (95 %)."""
+        return self.value + math.hypot(self.numerical, self.raised)
+
+    @property
+    def model(self) -> float:
+        """Of all errors of models, which are independent."""
+        return math.hypot(*self.models.values())
 
     @property
     def input(self) -> float:
@@ -191,137 +216,144 @@ class Budget:
 def _budgets(calibration: Calibration) -> Mapping[str, Budget]:
     """Budget of each of `UNITS`; wall pressure and moment at the largest fill, flow at the operating point.
 
-    Inputs count by `input_effects`, k's with what its velocity does when an input moves it. An operating
-    point without any velocity has no drag coefficient, and one without a flow over a crest neither crest
-    pressure nor margin.
+    Every uncertainty of the scene counts by `changes_of`, with what the velocity does when it moves. An
+    operating point without any velocity has no drag coefficient, and one without a flow over a crest neither
+    crest pressure nor margin.
     """
-    scene = calibration.scene
-    parts = _chamber_parts(scene, calibration.chamber) | _flow_parts(scene, calibration)
-    effects = _input_effects(scene)
-    return {
-        name: Budget(
+    errors = (*uncertainties(calibration.scene), of_chamber(VOLUME))
+    changes = _Changes.of(calibration, errors)
+    effects, values = by_group(errors, changes.alone), _values(calibration)
+    lowered, raised = changes.together([list(UNITS).index(name) for name in values])
+    found = {}
+    for (name, (value, numerical)), down, up in zip(values.items(), lowered, raised, strict=True):
+        place = list(UNITS).index(name)
+        each = {
+            group: float(effect[place])
+            for group, effect in effects.items()
+            if effect[place] > _NEGLIGIBLE * abs(value)
+        }
+        found[name] = Budget(
             quantity=name,
             unit=UNITS[name],
             value=value,
             numerical=numerical,
-            model=model,
+            models={group: size for group, size in each.items() if group.startswith(MODEL)},
             inputs={
-                path: change
-                for path, each in effects.items()
-                if (change := each[name]) > _NEGLIGIBLE * abs(value)
+                f"{UNCERTAIN_QUANTITIES[group]}.{group}" if group in UNCERTAIN_QUANTITIES else group: size
+                for group, size in each.items()
+                if not group.startswith(MODEL)
             },
+            lowered=down,
+            raised=up,
         )
-        for name, (value, numerical, model) in parts.items()
-    }
-
-
-_Parts = tuple[float, float, float]
-
-
-def _chamber_parts(scene: Scene, chamber: ChamberCalibration) -> dict[str, _Parts]:
-    """Value, numerical and model part of the quantities of the chamber."""
-    at = chamber.reported[-1]
-    central, numerical = chamber.moment_per_mass, chamber.moment_per_mass_numerical
-    drawn = drawing_shares(scene.disc, np.empty(0)).volume
-    model = math.sqrt(max(float(central.uncertainty) ** 2 - numerical**2, 0.0))
-    return {
-        "chamber_volume": (chamber.volume, _NEGLIGIBLE * chamber.volume, drawn * chamber.volume),
-        "wall_pressure": _curve_parts(chamber.wall_pressure, at),
-        "moment": _curve_parts(chamber.moment, at),
-        "lambda": (float(central.value), numerical, model),
-    }
-
-
-def _curve_parts(curve: Curve, at: int) -> _Parts:
-    model = float(curve.unmodelled[at])
-    return float(curve.value[at]), float(curve.numerical[at]), model
-
-
-def _flow_parts(scene: Scene, calibration: Calibration) -> dict[str, _Parts]:
-    """Value, numerical and model part of the quantities of the flow at the operating point."""
-    point, rest = calibration.operating_point, calibration.residual
-    law = _law_without_inputs(scene, calibration)
-    fills = (point.fill_ratio, point.fill_ratio)
-    flow = law.evaluate(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=point.gas_pressure)
-    error = calibration.flow_law.heads.interpolation_error
-    levels = _level_parts(calibration)
-    _, numerical, model = levels["stall_pressure"]
-    fill_width, moment_width = rest.model_uncertainty(scene, law=law, head=math.hypot(numerical, model))
-    found = levels | {
-        "least_fill_ratio": (rest.least_fill_ratio, 0.0, fill_width),
-        "usable_moment": (
-            rest.usable_pair_moment,
-            float(np.max(calibration.chamber.moment.interpolation)),
-            moment_width,
-        ),
-        "velocity": (point.velocity, error * abs(point.velocity), float(flow.uncertainty)),
-    }
-    if point.k is not None and point.k_model_uncertainty is not None:
-        found["drag_coefficient"] = (point.k, error * (point.k + 1), point.k_model_uncertainty)
-    if point.cavitation_margin is None or point.hump_pressure is None or point.velocity == 0:
-        return found
-    reverse = point.velocity < 0
-    margin = law.cavity_margin(fills=fills, gas_pressure=point.gas_pressure, reverse=reverse)[1] or 0.0
-    ends = law.ends(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=point.gas_pressure)
-    part = _crest_part(law, point, ends.reversed() if reverse else ends, margin)
-    rounding = error * abs(point.gas_pressure)
-    return found | {
-        "crest_pressure": (point.hump_pressure, rounding, part),
-        "cavitation_margin": (point.cavitation_margin, rounding, margin),
-    }
-
-
-def _level_parts(calibration: Calibration) -> dict[str, _Parts]:
-    """The same of the gas pressures that hydrostatics alone give, for which two chambers count."""
-    point, chamber = calibration.operating_point, calibration.chamber
-    level = chamber.hydrostatic_pressure
-    _, numerical, model = _curve_parts(level, chamber.reported[-1])
-    values = {
-        "stall_pressure": point.stall,
-        "priming_pressure_vented": point.priming_vented,
-        "priming_pressure_trapped": point.priming_trapped,
-    }
-    width = math.sqrt(2) * math.hypot(numerical, float(level.interpolation[-1]))
-    return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
-
-
-def _crest_part(law: CalibratedLaw, point: OperatingPoint, ends: TubeEnds, margin: float) -> float:
-    """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
-    if point.cavitation_margin is None or point.cavity_pressure is None:
-        return 0.0
-    low, high = (float(bound) for bound in possible_cavity(law.path, ends))
-    gas = max(float(gas_over_crest(law.path, ends)), high)
-    pressure = point.hump_pressure or 0.0
-    full = point.cavity_pressure + point.cavitation_margin
-    highest = max(gas if pressure > high else high, full + margin)
-    return max(highest - pressure, pressure - max(low, full - margin), 0.0)
-
-
-def _law_without_inputs(scene: Scene, calibration: Calibration) -> CalibratedLaw:
-    """The law with the uncertainties of numerics and models alone."""
-    chamber, law = calibration.chamber, calibration.flow_law
-    width = chamber.hydrostatic_pressure.half_widths(inputs=np.zeros_like(chamber.fill_ratio))
-    return replace(
-        law,
-        heads=law.heads.without_inputs(scene=scene),
-        inputs=DriveUncertainty(),
-        variants=(),
-        levels=law.levels.with_column(WIDTH, width),
-    )
-
-
-def _input_effects(scene: Scene) -> dict[str, dict[str, float]]:
-    """Effects on all of `UNITS`, by the input's path in the scene, or "fitted"."""
-    found = {}
-    for name, effects in input_effects(scene, _quantities)[1].items():
-        table = UNCERTAIN_QUANTITIES.get(name)
-        path = name if table is None else f"{table}.{name}"
-        found[path] = dict(zip(UNITS, effects.tolist(), strict=True))
     return found
 
 
-def _quantities(designs: Designs) -> FloatArray:
-    answers = Answers.of(designs)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Changes:
+    """Changes of `UNITS`, the last axis, by the errors of a scene."""
+
+    scene: Scene
+    errors: Sequence[Uncertainty]
+    values: FloatArray
+    alone: FloatArray
+    """At both sides of each error, shape (m, 2, quantities)."""
+    linear: FloatArray
+    """Half-widths (95 %) by what is no change of the scene, which act in proportion, (m, quantities)."""
+    waves: Waves
+
+    @classmethod
+    def of(cls, calibration: Calibration, errors: Sequence[Uncertainty]) -> _Changes:
+        """By every error alone; the chambers' by what no model of them holds."""
+        scene, chamber, rest = calibration.scene, calibration.chamber, calibration.residual
+        values, changes = changes_of(scene, _quantities, errors)
+        place = {error.name: place for place, error in enumerate(errors)}
+        at, fills = chamber.reported[-1], np.unique(chamber.fill_ratio)
+        share = unmodelled_fractions(scene, fills)["heads"]
+        waves = Waves(fill_ratio=fills, share=share, deviation=NORMAL_95 * np.array([-1.0, 1.0]))
+        moved = _quantities(Designs.stacked([scene] * 2), waves=waves)
+        changes[place[WAVES]] = (moved - values[:, None]).T
+        central = float(chamber.moment_per_mass.uncertainty)
+        moments = chamber.moment.unmodelled[np.argsort(chamber.fill_ratio)]
+        ends = np.interp([rest.least_fill_ratio, rest.largest_fill_ratio], fills, moments)
+        linear = np.zeros((len(errors), len(UNITS)))
+        for error, quantity, width in (
+            (WAVES, "wall_pressure", float(chamber.wall_pressure.unmodelled[at])),
+            (MOMENT, "moment", float(chamber.moment.unmodelled[at])),
+            (MOMENT, "lambda", math.sqrt(max(central**2 - chamber.moment_per_mass_numerical**2, 0.0))),
+            (MOMENT, "usable_moment", math.hypot(*ends)),
+            (VOLUME, "chamber_volume", drawing_shares(scene.disc, np.empty(0)).volume * chamber.volume),
+        ):
+            linear[place[error], list(UNITS).index(quantity)] = width
+        alone = changes + np.stack([-linear, linear], axis=1)
+        return cls(scene=scene, errors=errors, values=values, alone=alone, linear=linear, waves=waves)
+
+    def together(self, places: Sequence[int]) -> tuple[list[float], list[float]]:
+        """By how much all errors together may lower and raise quantities (95 %), by their places.
+
+        All move at once, in proportion to what each alone changes: on the sphere of 1.96 standard deviations
+        to the point from which on, to the first order, a value lies further away.
+        Source: Hasofer and Lind, "Exact and Invariant Second-Moment Code Format", J. Eng. Mech. Div. 100
+            (1974) 111 (first-order reliability).
+        """
+        asked = [(place, side) for place in places for side in (-1, 1)]
+        z = np.array([self._most_probable(place, side) for place, side in asked])
+        base, scenes = with_places(self.scene, self.errors), []
+        for row in z:
+            scene = base
+            for error, each in zip(self.errors, row.tolist(), strict=True):
+                scene = error.moved(scene, error.deviation_of_normal(each))
+            scenes.append(scene)
+        waves = replace(self.waves, deviation=z[:, [each.name for each in self.errors].index(WAVES)])
+        values = _quantities(Designs.stacked(scenes), waves=waves)
+        found, alone = [], both_sides(self.alone)
+        for row, (place, side) in enumerate(asked):
+            moved = side * (values[place, row] - self.values[place])
+            moved += side * float(z[row] @ self.linear[:, place]) / NORMAL_95
+            # Where nothing flows at that point, what flows at the sides counts.
+            found.append(float(max(moved, 0.0) if np.isfinite(moved) else alone[(side + 1) // 2][place]))
+        return found[::2], found[1::2]
+
+    def _most_probable(self, place: int, side: int) -> FloatArray:
+        """Standard normal deviates of the errors that move a quantity most to one side, shape (m,)."""
+        low, high = (side * np.nan_to_num(self.alone[:, end, place]) for end in (0, 1))
+        size = np.maximum(np.maximum(low, high), 0.0)
+        return NORMAL_95 * np.where(high >= low, 1.0, -1.0) * size / (np.linalg.norm(size) or 1.0)
+
+
+def _values(calibration: Calibration) -> dict[str, tuple[float, float]]:
+    """Values with their numerical parts."""
+    point, rest, chamber = calibration.operating_point, calibration.residual, calibration.chamber
+    at, error = chamber.reported[-1], calibration.flow_law.heads.interpolation_error
+    level, moment = chamber.hydrostatic_pressure, float(np.max(chamber.moment.interpolation))
+    # Two chambers count.
+    width = math.sqrt(2) * math.hypot(float(level.numerical[at]), float(level.interpolation[-1]))
+    found: dict[str, tuple[float | None, float]] = {
+        "chamber_volume": (chamber.volume, _NEGLIGIBLE * chamber.volume),
+        "wall_pressure": _at(chamber.wall_pressure, at),
+        "moment": _at(chamber.moment, at),
+        "lambda": (float(chamber.moment_per_mass.value), chamber.moment_per_mass_numerical),
+        "stall_pressure": (point.stall, width),
+        "priming_pressure_vented": (point.priming_vented, width),
+        "priming_pressure_trapped": (point.priming_trapped, width),
+        "least_fill_ratio": (rest.least_fill_ratio, 0.0),
+        "usable_moment": (rest.usable_pair_moment, moment),
+        "velocity": (point.velocity, error * abs(point.velocity)),
+        "drag_coefficient": (point.k, error * ((point.k or 0.0) + 1)),
+    }
+    if point.velocity != 0:
+        rounding = error * abs(point.gas_pressure)
+        found["crest_pressure"] = (point.hump_pressure, rounding)
+        found["cavitation_margin"] = (point.cavitation_margin, rounding)
+    return {name: (value, part) for name, (value, part) in found.items() if value is not None}
+
+
+def _at(curve: Curve, at: int) -> tuple[float, float]:
+    return float(curve.value[at]), float(curve.numerical[at])
+
+
+def _quantities(designs: Designs, *, waves: Waves | None = None) -> FloatArray:
+    answers = Answers.of(designs, waves=waves)
     return np.array([getattr(answers, _ANSWERS.get(name, name)) for name in UNITS])
 
 

@@ -108,6 +108,8 @@ def _quantities(calibration: Calibration) -> Iterator[Quantity]:
 def _of_budget(calibration: Calibration, key: str, budget: Budget) -> Quantity:
     name, symbol = _NAMES[key]
     low, high = around(budget.value, budget.total, stated=bool(calibration.scene.uncertainty))
+    if low is not None:
+        low, high = budget.lower, budget.upper
     return Quantity(
         key=key,
         name=name,
@@ -155,7 +157,7 @@ def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
     known = {each.key: each for each in _quantities(calibration)}
     if point.regime is Regime.BLOCKED:
         names = ("priming_pressure_vented", "stall_pressure")
-        needed = max(budgets[name].value + budgets[name].total for name in names if name in budgets)
+        needed = max(budgets[name].upper for name in names if name in budgets)
         yield Finding(code="blocked", values={"gas_pressure": point.gas_pressure, "pressure": needed})
     if rest.least_fill_ratio > 0:
         code = "draw_down" if rest.limited_by == "draw_down" else "gas_stalls"

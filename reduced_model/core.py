@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.chamber.values import chamber_pressure, measured_closed_forms
+from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.tube.flow import TubeFlow
+from ringbalance.reduced_model.tube.flow import TubeFlow, Waves
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,
     TubeEnds,
@@ -81,17 +81,20 @@ class Answers:
     proportional gain."""
 
     @classmethod
-    def of(cls, designs: Designs, *, near: TubeFlow | None = None) -> Answers:
+    def of(cls, designs: Designs, *, near: TubeFlow | None = None, waves: Waves | None = None) -> Answers:
         """Calibrate designs.
 
         Args: `near`: the tubes of n designs of which these are variations, n behind n: with them half of the
-            work is saved.
+            work is saved. `waves`: error of the chambers' levels.
         Source: Eqs. 2 to 18 of the liquid-ring paper, with exact chambers, the siphon crest and k(u).
         """
         parts = []
         for rows in np.array_split(np.arange(designs.size), -(-designs.size // _TOGETHER)):
             part = designs if designs.size <= _TOGETHER else designs.take(rows)
-            tube = near.of_neighbours(part, rows % near.designs.size) if near else TubeFlow.of(part)
+            moved = None if waves is None else waves.take(rows)
+            tube = (
+                near.of_neighbours(part, rows % near.designs.size) if near else TubeFlow.of(part, waves=moved)
+            )
             parts.append(cls._of(tube))
         if len(parts) == 1:
             return parts[0]
@@ -104,7 +107,7 @@ class Answers:
         designs, scene = tube.designs, tube.designs.scene
         top, rho = scene.disc.max_fill_ratio * np.ones(designs.size), scene.liquid.density
         wall, moment, ratio = measured_closed_forms(scene=scene, fill_ratio=np.array([top / 2, top]))
-        half, full = chamber_pressure(scene=scene, fill_ratio=np.array([top / 2, top]))
+        half, full = tube.level(np.array([top / 2, top]))
         equal, uneven = tube.ends(half, half), tube.ends(0 * full, full)
         flow = tube.flow(equal, primed=np.zeros(designs.size, dtype=np.bool_))
         primed = tube.flow(equal, primed=True)
@@ -117,7 +120,7 @@ class Answers:
         usable = ends[1] - ends[0]
         holds = np.zeros(designs.size, dtype=np.bool_)
         if tube.path.crest:
-            holds = chamber_pressure(scene=scene, fill_ratio=top - least) <= tube.path.return_pressure
+            holds = tube.level(top - least) <= tube.path.return_pressure
         rate = scene.rotor.influence_coefficient * ratio[0] * rho * scene.tube.area * running
         crest, nothing = tube.path.crest, np.full(designs.size, np.nan)
         separated = np.where(flow.separated, Regime.SEPARATED, Regime.SIPHON)
@@ -168,7 +171,7 @@ def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     def drawn(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
         part = tube.take(rows)
         scene = part.designs.scene
-        own, other = chamber_pressure(scene=scene, fill_ratio=np.array([fills, top[rows] - fills]))
+        own, other = part.level(np.array([fills, top[rows] - fills]))
         flow = part.flow(part.ends(own, other), primed=True, exactly=exactly)
         return drawn_fill(scene, flow_rate=scene.tube.area * flow.velocity)
 
@@ -184,9 +187,7 @@ def _stalled_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     def moves(rows: IntArray, fills: FloatArray) -> BoolArray:
         part = tube.take(rows)
         scene, path = part.designs.scene, part.path
-        own, other = chamber_pressure(
-            scene=scene, fill_ratio=np.array([fills, scene.disc.max_fill_ratio - fills])
-        )
+        own, other = part.level(np.array([fills, scene.disc.max_fill_ratio - fills]))
         rest, held = part.ends(own, other, driven=False), np.zeros(fills.shape, dtype=np.bool_)
         if path.crest:
             # Only over a crest may a column be held while the gas is off.

@@ -14,7 +14,7 @@ from typing import Any, Final, cast
 
 from markupsafe import escape
 
-from ringbalance.scene.uncertain import FITTED
+from ringbalance.scene.errors import FITTED
 
 _GREEK: Final = {
     "alpha": "α",

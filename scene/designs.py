@@ -6,7 +6,7 @@ one with plain numbers does; arrays that run along something else, as the fill d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,8 +15,8 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.errors import Uncertainty, with_places
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, combined, input_sides
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,31 +157,28 @@ def in_batches(
     return found[..., 0] if each is None else found
 
 
-def input_effects(
+def changes_of(
     scene: Scene,
     function: Callable[[Designs], FloatArray],
+    errors: Sequence[Uncertainty],
     *,
-    among: Collection[str] = UNCERTAIN_QUANTITIES,
-    errors: bool = True,
     each: int | None = None,
-) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Values of a scene, and what each uncertain input does to them: all sides in one batch of 2 m + 1 rows.
+) -> tuple[FloatArray, FloatArray]:
+    """Values of a scene, and how they change with each uncertainty: all sides in one batch of 2 m + 1 rows.
 
-    Every input moves by its expanded uncertainty (95 %) to both sides, and the larger change counts, because
-    a sensitivity at the value itself misses what bends within the interval.  All that follows from an input
-    follows, such as the velocity at which k is asked for, unless the function holds it.
-    Args: `function`: as for `in_batches`. `among`: inputs that count. `errors`: whether fitted errors of
-        models count too. `each`: as for `in_batches`.
-    Returns: The scene's values, and expanded uncertainties (95 %) by input, "fitted" for all that were fitted
-        together; NaN where neither side has the quantity.
+    Each moves to its 2.5 and 97.5 % quantiles, because a sensitivity at the value itself misses what bends
+    within the interval.  All that follows from it follows, such as the velocity at which k is asked for,
+    unless the function holds it.
+    Args: `function`: as for `in_batches`. `each`: as for `in_batches`.
+    Returns: The scene's values, and their changes at the low and the high side, shape (m, 2, ...); NaN
+        where a side does not have the quantity, zero by what is no change of the scene.
     Source: ASME V&V 20-2009, one input at a time.
     """
-    sides = input_sides(scene, among=among, errors=errors)
-    scenes = [scene, *(side for both in sides.values() for side in both)]
+    places = [place for place, error in enumerate(errors) if error.change]
+    base = with_places(scene, errors)
+    scenes = [base, *(side for place in places for side in errors[place].sides(base))]
     values = in_batches(scenes, function, each=each or 1)
-    here, moved = values[..., 0, :], np.abs(values[..., 1:, :] - values[..., :1, :])
-    larger = np.fmax(moved[..., ::2, :], moved[..., 1::2, :])
-    effects = {name: larger[..., place, :] for place, name in enumerate(sides)}
-    if each is None:
-        here, effects = here[..., 0], {name: effect[..., 0] for name, effect in effects.items()}
-    return here, combined(effects)
+    here, moved = values[..., 0, :], np.moveaxis(values[..., 1:, :], -2, 0)
+    changes = np.zeros((len(errors), 2, *here.shape))
+    changes[places] = moved.reshape(-1, 2, *here.shape) - here
+    return (here, changes) if each is not None else (here[..., 0], changes[..., 0])

@@ -109,6 +109,7 @@ _ROUND_OFF: Final = 1e-10
 CLEARING_ERROR: Final = "clearing of the crest"
 CAVITY_ERROR: Final = "pressure of the cavity"
 START_ERROR: Final = "start of the flow"
+CREST_ERROR: Final = "end of the crest"
 """Causes of `ModelError` beside those of k."""
 ErrorCause = Literal[
     "friction correlation",
@@ -123,8 +124,9 @@ ErrorCause = Literal[
     "clearing of the crest",
     "pressure of the cavity",
     "start of the flow",
+    "end of the crest",
 ]
-"""What a model may be off by: those of k, as `physics.tube.loss.MODEL_CAUSES`, and those above."""
+"""What a model may be off by: the keys of `scene.errors.MODEL_KINDS`."""
 ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")
 """Name of one standard deviation of a cause's even part, where none is named, or of its odd part."""
 LARGEST_ERROR: Final = 2.5

@@ -7,14 +7,14 @@ With C = L L' the covariance in [fitted], a quantity y of the scene has the vari
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import plain
 from ringbalance.scene.chamber_file.record import STRETCHED
 from ringbalance.scene.fitted import LARGEST_ERROR, MODEL, ErrorCause, Fitted, ModelError
 from ringbalance.scene.keys.schema import LIQUID_RING
@@ -154,14 +154,6 @@ def _table_of(quantity: str) -> str:
     return UNCERTAIN_QUANTITIES[quantity]
 
 
-FITTED: Final = "fitted"
-"""Name of all inputs that were fitted together, where effects are listed by input."""
-_DIRECTION: Final = f"{FITTED} "
-"""What the names of directions begin with; a number follows."""
-
-Sides = tuple[Scene, Scene]
-
-
 def without_fitted(scene: Scene) -> Scene:
     """The scene with its models as published and its inputs independent, for comparing models with models.
 
@@ -174,63 +166,6 @@ def independent_half_widths(scene: Scene) -> Mapping[str, float]:
     """`half_widths` of the inputs that are not fitted together."""
     together = {each.key for each in scene.fitted.quantities}
     return {name: width for name, width in half_widths(scene).items() if name not in together}
-
-
-def input_sides(
-    scene: Scene, *, among: Collection[str] = UNCERTAIN_QUANTITIES, errors: bool = True
-) -> Mapping[str, Sides]:
-    """The scene with each independent input, or direction of fitted ones, lower and higher.
-
-    By its expanded uncertainty (95 %), as far as a device can have it. Effects combine by the root of the sum
-    of squares.
-    Args: `among`: inputs that count. `errors`: whether fitted errors of models count too.
-    Returns: Both sides by input, or by direction, "fitted 1" and so on.
-    """
-    widths = independent_half_widths(scene)
-    alone = {
-        name: (moved(scene, {name: -width}), moved(scene, {name: width}))
-        for name, width in widths.items()
-        if name in among
-    }
-    return alone | direction_sides(scene, among=among, errors=errors)
-
-
-def direction_sides(
-    scene: Scene,
-    *,
-    among: Collection[str] = UNCERTAIN_QUANTITIES,
-    errors: bool = True,
-    turned: FloatArray | None = None,
-) -> dict[str, Sides]:
-    """The scene moved to both sides along each direction of its fitted inputs, as `input_sides`.
-
-    Args: `turned`: orthonormal columns, other directions as combinations of these.
-    """
-    keys = [each.key for each in scene.fitted.quantities]
-    which = [i for i, key in enumerate(keys) if (errors if key.startswith(MODEL) else key in among)]
-    columns = NORMAL_95 * scene.fitted.directions(np.array(which, dtype=np.int64))
-    changes = (columns if turned is None else columns @ turned).T.tolist()
-    moves = [dict(zip((keys[i] for i in which), change, strict=True)) for change in changes]
-    return {
-        f"{_DIRECTION}{place + 1}": (
-            moved(scene, {name: -change for name, change in move.items()}),
-            moved(scene, move),
-        )
-        for place, move in enumerate(moves)
-    }
-
-
-Effect = TypeVar("Effect", float, FloatArray)
-
-
-def combined(effects: Mapping[str, Effect]) -> dict[str, Effect]:
-    """Effects by input with those of all directions as one, "fitted", by the root of their squares' sum."""
-    alone: dict[str, Any] = {name: e for name, e in effects.items() if not name.startswith(_DIRECTION)}
-    together = [effect for name, effect in effects.items() if name.startswith(_DIRECTION)]
-    if not together:
-        return alone
-    whole: Any = np.sqrt(sum(np.square(effect) for effect in together))
-    return alone | {FITTED: whole if whole.ndim else float(whole)}
 
 
 def fitted_causes(scene: Scene) -> frozenset[str]:
@@ -255,12 +190,15 @@ def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
 
 def with_model_error(scene: Scene, name: str, change: float) -> Scene:
     """The scene with one error of its models larger, by standard deviations, within what models allow."""
-    error, tube = ModelError.named(name, 1.0), scene.tube
-    now = sum(
-        each.even * error.even + each.odd * error.odd
-        for each in tube.model_errors
-        if each.cause == error.cause
-    )
-    largest = max(LARGEST_ERROR, abs(now))
-    error = ModelError.named(name, min(max(now + change, -largest), largest) - now)
-    return replace(scene, tube=replace(tube, model_errors=(*tube.model_errors, error)))
+    unit, errors = ModelError.named(name, 1.0), scene.tube.model_errors
+    there = [each for each in errors if each.cause == unit.cause]
+    even, odd = sum(each.even for each in there), sum(each.odd for each in there)
+    now = even * unit.even + odd * unit.odd
+    largest = np.maximum(LARGEST_ERROR, np.abs(now))
+    step = np.clip(now + change, -largest, largest) - now
+    error = replace(unit, even=plain(even + step * unit.even), odd=plain(odd + step * unit.odd))
+    # In its place, so that scenes moved by the same errors differ in numbers alone.
+    place = errors.index(there[0]) if there else len(errors)
+    others = [each for each in errors if each.cause != unit.cause]
+    errors = (*others[:place], error, *others[place:])
+    return replace(scene, tube=replace(scene.tube, model_errors=errors))

@@ -305,7 +305,8 @@ class LiquidRingBalancer(Balancer):
 
     def information(self, scene: SceneFile) -> Information:
         """See `Balancer`."""
-        return loop_information(liquid_ring_scene(scene), self.model)
+        known = loop_information(liquid_ring_scene(scene), self.model)
+        return replace(known, document={**known.document, "drawn": self._drawn_runs.spread.document()})
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:
         """See `Balancer`."""

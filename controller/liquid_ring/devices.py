@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -19,58 +19,53 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.making import nominal_laws
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.draws import deviates, quantiles
+from ringbalance.scene.draws import quantiles
+from ringbalance.scene.errors import (
+    AMPLITUDE,
+    LOSS,
+    MOMENT,
+    PHASE,
+    WAVES,
+    Uncertainty,
+    of_chamber,
+    of_runs,
+    uncertainties,
+)
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import (
-    NORMAL_95,
-    independent_half_widths,
-    moved,
-    shifted_in_turn,
-)
+from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, shifted_in_turn
 
-ASSUMED_INFLUENCE: Final = 0.05
-"""Relative expanded uncertainty (95 %) of an influence coefficient for which the scene states none."""
-ASSUMED_LAG: Final = math.radians(3.0)
-"""Expanded uncertainty (95 %) of a lag angle for which the scene states none."""
-ASSUMED_AMPLITUDE: Final = 0.05
-"""Relative expanded uncertainty (95 %) of the initial amplitude from one machine to the next."""
 PAPER_DRAG_UNCERTAINTY: Final = 0.1
 """Relative half-width taken for "k is about 50"."""
 PAPER_MOMENT_UNCERTAINTY: Final = 0.007
 """Relative half-width that the liquid-ring paper states for lambda."""
-LOSS: Final = "model: loss of the tube"
-CAVITY: Final = "model: pressure of the cavity"
-MOMENT: Final = "model: moment"
-AMPLITUDE: Final = "rotor.initial_amplitude"
-PHASE: Final = "rotor.initial_phase"
-FITTED: Final = "fitted together, direction"
-"""Names of what is drawn beside the inputs of the scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """What differs between the devices of a scene under a law; expanded uncertainties (95 %)."""
+    """What differs between the devices of a scene under a law."""
 
-    inputs: Mapping[str, float]
-    """Of each input by itself, SI."""
-    directions: FloatArray
-    """Of inputs that were fitted together, SI, shape (quantities, directions)."""
-    loss: float
-    """Of the tube's head by models alone, relative; of a law that is not remade that of its velocity."""
-    cavity: bool
-    """Whether the pressure of a cavity lies anywhere between the vapour's and the gas's."""
+    errors: tuple[Uncertainty, ...]
+    """All that is drawn."""
     remade: bool
     """Whether a device has a law of its own, and not the scene's with another velocity."""
-    moment: float
-    """Of the moment by models alone, relative."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of all that is drawn, inputs of the scene by their keys."""
-        fitted = [f"{FITTED} {place + 1}" for place in range(self.directions.shape[1])]
-        cavity = [CAVITY] if self.cavity else []
-        return (*self.inputs, *fitted, LOSS, *cavity, MOMENT, AMPLITUDE, PHASE)
+        return tuple(each.name for each in self.errors)
+
+    def half_width(self, name: str) -> float:
+        """Relative expanded uncertainty (95 %) of what acts by a factor."""
+        return next(each.half_width or 0.0 for each in self.errors if each.name == name)
+
+    def factor(self, name: str, z: Mapping[str, float]) -> float:
+        """By which it acts, at its deviation."""
+        return math.exp(math.log1p(self.half_width(name)) * z[name] / NORMAL_95)
+
+    def document(self) -> list[dict[str, Any]]:
+        """What is drawn, for JSON."""
+        return [each.document() for each in self.errors]
 
     @classmethod
     def of(cls, scene: Scene, model: BalancerModel, *, remade: bool = True) -> Spread:
@@ -78,25 +73,21 @@ class Spread:
 
         Args: `remade`: whether a calibrated law is the scene's own.
         """
-        rotor, fitted = scene.rotor, {each.key for each in scene.fitted.quantities}
-        assumed = {
-            "influence_coefficient": ASSUMED_INFLUENCE * rotor.influence_coefficient,
-            "lag_angle": ASSUMED_LAG,
-        }
-        inputs = dict(independent_half_widths(scene))
-        inputs |= {
-            name: width
-            for name, width in assumed.items()
-            if name not in inputs and name not in fitted and not _states(scene, name)
-        }
-        return cls(
-            inputs=inputs,
-            directions=NORMAL_95 * scene.fitted.directions(),
-            loss=_loss(scene, model, remade=remade),
-            cavity=remade and isinstance(model.flow, CalibratedLaw) and model.flow.path.released > 0.0,
-            remade=remade and isinstance(model.flow, CalibratedLaw),
-            moment=_moment(model),
+        remade = remade and isinstance(model.flow, CalibratedLaw)
+        moment = of_chamber(MOMENT, _moment(model))
+        if remade:
+            known = [each for each in uncertainties(scene) if each.name != MOMENT]
+            return cls(errors=(*known, moment, *of_runs(scene)), remade=True)
+        loss = Uncertainty(
+            name=LOSS,
+            group=LOSS,
+            acts_on="velocity in the tube",
+            varies="not known",
+            distribution="lognormal",
+            half_width=_loss(scene, model),
         )
+        inputs = uncertainties(scene, models=False)
+        return cls(errors=(*inputs, loss, moment, *of_runs(scene)), remade=False)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,7 +102,7 @@ class Device:
     moment: float
     """Factor on the law's moments."""
     inputs: Mapping[str, float]
-    """Place of everything that was drawn in its distribution, in (0, 1)."""
+    """Quantile of everything that was drawn, in (0, 1)."""
     clipped: tuple[str, ...]
     """Inputs that lie nearer to the scene's value than drawn, since no device has the drawn one."""
 
@@ -150,26 +141,27 @@ def devices(
 
     Args: `rotors`: that the devices run on; default their own, drawn.
     """
-    normal = _rows({name: deviates(name, numbers, seed=seed) / NORMAL_95 for name in spread.names})
-    places = _rows({name: quantiles(name, numbers, seed=seed) for name in spread.names})
-    found = [_drawn(scene, spread, z, q) for z, q in zip(normal, places, strict=True)]
-    scenes = [drawn for drawn, _ in found]
+    places = {each.name: quantiles(each.name, numbers, seed=seed) for each in spread.errors}
+    quantile = _rows(places)
+    deviation = _rows({each.name: each.deviation(places[each.name]) for each in spread.errors})
+    drawn = [_drawn(scene, spread, z) for z in deviation]
+    scenes = [each for each, _ in drawn]
     if rotors is not None:
         pairs = zip(scenes, numbers, strict=True)
-        scenes = [replace(drawn, rotor=rotor_like(drawn.rotor, rotors(number))) for drawn, number in pairs]
-    laws = _laws(scenes, scene, model, spread, normal, places)
+        scenes = [replace(each, rotor=rotor_like(each.rotor, rotors(number))) for each, number in pairs]
+    laws = _laws(scenes, scene, model, spread, deviation)
     return tuple(
         Device(
             number=number,
-            scene=drawn,
+            scene=device,
             model=law,
             speed=speed,
-            moment=math.exp(math.log1p(spread.moment) * z[MOMENT]),
+            moment=spread.factor(MOMENT, z),
             inputs=q,
             clipped=clipped,
         )
-        for number, drawn, (law, speed), z, q, (_, clipped) in zip(
-            numbers, scenes, laws, normal, places, found, strict=True
+        for number, device, (law, speed), z, q, (_, clipped) in zip(
+            numbers, scenes, laws, deviation, quantile, drawn, strict=True
         )
     )
 
@@ -192,21 +184,23 @@ def rotor_like(own: Rotor, rotor: CommonRotor) -> Rotor:
     )
 
 
-def _drawn(
-    scene: Scene, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
-) -> tuple[Scene, tuple[str, ...]]:
+def _drawn(scene: Scene, spread: Spread, z: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a device, and the inputs that no device can have as drawn."""
-    changes = {name: width * z[name] for name, width in spread.inputs.items()}
-    device, clipped = shifted_in_turn(scene, changes)
-    keys = [each.key for each in scene.fitted.quantities]
-    for place, column in enumerate(spread.directions.T):
-        together = zip(keys, (column * z[f"{FITTED} {place + 1}"]).tolist(), strict=True)
-        device = moved(device, dict(together))
+    alone = {
+        name: z[each.name] * change
+        for each in spread.errors
+        if each.name in UNCERTAIN_QUANTITIES
+        for name, change in each.change.items()
+    }
+    device, clipped = shifted_in_turn(scene, alone)
+    for each in spread.errors:
+        if each.name not in alone:
+            device = each.moved(device, z[each.name])
     rotor, half = device.rotor, scene.requirement.phase_range
     started = replace(
         rotor,
-        initial_amplitude=rotor.initial_amplitude * math.exp(math.log1p(ASSUMED_AMPLITUDE) * z[AMPLITUDE]),
-        initial_phase=rotor.initial_phase + half * (2.0 * q[PHASE] - 1.0),
+        initial_amplitude=rotor.initial_amplitude * spread.factor(AMPLITUDE, z),
+        initial_phase=rotor.initial_phase + half * z[PHASE] / NORMAL_95,
     )
     return replace(device, rotor=started), clipped
 
@@ -216,44 +210,29 @@ def _laws(
     scene: Scene,
     model: BalancerModel,
     spread: Spread,
-    normal: Sequence[Mapping[str, float]],
-    places: Sequence[Mapping[str, float]],
+    deviation: Sequence[Mapping[str, float]],
 ) -> list[tuple[BalancerModel, float]]:
     """Law of each device, and the factor on its velocity where only that is known to be uncertain.
 
     Whether they hold gravity is the scene's own question.
     """
     if isinstance(model.flow, PaperLaw):
-        drags = [_drag(model.flow.drag_coefficient, spread, z) for z in normal]
+        drags = [_drag(model.flow.drag_coefficient, spread, z) for z in deviation]
         tubes = zip(scenes, drags, strict=True)
         drawn = [replace(each, tube=replace(each.tube, drag_coefficient=drag)) for each, drag in tubes]
         return [(paper_model(each), 1.0) for each in drawn]
     if not spread.remade:
-        return [(model, math.exp(math.log1p(spread.loss) * z[LOSS])) for z in normal]
-    laws = nominal_laws(scenes, gravity=gravity_shares(scene).mean > scene.tolerance)
-    return [(_as_drawn(law, spread, z, q), 1.0) for law, z, q in zip(laws, normal, places, strict=True)]
+        return [(model, spread.factor(LOSS, z)) for z in deviation]
+    gravity, waves = gravity_shares(scene).mean > scene.tolerance, [z[WAVES] for z in deviation]
+    return [(BalancerModel.of(law), 1.0) for law in nominal_laws(scenes, gravity=gravity, waves=waves)]
 
 
 def _drag(k: float, spread: Spread, z: Mapping[str, float]) -> float:
-    return k * math.exp(math.log1p(2.0 * spread.loss * (k + 1.0) / k) * z[LOSS])
+    return k * math.exp(math.log1p(2.0 * spread.half_width(LOSS) * (k + 1.0) / k) * z[LOSS] / NORMAL_95)
 
 
-def _as_drawn(
-    law: CalibratedLaw, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
-) -> BalancerModel:
-    """With its loss and its cavity."""
-    more = math.log1p(spread.loss) * z[LOSS]
-    path = replace(law.path, released=q[CAVITY]) if spread.cavity else law.path
-    return BalancerModel.of(replace(law, heads=law.heads.raised(more), path=path))
-
-
-def _states(scene: Scene, name: str) -> bool:
-    """Whether the scene states an uncertainty, be it zero."""
-    return any(each.quantity == name for each in scene.uncertainty)
-
-
-def _loss(scene: Scene, model: BalancerModel, *, remade: bool) -> float:
-    """Relative uncertainty of the head by models alone; of a law that is not remade of its velocity."""
+def _loss(scene: Scene, model: BalancerModel) -> float:
+    """Relative uncertainty of the velocity of a law that is not remade, by models alone of the paper's."""
     law, fill = model.flow, scene.disc.initial_fill
     if isinstance(law, PaperLaw):
         stated = any(each.quantity == "drag_coefficient" for each in scene.uncertainty)
@@ -264,8 +243,6 @@ def _loss(scene: Scene, model: BalancerModel, *, remade: bool) -> float:
         fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=rest.primed
     )
     u = abs(float(flow.velocity)) or 1.0
-    if remade and isinstance(law, CalibratedLaw):
-        return law.heads.uncertainty_of_models(u, scene=scene)
     return float(flow.uncertainty) / u
 
 

@@ -15,14 +15,22 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.controller.balancer import Remedy
-from ringbalance.controller.liquid_ring.devices import AMPLITUDE, CAVITY, FITTED, LOSS, MOMENT, PHASE
 from ringbalance.controller.liquid_ring.loop_factor import loop_rate
 from ringbalance.controller.terms import dead_time
 from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Point, Trials, rounded
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding, residual_fill_ratio, stalled_fill_ratio
+from ringbalance.scene.errors import (
+    FITTED_DIRECTION,
+    LOSS,
+    MODEL_ERRORS,
+    MODEL_KINDS,
+    MOMENT,
+    NOT_KNOWN,
+    of_input,
+)
+from ringbalance.scene.fitted import MODEL
 from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import raw_value_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
@@ -148,15 +156,10 @@ Source: C and b of the SY3000 from SMC's catalogue EUS11-83 B-UK, of the M4GA2 R
     bar gauge, of which C follows by ISO 6358 with b taken as 0.3.  All lags are assumed.
 """
 _MEASURED: Mapping[str, str] = MappingProxyType(
-    {
-        LOSS: "measure_flow",
-        CAVITY: "measure_flow",
-        MOMENT: "measure_moment",
-        "draw_down_factor": "measure_residual",
-    }
+    dict.fromkeys((LOSS, *MODEL_ERRORS), "measure_flow")
+    | {MOMENT: "measure_moment", "draw_down_factor": "measure_residual"}
 )
 """What to measure in place of an error of a model."""
-_VARY: Final = frozenset({AMPLITUDE, PHASE})
 
 
 def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
@@ -191,12 +194,16 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
 
 def drawn_input(name: str) -> DrawnInput:
     """What kind of thing an input of drawn devices is, by its name among them."""
-    if table := UNCERTAIN_QUANTITIES.get(name):
-        common = LIQUID_RING.tables[table].keys[name].common
+    if name in UNCERTAIN_QUANTITIES:
+        kind = of_input(name, 0.0)
         measure = _MEASURED.get(name, MEASURE_INPUT)
-        return DrawnInput(common=common, measure=measure, path=f"{table}.{name}")
-    measure = "measure_fitted" if name.startswith(FITTED) else _MEASURED.get(name, "")
-    return DrawnInput(common=name not in _VARY, measure=measure, path=name if name in _VARY else "")
+        return DrawnInput(common=kind.varies == NOT_KNOWN, measure=measure, path=kind.acts_on)
+    if name.startswith(MODEL):
+        common = name not in MODEL_ERRORS or MODEL_KINDS[MODEL_ERRORS[name]].varies == NOT_KNOWN
+        return DrawnInput(common=common, measure=_MEASURED.get(name, ""))
+    if name.startswith(FITTED_DIRECTION):
+        return DrawnInput(common=True, measure="measure_fitted")
+    return DrawnInput(common=False, measure="", path=name)
 
 
 def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:

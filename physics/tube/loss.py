@@ -34,9 +34,10 @@ from ringbalance.physics.tube.local_losses import (
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rotation_table_covers
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.designs import Designs, input_effects
+from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.errors import FITTED, by_group, uncertainties
 from ringbalance.scene.models import Scene, Tube
-from ringbalance.scene.uncertain import FITTED, NORMAL_95, fitted_causes
+from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
 
 INPUT_PART: Final = "input: "
 """What the names of parts by inputs begin with."""
@@ -233,7 +234,8 @@ def _input_parts(scene: Scene, *, k_of: Callable[[Designs], FloatArray]) -> dict
     Args: `k_of`: k of designs at given velocities, which are held; the last axis runs over the designs.
     Returns: Half-width of k by input, each without that axis; "input: fitted" of all fitted together.
     """
-    effects = input_effects(scene, k_of, among=TUBE_INPUTS)[1]
+    errors = uncertainties(scene, among=TUBE_INPUTS, models=False)
+    effects = by_group(errors, changes_of(scene, k_of, errors)[1])
     return {f"{INPUT_PART}{name}": effect for name, effect in effects.items()}
 
 

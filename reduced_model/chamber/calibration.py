@@ -21,7 +21,8 @@ from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues, chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables, spline
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.designs import Designs, input_effects
+from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.errors import by_group, uncertainties
 from ringbalance.scene.models import Disc, Scene
 
 FILL_STEP: Final = 0.05
@@ -227,7 +228,8 @@ def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, _InputEffect]:
         level = chamber_pressure(scene=designs.scene, fill_ratio=places)
         return np.array(np.broadcast_arrays(wall, level, moment, ratio))
 
-    effects = input_effects(scene, values, among=CHAMBER_INPUTS, errors=False)[1]
+    errors = uncertainties(scene, among=CHAMBER_INPUTS, models=False, fitted_models=False)
+    effects = by_group(errors, changes_of(scene, values, errors)[1])
     return {
         name: _InputEffect(
             wall_pressure=each[0, :-1],

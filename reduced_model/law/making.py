@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
-from ringbalance.reduced_model.chamber.contributions import gravity_shares
+from ringbalance.reduced_model.chamber.contributions import gravity_shares, unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import (
     RingValues,
     chamber_closed_forms,
@@ -33,8 +33,9 @@ from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, alike
+from ringbalance.scene.errors import FITTED, directions
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
+from ringbalance.scene.uncertain import NORMAL_95, independent_half_widths
 
 # Density and speed act on both chambers and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
@@ -86,7 +87,7 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
     gravity = gravity_shares(scene).mean > scene.tolerance
 
     def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
-        sides = [side for both in direction_sides(scene, turned=turned).values() for side in both]
+        sides = [side for error in directions(scene, turned=turned) for side in error.sides(scene)]
         made = zip(nominal_laws(sides, gravity=gravity), sides, strict=True)
         return tuple(_variant(scene, law, side) for law, side in made)
 
@@ -118,20 +119,31 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
     return nominal_laws([scene], gravity=gravity)[0]
 
 
-def nominal_laws(scenes: Sequence[Scene], *, gravity: bool) -> tuple[CalibratedLaw, ...]:
-    """The same of many scenes; those that differ in numbers alone, and not in their fills, at once."""
+def nominal_laws(
+    scenes: Sequence[Scene], *, gravity: bool, waves: Sequence[float] | None = None
+) -> tuple[CalibratedLaw, ...]:
+    """The same of many scenes; those that differ in numbers alone, and not in their fills, at once.
+
+    Args: `waves`: error of each one's levels by what no model holds, in standard deviations.
+    """
     laws: dict[int, CalibratedLaw] = {}
     for places in alike(scenes):
         some = [scenes[place] for place in places]
-        laws |= zip(places, _nominal(some, gravity=gravity), strict=True)
+        moved = None if waves is None else [waves[place] for place in places]
+        laws |= zip(places, _nominal(some, gravity=gravity, waves=moved), strict=True)
     return tuple(laws[place] for place in range(len(scenes)))
 
 
-def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLaw]:
+def _nominal(
+    scenes: Sequence[Scene], *, gravity: bool, waves: Sequence[float] | None
+) -> Iterator[CalibratedLaw]:
     """Of scenes that are alike."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
     heads = TubeHeads.nominal(designs)
     pressures, moments = _chambers(designs, scenes, fills, gravity=gravity)
+    if waves is not None:
+        share = unmodelled_fractions(scenes[0], fills)["heads"] / NORMAL_95
+        pressures = [level * (1 + each * share) for level, each in zip(pressures, waves, strict=True)]
     levels = pressure_tables(scenes, fills, pressures)
     curves = smooth_tables(fills, designs.scene.disc.moment_factor * moments)
     for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):

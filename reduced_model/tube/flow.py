@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, TypeVar
 
@@ -139,6 +139,27 @@ def _log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
 
 
 @dataclass(frozen=True, eq=False)
+class Waves:
+    """What no model holds of the chambers' liquid, as a factor on its levels."""
+
+    fill_ratio: FloatArray
+    """Nodes."""
+    share: FloatArray
+    """Expanded uncertainty (95 %) there, relative."""
+    deviation: FloatArray
+    """In standard deviations, of n designs."""
+
+    def take(self, rows: IntArray) -> Waves:
+        """Those of some of the designs."""
+        return replace(self, deviation=self.deviation[rows])
+
+    def factor(self, fill_ratio: FloatArray) -> FloatArray:
+        """On the level at fills whose last axis runs over the designs."""
+        share = np.interp(fill_ratio, self.fill_ratio, self.share)
+        return 1.0 + self.deviation / NORMAL_95 * share
+
+
+@dataclass(frozen=True, eq=False)
 class TubeFlow:
     """The tubes of designs; arrays of shape (n,)."""
 
@@ -149,9 +170,11 @@ class TubeFlow:
     """Of the head between the chambers."""
     to_crest: _Inverse | None = None
     """Of that from the driven chamber to the lowest pressure at the crest; None without one."""
+    waves: Waves | None = field(default=None, kw_only=True)
+    """Error of the chambers' levels; None: none is supposed."""
 
     @classmethod
-    def of(cls, designs: Designs) -> TubeFlow:
+    def of(cls, designs: Designs, *, waves: Waves | None = None) -> TubeFlow:
         """Those of designs, with the nodes that roots start from."""
         scene, path, factor = designs.scene, tube_path(designs.scene), pressure_factor(designs.scene)
         highest = factor * np.abs(scene.gas.pressure) + chamber_pressure(
@@ -160,7 +183,7 @@ class TubeFlow:
         fastest = np.log(2 * np.maximum(highest, 1.0) / path.density * np.ones(designs.size)) / 2
         log_velocity = fastest + _NODES[:, None]
         heads = [_Inverse.through(log_velocity, head) for head in _log_heads(scene, log_velocity)]
-        return cls(designs, path, factor, *heads)
+        return cls(designs, path, factor, *heads, waves=waves)
 
     def of_neighbours(self, designs: Designs, rows: IntArray) -> TubeFlow:
         """Those of designs that differ little from some of these: roots start from tables of these."""
@@ -177,7 +200,13 @@ class TubeFlow:
         part = self.designs.take(rows)
         tables = (self.between, self.to_crest) if self.to_crest else (self.between,)
         heads = [table.take(rows) for table in tables]
-        return TubeFlow(part, tube_path(part.scene), pressure_factor(part.scene), *heads)
+        waves = None if self.waves is None else self.waves.take(rows)
+        return TubeFlow(part, tube_path(part.scene), pressure_factor(part.scene), *heads, waves=waves)
+
+    def level(self, fill_ratio: FloatArray) -> FloatArray:
+        """Hydrostatic pressure of a chamber's liquid at the outer radius, Pa, with the error of `waves`."""
+        level = chamber_pressure(scene=self.designs.scene, fill_ratio=fill_ratio)
+        return level if self.waves is None else level * self.waves.factor(fill_ratio)
 
     def ends(self, own: FloatArray, other: FloatArray, *, driven: bool = True) -> TubeEnds:
         """For levels of the two chambers, Pa. Args: `driven`: with the gas on."""

@@ -16,8 +16,10 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.scene.arrays import BoolArray, FloatArray, plain
+from ringbalance.scene.fitted import CREST_ERROR
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.uncertain import NORMAL_95
 
 _SAME = 1e-9
 
@@ -71,17 +73,27 @@ class Places:
 
 def reversed_tube(tube: Tube) -> Tube:
     """The tube as the opposite chamber sees it. Returns: The tube with crest and bends from the other end."""
-    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1])
+    errors = tuple(
+        replace(each, even=-each.even) if each.cause == CREST_ERROR else each for each in tube.model_errors
+    )
+    return replace(tube, hump_position=1 - tube.hump_position, bends=tube.bends[::-1], model_errors=errors)
 
 
 def crest_span(tube: Tube) -> tuple[float, float]:
     """Fractions of the path between which the tube lies on the crest's circle; equal for a point.
 
     The arc takes r_m (pi - 2 acos(r_m/r_p)) of the shortest path, and `hump_position` divides what is left.
-    Friction goes on at the crest's radius, so the pressure falls up to the second of the two.
+    Friction goes on at the crest's radius, so the pressure falls up to the second of the two.  By how much
+    the tube is longer than its shortest path may lie anywhere, at the most all of it before the crest or
+    behind: the error of `CREST_ERROR`, from -1.96 to 1.96.
     """
-    arc = _arc_fraction(tube)
-    return tube.hump_position * (1 - arc), tube.hump_position + (1 - tube.hump_position) * arc
+    arc, error = _arc_fraction(tube), tube.model_error(CREST_ERROR) / NORMAL_95
+    span = tube.hump_position * (1 - arc), tube.hump_position + (1 - tube.hump_position) * arc
+    if np.all(error == 0) or np.all(arc == 0):
+        return span
+    slack = np.maximum(1 - _shortest(tube) / tube.length, 0.0) * np.clip(error, -1.0, 1.0)
+    start, end = (plain(share * (1 - np.abs(slack)) + np.maximum(slack, 0.0)) for share in span)
+    return start, end
 
 
 def crest_middle(tube: Tube) -> float:

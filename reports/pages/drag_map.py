@@ -37,9 +37,10 @@ from ringbalance.reduced_model.tube.regime import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
+from ringbalance.scene.errors import uncertainties
 from ringbalance.scene.liquids import liquids_at_room_temperature
 from ringbalance.scene.models import HumpGas, Liquid, Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, input_sides, nominal_value, without_fitted
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, without_fitted
 
 _STEP: Final = 1e-5
 """Of ln u, for slopes."""
@@ -162,9 +163,10 @@ def _width(
     squares = sum(part**2 for part in model_parts(tube=varied.tube, state=state).values())
     among = [name for name in TUBE_INPUTS if name not in _CHARGED]
     moved = []
-    for name, sides in input_sides(without_fitted(scene), among=among).items():
-        table = UNCERTAIN_QUANTITIES[name]
-        values = [nominal_value(scene=side, quantity=name) for side in sides]
+    independent = without_fitted(scene)
+    for each in uncertainties(independent, among=among, models=False):
+        name, table = each.name, UNCERTAIN_QUANTITIES[each.name]
+        values = [nominal_value(scene=side, quantity=name) for side in each.sides(independent)]
         moved.append(
             [replace(varied, **{table: replace(getattr(varied, table), **{name: v})}) for v in values]
         )

@@ -21,10 +21,10 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.parameters import MODEL_ERRORS
 from ringbalance.identification.reading import KINDS
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted, with_model_error

@@ -16,9 +16,10 @@ from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit, problem_of
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.parameters import MODEL_ERRORS, FitError
+from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import with_model_error, with_value

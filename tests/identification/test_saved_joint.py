@@ -26,6 +26,7 @@ from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene, scene_from
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.errors import FITTED
 from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.toml import toml_bytes
@@ -136,8 +137,18 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
     whole = Spread.of(scene, model)
     # A fifth as wide, the rate follows the inputs in proportion; over the whole width what makes up for each
     # other does so to the first order alone.
-    spread = replace(whole, directions=0.2 * whole.directions, inputs={}, loss=0.0, moment=0.0, cavity=False)
-    made = devices(scene, model, spread, range(64), seed=0)
+    spread = replace(
+        whole,
+        errors=tuple(
+            replace(
+                each,
+                half_width=0.0,
+                change={name: 0.2 * size for name, size in each.change.items() if each.group == FITTED},
+            )
+            for each in whole.errors
+        ),
+    )
+    made = devices(scene, model, spread, range(512), seed=0)
     drawn = np.std([log_rate(each.scene) for each in made])
     assert drawn == pytest.approx(0.2 * posterior, rel=0.1)
     assert alone > 3 * posterior

@@ -18,7 +18,8 @@ from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import growing_root
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.designs import Designs, in_batches, input_effects
+from ringbalance.scene.designs import Designs, changes_of, in_batches
+from ringbalance.scene.errors import both_sides, by_group, uncertainties
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 
@@ -132,11 +133,12 @@ def test_scenes_of_other_kinds_are_answered_in_their_order(table_1_scene: Scene)
 def test_an_inputs_effect_is_the_larger_change_of_both_sides(table_1_scene: Scene) -> None:
     stated = InputUncertainty(quantity="speed", half_width=10.0, relative=False)
     scene = dataclasses.replace(table_1_scene, uncertainty=(stated,))
-    here, effects = input_effects(
-        scene, lambda designs: np.array([Answers.of(designs).stall_pressure]), among=("speed",)
-    )
+    errors = uncertainties(scene, among=("speed",), models=False)
+    here, changes = changes_of(scene, lambda designs: np.array([Answers.of(designs).stall_pressure]), errors)
     speed = scene.rotor.speed
-    assert effects["speed"][0] == pytest.approx(here[0] * ((1 + 10 / speed) ** 2 - 1), rel=1e-9)
+    higher, lower = ((1 + side * 10 / speed) ** 2 - 1 for side in (1, -1))
+    assert by_group(errors, changes)["speed"][0] == pytest.approx(here[0] * higher, rel=1e-9)
+    assert np.ravel(both_sides(changes)) == pytest.approx([-here[0] * lower, here[0] * higher], rel=1e-9)
 
 
 @given(

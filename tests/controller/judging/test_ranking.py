@@ -12,11 +12,11 @@ import pytest
 from ringbalance.controller.balancer import Outcomes, settles_within
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.ranking import _first_order_index, ranked
-from ringbalance.controller.liquid_ring.devices import CAVITY, LOSS, PHASE
 from ringbalance.controller.liquid_ring.offers import drawn_input
 from ringbalance.controller.trials import DrawnInput
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
+from ringbalance.scene.errors import LOSS, MODEL_ERRORS, PHASE
 
 NAMES = ("a", "b", "c")
 
@@ -117,5 +117,8 @@ def test_kinds_of_inputs_of_a_liquid_ring() -> None:
     assert drawn_input("draw_down_factor") == DrawnInput(
         common=True, measure="measure_residual", path=drawn_input("draw_down_factor").path
     )
-    assert drawn_input(LOSS) == drawn_input(CAVITY) == DrawnInput(common=True, measure="measure_flow")
+    designs = ("model: ends, even", "model: pressure of the cavity", "model: end of the crest")
+    assert set(designs) < set(MODEL_ERRORS)
+    for name in (LOSS, *designs):
+        assert drawn_input(name) == DrawnInput(common=True, measure="measure_flow")
     assert drawn_input(PHASE) == DrawnInput(common=False, measure="", path="rotor.initial_phase")

@@ -1,0 +1,337 @@
+"""The one list of what is not known exactly of a liquid ring: every input, and every error of a model.
+
+Static intervals take both sides of each (its 2.5 and 97.5 % quantiles), drawn devices its quantiles, `fit`
+the errors of models as nuisance parameters, and rankings their names.  What an error does stands where the
+model stands; here are its distribution, what it acts on and whether devices differ in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
+from typing import Any, Final, Literal, TypeAlias
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.fitted import (
+    CAVITY_ERROR,
+    CLEARING_ERROR,
+    CREST_ERROR,
+    MODEL,
+    START_ERROR,
+)
+from ringbalance.scene.keys.schema import LIQUID_RING
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    UNCERTAIN_QUANTITIES,
+    fitted_causes,
+    independent_half_widths,
+    moved,
+)
+
+Distribution: TypeAlias = Literal["normal", "lognormal", "uniform"]
+"""Lognormal: of a factor 1 + U at the expanded uncertainty (95 %) U."""
+Varies: TypeAlias = Literal["devices", "chambers", "not known"]
+"""Between what it varies; "not known": all have it alike."""
+NOT_KNOWN: Final = "not known"
+ASSUMED_INFLUENCE: Final = 0.05
+"""Relative expanded uncertainty (95 %) of an influence coefficient for which the scene states none."""
+ASSUMED_LAG: Final = math.radians(3.0)
+"""Expanded uncertainty (95 %) of a lag angle for which the scene states none."""
+ASSUMED_AMPLITUDE: Final = 0.05
+"""Relative expanded uncertainty (95 %) of the initial amplitude from one machine to the next."""
+FITTED: Final = "fitted"
+"""Group of all inputs that were fitted together."""
+FITTED_DIRECTION: Final = "fitted together, direction"
+"""What the names of their directions begin with; a number follows."""
+LOSS: Final = f"{MODEL}loss of the tube"
+"""Of a law that is not the scene's own: on its velocity, or on the paper's k."""
+WAVES: Final = f"{MODEL}waves"
+MOMENT: Final = f"{MODEL}moment"
+VOLUME: Final = f"{MODEL}volume"
+"""Of a chamber's liquid what no model holds: on its pressure and on its moment; by facets on its volume."""
+AMPLITUDE: Final = "rotor.initial_amplitude"
+PHASE: Final = "rotor.initial_phase"
+_PARTS: Final = ("even", "odd")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelKind:
+    """A model that may be off."""
+
+    acts_on: str
+    parts: tuple[str, ...] = ("",)
+    """Names of the numbers that it has; those of a random function of Re are two."""
+    distribution: Distribution = "normal"
+    varies: Varies = "not known"
+    by_fit: bool = False
+    """Whether only data of a device that was built say something of it, so that a design has none."""
+    applies: Callable[[Scene], bool] = lambda _: True
+
+    def names(self, cause: str) -> tuple[str, ...]:
+        """Names of its numbers, such as "model: ends, even"."""
+        return tuple(f"{MODEL}{cause}, {part}" if part else f"{MODEL}{cause}" for part in self.parts)
+
+
+def _has_model(scene: Scene) -> bool:
+    """A prescribed k has no model."""
+    return scene.tube.drag_coefficient is None
+
+
+def _has_bends(scene: Scene) -> bool:
+    return _has_model(scene) and bool(scene.tube.bends)
+
+
+def _has_crest(scene: Scene) -> bool:
+    return scene.tube.hump_radius is not None
+
+
+def _has_arc(scene: Scene) -> bool:
+    return _has_crest(scene) and scene.tube.hump_shape == "arc"
+
+
+def _has_dissolved_gas(scene: Scene) -> bool:
+    return _has_crest(scene) and scene.liquid.dissolved_gas == "saturated"
+
+
+def _of_loss(acts_on: str, applies: Callable[[Scene], bool] = _has_model) -> ModelKind:
+    return ModelKind(acts_on=acts_on, parts=_PARTS, applies=applies)
+
+
+def _as_built(acts_on: str, applies: Callable[[Scene], bool] = _has_model) -> ModelKind:
+    return ModelKind(acts_on=acts_on, parts=_PARTS, varies="devices", by_fit=True, applies=applies)
+
+
+MODEL_KINDS: Final[Mapping[str, ModelKind]] = MappingProxyType(
+    {
+        START_ERROR: ModelKind(acts_on="start of an injection", varies="chambers", by_fit=True),
+        CLEARING_ERROR: ModelKind(acts_on="flow that carries gas off the crest", applies=_has_crest),
+        CAVITY_ERROR: ModelKind(
+            acts_on="pressure over the crest", distribution="uniform", applies=_has_dissolved_gas
+        ),
+        CREST_ERROR: ModelKind(acts_on="loss up to the crest", distribution="uniform", applies=_has_arc),
+        "friction correlation": _of_loss("friction of the tube"),
+        "rotation model": _of_loss("friction that rotation adds"),
+        "rotation entry": _of_loss("friction that rotation adds near the inlet"),
+        "ends": _of_loss("loss of entrance and exit"),
+        "bends": _of_loss("loss of the bends", _has_bends),
+        "friction as built": _as_built("friction of the tube"),
+        "rotation as built": _as_built("friction that rotation adds"),
+        "entrance as built": _as_built("loss of the entrance"),
+        "bends as built": _as_built("loss of the bends", _has_bends),
+    }
+)
+"""By `ErrorCause`. Each cause of k's is a random function of Re of its own range, of two numbers, as
+`physics.tube.loss.with_errors` says; "as built" gives the shape of k(u) freedom of its own.  What clears the
+crest and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`, and
+where the crest's arc ends within that of `reduced_model.tube.path`.  The start of the flow has no
+measurements to compare with: the column's inertia, a valve that does not open as fast as it closes, and to
+which side liquid runs that stands on the crest when the gas is shut, up to half of the tube.  The time L/2u
+in which the flow passes that half is taken for their expanded uncertainty (95 %)."""
+MODEL_ERRORS: Final[Mapping[str, str]] = MappingProxyType(
+    {name: cause for cause, kind in MODEL_KINDS.items() for name in kind.names(cause)}
+)
+"""Cause by the name of each number, one standard deviation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uncertainty:
+    """One quantity that is not known exactly."""
+
+    name: str
+    """Of a quantity of the scene its key, of a model's error as `ModelError.named` takes it."""
+    group: str
+    """Under which its effect is reported: the name, "fitted", or the cause of a model's error."""
+    acts_on: str
+    varies: Varies
+    distribution: Distribution = "normal"
+    half_width: float | None = None
+    """Expanded uncertainty (95 %), SI, relative where it acts by a factor; None: that of its model."""
+    change: Mapping[str, float] = field(default_factory=dict)
+    """Changes of the scene with one standard deviation, as `moved` takes them; empty: it is in no scene."""
+
+    @property
+    def is_model(self) -> bool:
+        """Whether it is an error of a model and not of an input."""
+        return self.name.startswith(MODEL)
+
+    def deviation(self, quantile: Any) -> Any:
+        """Standard deviations at quantiles; of a uniform one 1.96 lie at the end of the range."""
+        if self.distribution == "uniform":
+            return NORMAL_95 * (2.0 * np.asarray(quantile) - 1.0)
+        return ndtri(quantile)
+
+    def deviation_of_normal(self, deviate: float) -> float:
+        """Its standard deviations where a standard normal variable has a value as likely to be exceeded."""
+        return float(self.deviation(ndtr(deviate))) if self.distribution == "uniform" else deviate
+
+    def moved(self, scene: Scene, deviation: float) -> Scene:
+        """The scene with it larger by standard deviations, as far as a device can have it."""
+        return moved(scene, {name: deviation * each for name, each in self.change.items()})
+
+    def sides(self, scene: Scene) -> tuple[Scene, Scene]:
+        """The scene at its 2.5 and 97.5 % quantiles."""
+        end = float(self.deviation(0.975))
+        return self.moved(scene, -end), self.moved(scene, end)
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {key: value for key, value in asdict(self).items() if key not in ("group", "change")}
+
+
+def uncertainties(
+    scene: Scene,
+    *,
+    among: Collection[str] = UNCERTAIN_QUANTITIES,
+    models: bool = True,
+    fitted_models: bool = True,
+) -> tuple[Uncertainty, ...]:
+    """The list for a scene: inputs, directions of those that were fitted together, errors of its models.
+
+    Args: `among`: inputs that count. `models`: whether errors of models count. `fitted_models`: whether those
+        do that were fitted together with inputs.
+    """
+    alone = tuple(
+        of_input(name, width) for name, width in independent_half_widths(scene).items() if name in among
+    )
+    found = (*alone, *directions(scene, among=among, errors=fitted_models))
+    return (*found, *model_uncertainties(scene), of_chamber(WAVES), of_chamber(MOMENT)) if models else found
+
+
+def of_input(name: str, width: float) -> Uncertainty:
+    """A quantity of the scene with its half-width (95 %), SI."""
+    table = UNCERTAIN_QUANTITIES[name]
+    return Uncertainty(
+        name=name,
+        group=name,
+        acts_on=f"{table}.{name}",
+        varies="not known" if LIQUID_RING.tables[table].keys[name].common else "devices",
+        half_width=width,
+        change={name: width / NORMAL_95},
+    )
+
+
+def directions(
+    scene: Scene,
+    *,
+    among: Collection[str] = UNCERTAIN_QUANTITIES,
+    errors: bool = True,
+    turned: FloatArray | None = None,
+) -> tuple[Uncertainty, ...]:
+    """Independent directions of the scene's fitted inputs and errors.
+
+    Args: `errors`: whether errors of models count. `turned`: orthonormal columns, other directions as
+        combinations of these.
+    """
+    keys = [each.key for each in scene.fitted.quantities]
+    which = [i for i, key in enumerate(keys) if (errors if key.startswith(MODEL) else key in among)]
+    columns = scene.fitted.directions(np.array(which, dtype=np.int64))
+    changes = (columns if turned is None else columns @ turned).T.tolist()
+    names = [keys[i] for i in which]
+    return tuple(
+        Uncertainty(
+            name=f"{FITTED_DIRECTION} {place + 1}",
+            group=FITTED,
+            acts_on=", ".join(names),
+            varies="not known",
+            change=dict(zip(names, change, strict=True)),
+        )
+        for place, change in enumerate(changes)
+    )
+
+
+def model_uncertainties(scene: Scene) -> tuple[Uncertainty, ...]:
+    """Errors of the models of a design, but for those that were fitted together with inputs."""
+    fitted = fitted_causes(scene)
+    return tuple(
+        Uncertainty(
+            name=name,
+            group=f"{MODEL}{cause}",
+            acts_on=kind.acts_on,
+            varies=kind.varies,
+            distribution=kind.distribution,
+            change={name: 1.0},
+        )
+        for cause, kind in MODEL_KINDS.items()
+        if not kind.by_fit and kind.applies(scene) and cause not in fitted
+        for name in kind.names(cause)
+    )
+
+
+def of_chamber(name: str, half_width: float | None = None) -> Uncertainty:
+    """`WAVES`, `MOMENT` or `VOLUME`. Args: `half_width`: relative; None: it depends on the fill."""
+    acts_on = {
+        WAVES: "pressure of the chambers' liquid",
+        MOMENT: "moment of the chambers' liquid",
+        VOLUME: "volume of a chamber",
+    }[name]
+    return Uncertainty(
+        name=name,
+        group=name,
+        acts_on=acts_on,
+        varies="not known",
+        distribution="lognormal" if name == MOMENT else "normal",
+        half_width=half_width,
+    )
+
+
+def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
+    """What runs of devices have beside `uncertainties`: an unstated rotor's, and the vibration before."""
+    rotor, known = scene.rotor, {each.key for each in scene.fitted.quantities}
+    known |= {each.quantity for each in scene.uncertainty}
+    assumed = {
+        "influence_coefficient": ASSUMED_INFLUENCE * rotor.influence_coefficient,
+        "lag_angle": ASSUMED_LAG,
+    }
+    found = [of_input(name, width) for name, width in assumed.items() if name not in known]
+    starts: tuple[tuple[str, Distribution, float], ...] = (
+        (AMPLITUDE, "lognormal", ASSUMED_AMPLITUDE),
+        (PHASE, "uniform", scene.requirement.phase_range),
+    )
+    for name, distribution, width in starts:
+        found.append(
+            Uncertainty(
+                name=name,
+                group=name,
+                acts_on=name,
+                varies="devices",
+                distribution=distribution,
+                half_width=width,
+            )
+        )
+    return tuple(found)
+
+
+def with_places(scene: Scene, errors: Collection[Uncertainty]) -> Scene:
+    """The scene with an entry for each cause among errors, so that scenes moved by them differ in numbers."""
+    for each in errors:
+        for name in each.change:
+            if name.startswith(MODEL):
+                scene = moved(scene, {name: 0.0})
+    return scene
+
+
+def larger(changes: FloatArray) -> FloatArray:
+    """The larger change of both sides of each error, as `by_group` takes them; NaN where neither has any."""
+    return np.asarray(np.fmax(*np.abs(np.moveaxis(changes, 1, 0))))
+
+
+def by_group(errors: Sequence[Uncertainty], changes: FloatArray) -> dict[str, FloatArray]:
+    """Expanded uncertainties (95 %) by group: the larger changes of its errors, by the root of their squares'
+    sum. Args: `changes`: as of `designs.changes_of`."""
+    squares: dict[str, Any] = {}
+    for error, change in zip(errors, larger(changes), strict=True):
+        squares[error.group] = squares.get(error.group, 0.0) + np.square(change)
+    return {group: np.sqrt(square) for group, square in squares.items()}
+
+
+def both_sides(changes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """By how much all together may lower and raise a value (95 %), of changes as `by_group` takes them."""
+    known = np.nan_to_num(changes)
+    lowered, raised = np.max(np.maximum(-known, 0.0), axis=1), np.max(np.maximum(known, 0.0), axis=1)
+    return np.sqrt(np.sum(lowered**2, axis=0)), np.sqrt(np.sum(raised**2, axis=0))

@@ -189,7 +189,6 @@ def _budget(budget: Budget) -> dict[str, Any]:
         "model": budget.model,
         "total": budget.total,
         "inputs": dict(budget.inputs),
-        "models": dict(budget.models),
     }
 
 

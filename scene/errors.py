@@ -309,11 +309,7 @@ def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
 
 def with_places(scene: Scene, errors: Collection[Uncertainty]) -> Scene:
     """The scene with an entry for each cause among errors, so that scenes moved by them differ in numbers."""
-    for each in errors:
-        for name in each.change:
-            if name.startswith(MODEL):
-                scene = moved(scene, {name: 0.0})
-    return scene
+    return moved(scene, {name: 0.0 for each in errors for name in each.change if name.startswith(MODEL)})
 
 
 def larger(changes: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, Final, Literal, cast, get_args
 
 import numpy as np
@@ -154,11 +154,17 @@ class ModelError:
 
         Args: `size`: in standard deviations. Raises: ValueError: there is no such error.
         """
-        match = ERROR_NAME.fullmatch(name)
-        if match is None or match[1] not in get_args(ErrorCause):
-            raise ValueError(f"{name!r} names no error of a model")
-        cause = cast(ErrorCause, match[1])
-        return cls(cause=cause, odd=size) if match[2] == "odd" else cls(cause=cause, even=size)
+        cause, odd = error_part(name)
+        return cls(cause=cause, odd=size) if odd else cls(cause=cause, even=size)
+
+
+@cache
+def error_part(name: str) -> tuple[ErrorCause, int]:
+    """Cause, and 1 for its odd part, else 0. Raises: ValueError: there is no such error."""
+    match = ERROR_NAME.fullmatch(name)
+    if match is None or match[1] not in get_args(ErrorCause):
+        raise ValueError(f"{name!r} names no error of a model")
+    return cast(ErrorCause, match[1]), int(match[2] == "odd")
 
 
 ModelErrors = Annotated[

@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import plain
 from ringbalance.scene.chamber_file.record import STRETCHED
-from ringbalance.scene.fitted import LARGEST_ERROR, MODEL, ErrorCause, Fitted, ModelError
+from ringbalance.scene.fitted import LARGEST_ERROR, MODEL, ErrorCause, Fitted, ModelError, error_part
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene, Tube
 
@@ -181,24 +181,34 @@ def fitted_causes(scene: Scene) -> frozenset[str]:
 def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """The scene with changes of inputs, SI, and of errors of models, in standard deviations."""
     for name, change in changes.items():
-        if name.startswith(MODEL):
-            scene = with_model_error(scene, name, change)
-        else:
+        if not name.startswith(MODEL):
             scene = shifted(scene=scene, quantity=name, change=change)
-    return scene
+    errors = {name: change for name, change in changes.items() if name.startswith(MODEL)}
+    return with_model_errors(scene, errors) if errors else scene
 
 
 def with_model_error(scene: Scene, name: str, change: float) -> Scene:
     """The scene with one error of its models larger, by standard deviations, within what models allow."""
-    unit, errors = ModelError.named(name, 1.0), scene.tube.model_errors
-    there = [each for each in errors if each.cause == unit.cause]
-    even, odd = sum(each.even for each in there), sum(each.odd for each in there)
-    now = even * unit.even + odd * unit.odd
-    largest = np.maximum(LARGEST_ERROR, np.abs(now))
-    step = np.clip(now + change, -largest, largest) - now
-    error = replace(unit, even=plain(even + step * unit.even), odd=plain(odd + step * unit.odd))
-    # In its place, so that scenes moved by the same errors differ in numbers alone.
-    place = errors.index(there[0]) if there else len(errors)
-    others = [each for each in errors if each.cause != unit.cause]
-    errors = (*others[:place], error, *others[place:])
+    return with_model_errors(scene, {name: change})
+
+
+def with_model_errors(scene: Scene, changes: Mapping[str, Any]) -> Scene:
+    """The same with several errors; a cause keeps its place, so that scenes differ in numbers alone."""
+    sums: dict[str, list[Any]] = {}
+    for each in scene.tube.model_errors:
+        parts = sums.setdefault(each.cause, [0.0, 0.0])
+        parts[0], parts[1] = parts[0] + each.even, parts[1] + each.odd
+    for name, change in changes.items():
+        cause, part = error_part(name)
+        parts = sums.setdefault(cause, [0.0, 0.0])
+        parts[part] = _limited(parts[part], change)
+    errors = tuple(ModelError(cause=c, even=even, odd=odd) for c, (even, odd) in sums.items())
     return replace(scene, tube=replace(scene.tube, model_errors=errors))
+
+
+def _limited(now: Any, change: Any) -> Any:
+    if isinstance(now, float) and isinstance(change, float):
+        largest = max(LARGEST_ERROR, abs(now))
+        return min(max(now + change, -largest), largest)
+    most = np.maximum(LARGEST_ERROR, np.abs(now))
+    return plain(np.clip(now + change, -most, most))

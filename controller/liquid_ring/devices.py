@@ -33,7 +33,7 @@ from ringbalance.scene.errors import (
 )
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, shifted_in_turn
+from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, moved, shifted_in_turn
 
 PAPER_DRAG_UNCERTAINTY: Final = 0.1
 """Relative half-width taken for "k is about 50"."""
@@ -193,9 +193,12 @@ def _drawn(scene: Scene, spread: Spread, z: Mapping[str, float]) -> tuple[Scene,
         for name, change in each.change.items()
     }
     device, clipped = shifted_in_turn(scene, alone)
+    others: dict[str, float] = {}
     for each in spread.errors:
         if each.name not in alone:
-            device = each.moved(device, z[each.name])
+            for name, change in each.change.items():
+                others[name] = others.get(name, 0.0) + z[each.name] * change
+    device = moved(device, others)
     rotor, half = device.rotor, scene.requirement.phase_range
     started = replace(
         rotor,

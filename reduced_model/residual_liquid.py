@@ -100,24 +100,6 @@ class ResidualLiquid:
             reach_share=share,
         )
 
-    def model_uncertainty(self, scene: Scene, *, law: CalibratedLaw, head: float) -> tuple[float, float]:
-        """Of the least fill and of the usable pair moment, kg m, by numerics and models alone.
-
-        Args: `law`: with these uncertainties and no others. `head`: that of a difference of two wall
-            pressures, Pa, which moves the stall.
-        """
-        top, x = scene.disc.max_fill_ratio, self.fill_ratio
-        rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
-        change = min(_by_flow(scene, rate, width), 0.99)
-        drawn = _residual_fills(scene, law, [1 - change, 1 + change])
-        gas = scene.gas
-        sides = gas.pressure + head, max(gas.pressure - head, -gas.ambient_pressure)
-        stalled = [stalled_fill_ratio(law=law, total=top, gas_pressure=side) for side in sides]
-        low, high = np.minimum(np.maximum(drawn, stalled), top / 2)
-        by_fill = (_pair_moment(law, top, low) - _pair_moment(law, top, high)) / 2
-        ends = law.moment.half_width(np.array([self.least_fill_ratio, self.largest_fill_ratio]))
-        return float(high - low) / 2, math.hypot(by_fill, *ends)
-
 
 def reach_share(chambers: int, *, passes_on: bool = True) -> float:
     """Smallest radius of what n pairs cancel together, over what one does along its axis: cot(pi/(2 n)).

@@ -11,9 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import (
     corrected_state,
-    model_parts,
     uncertainty_parts,
-    unfitted_parts,
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
@@ -28,9 +26,10 @@ from ringbalance.scene.arrays import FloatArray, clipped, plain
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.fitted import CREST_ERROR
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.toml import toml_text
-from ringbalance.scene.uncertain import independent_half_widths
+from ringbalance.scene.uncertain import fitted_causes, independent_half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to its square."""
@@ -106,7 +105,9 @@ class TubeHeads:
         Raises: ValueError: arcs of bends longer than the tube. SceneError: a head that falls.
         Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
         """
-        place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
+        position = independent_half_widths(scene).get("hump_position", 0.0)
+        fitted = CREST_ERROR in fitted_causes(scene)
+        place = crest_end_uncertainty(scene.tube, position, fitted=fitted)
         log_u, every = _places(2 * _SAMPLES - 1), _places(_SAMPLES)
         widths = _widths(scene, np.exp(every), place=place)
         return cls._with_widths(scene, _Widths(*(np.interp(log_u, every, width) for width in widths)))
@@ -156,47 +157,6 @@ class TubeHeads:
     def uncertainty(self, velocity: npt.ArrayLike) -> FloatArray:
         """Expanded uncertainty (95 %) of k over k + 1 at velocities above zero, m/s."""
         return self.siphon.straight(roots_of(self.siphon, velocity), LOSS)
-
-    def uncertainty_of_models(self, velocity: float, *, scene: Scene) -> float:
-        """The same by models alone, as `without_inputs` has it, of one velocity."""
-        knots, root = self.siphon.knots, roots_of(self.siphon, velocity)
-        piece = self.siphon.place(root)[0]
-        ends = slice(int(piece), int(piece) + 2)
-        place = crest_end_uncertainty(scene.tube, 0.0)
-        widths = _widths(scene, velocities_of(self.siphon)[ends], place=place, by_inputs=False)
-        return float(np.interp(root, knots[ends], widths.whole))
-
-    def without_inputs(self, *, scene: Scene) -> TubeHeads:
-        """The heads with models' uncertainties alone."""
-        place = crest_end_uncertainty(scene.tube, 0.0)
-
-        def widths(table: Table) -> _Widths:
-            return _widths(scene, velocities_of(table), place=place, by_inputs=False)
-
-        whole = widths(self.siphon)
-        siphon = self.siphon.with_column(LOSS, whole.whole)
-        if self.hump is None:
-            return replace(self, siphon=siphon)
-        siphon, back = siphon.with_column(SHARE_WIDTH, whole.share), self.return_hump
-        return TubeHeads(
-            siphon=siphon,
-            hump=self.hump.with_column(LOSS, widths(self.hump).there),
-            return_hump=None if back is None else back.with_column(LOSS, widths(back).back),
-            interpolation_error=self.interpolation_error,
-        )
-
-    def raised(self, logarithm: float) -> TubeHeads:
-        """Every head times exp(logarithm)."""
-        root, ratio = np.exp(logarithm / 8), np.exp(-logarithm / 2)
-
-        def raised(table: Table) -> Table:
-            factors = np.ones(table.count)
-            factors[:LOSS] = ratio / root ** np.arange(LOSS)
-            factors[SHARE + 1 :: 2] = 1 / root
-            columns = np.repeat(factors, table.knots.size) * table.columns
-            return Table(knots=root * table.knots, columns=columns)
-
-        return self._changed(raised)
 
     def power(self, *, velocity: float, exponent: float) -> TubeHeads:
         """Heads in proportion to a power of the velocity, those of the tube at one velocity, m/s."""
@@ -376,15 +336,13 @@ class _Widths(NamedTuple):
         return self.there, self.back
 
 
-def _widths(scene: Scene, velocity: FloatArray, *, place: float, by_inputs: bool = True) -> _Widths:
+def _widths(scene: Scene, velocity: FloatArray, *, place: float) -> _Widths:
     """But for inputs fitted together.
 
     Args: `place`: uncertainty of the crest's end.
     """
     state = tube_state(scene, velocity)
-    parts: Mapping[str, FloatArray] = unfitted_parts(scene, model_parts(tube=scene.tube, state=state))
-    if by_inputs:
-        parts = uncertainty_parts(scene, velocity=velocity, state=state, fitted=False)
+    parts = uncertainty_parts(scene, velocity=velocity, state=state, fitted=False)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(velocity)))
     right = with_errors(tube=scene.tube, state=state)
     there, share = _way_widths(scene.tube, state, right, parts, width, place)

@@ -226,11 +226,6 @@ def holds_at_rest(path: Any, ends: Any, primed: Any) -> Any:
     return held & (driving_pressure(path, ends) == 0.0) & (crest_margins(path, ends)[0] > 0.0)
 
 
-def possible_cavity(path: TubePath, ends: TubeEnds) -> Any:
-    """Between which a cavity's pressure lies, Pa; fitted, twice what is taken."""
-    return (cavity_pressure(path, ends),) * 2 if path.cavity_fitted else cavity_bounds(path, ends)
-
-
 def priming_pressure(path: TubePath, ends: TubeEnds) -> Any:
     """Difference of the gas pressures that lifts liquid over the crest of an unprimed tube, Pa.
 

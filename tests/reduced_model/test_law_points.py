@@ -107,13 +107,3 @@ def test_heads_of_a_power_keep_the_loss_at_one_velocity(law: CalibratedLaw, expo
     for table, own in ((heads.siphon, law.heads.siphon), (heads.hump, law.heads.hump)):
         right = roots_of(own, 7.0) ** 8 * (u / 7.0) ** exponent
         np.testing.assert_allclose(roots_of(table, u) ** 8, right, rtol=1e-6)
-
-
-def test_raised_heads_are_all_larger_by_one_factor(law: CalibratedLaw) -> None:
-    heads, u = law.heads.raised(np.log(1.3)), np.geomspace(1e-4, 1e2, 50)
-    assert heads.hump is not None
-    assert law.heads.hump is not None
-    for table, own in ((heads.siphon, law.heads.siphon), (heads.hump, law.heads.hump)):
-        np.testing.assert_allclose(roots_of(table, u) ** 8, 1.3 * roots_of(own, u) ** 8, rtol=1e-11)
-    share = heads.siphon.cubic(roots_of(heads.siphon, u), 5)
-    np.testing.assert_allclose(share, law.heads.siphon.cubic(roots_of(law.heads.siphon, u), 5), rtol=1e-10)

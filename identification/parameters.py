@@ -26,6 +26,7 @@ from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.errors import MODEL_ERRORS, MODEL_KINDS
 from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.fitted import CREST_ERROR
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile, with_values_at
@@ -317,9 +318,9 @@ class _SceneInputs:
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
         """The scene with one of these lower and higher by a change, as far as a device can have it."""
-        # Errors of models are nearly linear, and there are many of them.
-        low = self.scene if name in MODEL_ERRORS else self.changed(name, -change)
-        return low, self.changed(name, change)
+        # Errors of models are nearly linear, and there are many, but a crest's arc has two different ends.
+        one = name in MODEL_ERRORS and MODEL_ERRORS[name] != CREST_ERROR
+        return self.scene if one else self.changed(name, -change), self.changed(name, change)
 
     def _moved(self, name: str, change: float) -> SceneFile:
         """The scene with one uncertain quantity changed, SI, as far as a device can have it."""

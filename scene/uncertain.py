@@ -194,7 +194,7 @@ def with_model_error(scene: Scene, name: str, change: float) -> Scene:
 
 def with_model_errors(scene: Scene, changes: Mapping[str, Any]) -> Scene:
     """The same with several errors; a cause keeps its place, so that scenes differ in numbers alone."""
-    sums: dict[str, list[Any]] = {}
+    sums: dict[ErrorCause, list[Any]] = {}
     for each in scene.tube.model_errors:
         parts = sums.setdefault(each.cause, [0.0, 0.0])
         parts[0], parts[1] = parts[0] + each.even, parts[1] + each.odd

@@ -75,14 +75,18 @@ class TubeHeads:
     """Largest relative error of a head found between knots; zero where none was looked for."""
 
     @classmethod
-    def nominal(cls, designs: Designs) -> tuple[TubeHeads, ...]:
+    def nominal(cls, designs: Designs, *, drawn: bool = False) -> tuple[TubeHeads, ...]:
         """The heads of every design without uncertainties and on few knots.
 
         These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values.
+        Args: `drawn`: whether errors of models are drawn, so that a head that falls is levelled.
         Raises: ValueError: as `TubeHeads.of`. SceneError: a head that falls with the velocity.
         """
         log_u = _places(_NOMINAL_KNOTS)
-        lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u)]
+        lost = [
+            _Lost.of(log_u[:, None], value)
+            for value in _sampled(designs.scene, log_u, falls=np.inf if drawn else _LEVELLED)
+        ]
         exact, tables = _Widths(*([np.zeros((log_u.size, 1))] * 4)), []
         # One column where nothing that a head depends on differs between designs.
         shape = log_u.size, designs.size
@@ -290,7 +294,7 @@ def _inconsistent(scene: Scene) -> SceneError:
     return SceneError([replace(fault, value=toml_text(written))])
 
 
-def _sampled(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
+def _sampled(scene: Scene, log_velocity: FloatArray, *, falls: float = _LEVELLED) -> list[FloatArray]:
     """`log_heads` over even places, shape (samples, designs).
 
     Raises: as `TubeHeads.nominal`.
@@ -299,21 +303,21 @@ def _sampled(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
     with np.errstate(invalid="ignore", divide="ignore"):
         values = log_heads(scene, places)
     if scene.tube.model_errors and np.all(np.isfinite(values)):
-        values = [_growing(scene, places, value) for value in values]
+        values = [_growing(scene, places, value, falls) for value in values]
     if not all(np.all(np.isfinite(value)) and np.all(np.diff(value, axis=0) > 0) for value in values):
         raise _inconsistent(scene)
     return values
 
 
-def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray) -> FloatArray:
+def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray, falls: float) -> FloatArray:
     """A head with supposed errors of models, level where these make it fall a little.
 
     Sizes of errors change fast where the flow turns turbulent. Its largest value up to a velocity is taken,
     rising by `_RISE` per unit of ln u, so that one velocity belongs to each.
-    Raises: SceneError: it falls by more than `_LEVELLED`, or is none.
+    Raises: SceneError: ln of it falls by more than `falls`, or it is none.
     """
     highest = np.maximum.accumulate(log_head, axis=0)
-    if not np.all(highest - log_head <= _LEVELLED):
+    if not np.all(highest - log_head <= falls):
         raise _inconsistent(scene)
     return highest + _RISE * log_velocity
 

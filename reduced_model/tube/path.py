@@ -91,8 +91,18 @@ def crest_span(tube: Tube) -> tuple[float, float]:
     span = tube.hump_position * (1 - arc), tube.hump_position + (1 - tube.hump_position) * arc
     if np.all(error == 0) or np.all(arc == 0):
         return span
-    slack = np.maximum(1 - _shortest(tube) / tube.length, 0.0) * np.clip(error, -1.0, 1.0)
-    start, end = (plain(share * (1 - np.abs(slack)) + np.maximum(slack, 0.0)) for share in span)
+    slack, error = np.maximum(1 - _shortest(tube) / tube.length, 0.0), np.clip(error, -1.0, 1.0)
+    # A parabola through both ends and what the stretched path has, smooth where no error is supposed.
+    start, end = (
+        plain(
+            np.clip(
+                share + slack * (error / 2 + error**2 * (0.5 - share)),
+                share * (1 - slack),
+                share * (1 - slack) + slack,
+            )
+        )
+        for share in span
+    )
     return start, end
 
 

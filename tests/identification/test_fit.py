@@ -165,7 +165,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
             moved = with_value(scene=scene, quantity="bore", value=float(bore))
             moved = with_value(scene=moved, quantity="lambda_factor", value=float(factor))
             left = kind.numbers(data) - kind.predict(moved, data, models)
-            known = ((bore - scene.tube.bore) / (5e-5 / 1.96)) ** 2 + ((factor - 1) / (0.05 / 1.96)) ** 2
+            known = ((bore - scene.tube.bore) / (3e-5 / 1.96)) ** 2 + ((factor - 1) / (0.05 / 1.96)) ** 2
             log_density[i, j] = -(left @ precision @ left + known) / 2
     weight = np.exp(log_density - log_density.max())
     mean = np.tensordot(weight / weight.sum(), places, axes=2)
@@ -176,7 +176,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
 def test_a_posterior_on_a_grid(paper_scene: Scene) -> None:
     """Means within 5 % of a standard deviation, standard deviations within 1 %: what is left is the bend of
     the prediction over the posterior, which the profile follows and a mean does not."""
-    scene = stated(replace(paper_scene, disc=replace(paper_scene.disc, lambda_factor=1.0)), bore=5e-5)
+    scene = stated(replace(paper_scene, disc=replace(paper_scene.disc, lambda_factor=1.0)), bore=3e-5)
     data = injected(scene, sd=1.5e-8)
     result = fit(scene, data=[data], parameters=["bore", "lambda_factor"])
     mean, spread = posterior(scene, data, result, 1.5e-8 * np.sqrt(2))

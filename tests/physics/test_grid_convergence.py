@@ -56,6 +56,20 @@ def test_round_off_is_said_and_gets_no_index() -> None:
     assert "round-off" in found.text
 
 
+@pytest.mark.parametrize(("change", "noise"), [(3e-4, True), (4e-4, False)])
+def test_a_change_is_round_off_where_the_coarser_pair_promises_no_more(change: float, noise: bool) -> None:
+    """No change between the finer two, and change/(4^2 - 1)/1.5^2 foretold: 8.9 and 11.9 times the noise."""
+    found = gci(values=(1.0, 1.0, 1.0 + change), sizes=(1, 1.5, 6), formal_order=2.0, round_off=1e-6)
+    assert (found.verdict is GridVerdict.ROUND_OFF) == noise
+
+
+def test_a_diverging_half_width_holds_the_noise() -> None:
+    """No change between the coarser two: three times the last change, and the noise in a value beside it."""
+    found = gci(values=(1.0, 1.1, 1.1), sizes=(1, 2, 4), formal_order=2.0, round_off=0.05)
+    assert found.verdict is GridVerdict.DIVERGING
+    assert found.uncertainty == pytest.approx(3 * 0.1 + 0.05, rel=1e-9)
+
+
 def test_equal_values_are_round_off_and_not_an_error() -> None:
     for value in (0.0, 3.7):
         found = gci(values=(value,) * 3, sizes=(1, 2, 4), formal_order=2.0)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.page import render
 from ringbalance.reports.pages import drag_coefficient as fifty
@@ -157,6 +158,15 @@ def inside_record(work: Work) -> Record:
     record = inside.SECTION.collect(work)
     assert record is not None
     return record
+
+
+def test_the_change_of_friction_is_that_of_the_table_for_turning_tubes(inside_record: Record) -> None:
+    """The drawn section is on a coarse mesh; the table was computed on fine ones."""
+    section = inside_record["section"]
+    conditions = {"reynolds": section["reynolds"], "rotation_reynolds": section["rotation_reynolds"]}
+    table = float(rotating_friction_ratio(**conditions).value)
+    assert table > 1.01
+    assert section["friction_change"] == pytest.approx(table - 1, rel=0.03)
 
 
 def test_a_field_is_packed_to_four_digits() -> None:

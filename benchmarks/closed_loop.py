@@ -33,7 +33,6 @@ from functools import partial
 import numpy as np
 from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
 
-from ringbalance.controller.algorithms.built_in import vector_shares
 from ringbalance.controller.balancer import AS_GIVEN, Draws
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.drawn_runs import RELATIVE_ERROR
@@ -144,8 +143,10 @@ def _gas(
     settings, half, longest = scene.controller, len(fills), 0.0
     length = min(max(wanted, 0.0), settings.maximum_gas_time)
     angle = phase + settings.assumed_lag_angle
-    first, near, second, far = vector_shares(2 * half, angle, length, (False,) * 2 * half)
-    for chamber, share in ((first, near), (second, far)):
+    between = math.pi / half
+    first, past = divmod(angle % (2 * math.pi), between)
+    near, far = (length * math.sin(part) / math.sin(between) for part in (between - past, past))
+    for chamber, share in ((int(first) % (2 * half), near), ((int(first) + 1) % (2 * half), far)):
         duration = min(share, remaining)
         if share < settings.minimum_gas_time or duration <= 0:
             continue

@@ -230,9 +230,8 @@ def _act(
 ) -> None:
     """All valves of the command open together; after the last one has closed the loop waits."""
     commanded, before, start = limit_to_time(loop, run), run.vibration, run.time
-    left = commanded
     if commanded > 0 or not _rests(loop, plant, run, motions):
-        left = move(loop, plant, run, motions, commanded, notes, w)
+        move(loop, plant, run, motions, commanded, notes, w)
         note_stretch(loop, run, notes[0], run.on_points, start, instants)
         note_stretch(loop, run, notes[1], run.off_points, start + run.on, instants)
         look(loop, plant, run, motions)
@@ -242,12 +241,10 @@ def _act(
             keep_instant(loop, run, instants, start + run.off * k / TAIL_POINTS)
     run.time = start + run.on + run.off
     run.cut = 1 if run.off < loop.period else run.cut
-    if left > 0:
+    if commanded > 0:
         run.operated = 1
         moved = keep_injections(loop, plant, run, motions, start, injections)
         run.idle = 0 if moved or abs(run.vibration - before) > loop.limit else run.idle + 1
-    elif commanded > 0:
-        run.idle += 1
 
 
 @in_place

@@ -7,7 +7,7 @@ import math
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
 from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS, pair_moment
 from ringbalance.reduced_model.injection.dynamics import WORK, X
-from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.events import command, forget
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
 from ringbalance.scene.arrays import FloatArray, Record
@@ -41,9 +41,9 @@ def limit_to_time(loop: Record, run: Record) -> int:
                 for chamber in range(loop.chambers):
                     run.refused[chamber] = 0
             count += 1
-            run.at_residual[i], run.at_residual[i + half] = 0, 0
             run.cut = 1 if run.asked[i] > left else run.cut
             run.asked[i] = min(run.asked[i], left)
+        run.drives[i] = run.asked[i]
     return count
 
 
@@ -56,11 +56,10 @@ def move(
     commanded: int,
     notes: FloatArray,
     w: FloatArray,
-) -> int:
-    """Let time pass to the next sample, with valve-open times that leave each chamber its residual fill.
+) -> None:
+    """Let time pass to the next sample; from its residual fill on a driven chamber gives gas, no liquid.
 
-    The motion is tried as commanded, and made again where that falls short.
-    Returns: the number of valves that opened.
+    The motion is tried as commanded, and made again with the times that drive liquid where those are shorter.
     """
     half = loop.chambers // 2
     guarded = commanded > 0 and run.residual_fill > 0.0
@@ -69,7 +68,7 @@ def move(
             motions[half + i] = motions[i]
             at_residual = _driven_fill(loop, run, i) <= run.residual_fill + NEAR_RESIDUAL
             if run.asked[i] > 0.0 and at_residual:
-                _cut_short(loop, run, i, 0.0)
+                _gas_in_port(loop, run, i, 0.0)
     drift = _pass(loop, plant, run, motions, notes, w)
     if guarded and not _keeps_residual(loop, plant, run, motions, w):
         for i in range(half):
@@ -77,10 +76,6 @@ def move(
         _shorten(loop, plant, run, motions, w)
         drift = _pass(loop, plant, run, motions, notes, w)
     run.drift = max(run.drift, drift)
-    count = 0
-    for i in range(half):
-        count += 1 if run.asked[i] > 0.0 else 0
-    return count
 
 
 @in_place
@@ -93,7 +88,7 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
     """Whether each driven chamber has kept its residual fill and will, with the tail of its injection."""
     spare, found = loop.chambers // 2 * 2, True
     for i in range(loop.chambers // 2):
-        if run.asked[i] > 0.0:
+        if run.drives[i] > 0.0:
             motions[spare] = motions[i]
             run.lowest[i] = least_later(plant, motions, spare, w)
             found = found and run.lowest[i] >= run.residual_fill
@@ -102,23 +97,22 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
 
 @in_place
 def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> None:
-    """Shorten the valve-open times to what leaves the residual fill."""
+    """Shorten the times that drive liquid to what leaves the residual fill."""
     half = loop.chambers // 2
     for i in range(half):
-        if run.asked[i] > 0.0:
-            asked, side, lowest = run.asked[i], run.side[i], run.lowest[i]
+        if run.drives[i] > 0.0:
+            asked, side, lowest = run.drives[i], run.side[i], run.lowest[i]
             time = opening_within(plant, motions, i, 2 * half, side, asked, lowest, w)
             if time != asked:
-                _cut_short(loop, run, i, time)
+                _gas_in_port(loop, run, i, time)
 
 
 @in_place
-def _cut_short(loop: Record, run: Record, pair: int, time: float) -> None:
-    """Give a pair less valve-open time than is asked for; none where it would be below the minimum."""
-    chamber = pair + loop.chambers // 2 * run.side[pair]
+def _gas_in_port(loop: Record, run: Record, pair: int, time: float) -> None:
+    """Let a pair's gas drive liquid for a time, s; then it enters the port of the driven chamber."""
     run.shortened += 1
-    run.at_residual[chamber], run.refused[chamber] = 1, 1
-    run.asked[pair] = time if time >= loop.shortest[chamber] else 0.0
+    run.refused[pair + loop.chambers // 2 * run.side[pair]] = 1
+    run.drives[pair] = time
 
 
 @in_place
@@ -139,8 +133,8 @@ def _pass(
         notes[1, 0, k] = off * (k + 1) / TAIL_POINTS
     for i in range(half):
         motion, ran_back = motions[i], 0.0
-        if run.asked[i] > 0.0:
-            command(plant, motion, run.side[i], run.asked[i])
+        if run.drives[i] > 0.0:
+            command(plant, motion, run.side[i], run.drives[i])
         if on > 0.0:
             motion.steps, motion.ran_back = 0, 0.0
             advance(plant, motion, on, notes[0], i + 1, run.on_points, w)
@@ -159,12 +153,12 @@ def _gas_instants(loop: Record, run: Record, notes: FloatArray) -> int:
     for k in range(count):
         notes[0, 0, k] = run.on * (k + 1) / GAS_POINTS
     for i in range(loop.chambers // 2):
-        if 0.0 < run.asked[i] < run.on:
+        if 0.0 < run.drives[i] < run.on:
             place = count
-            while place > 0 and notes[0, 0, place - 1] > run.asked[i]:
+            while place > 0 and notes[0, 0, place - 1] > run.drives[i]:
                 notes[0, 0, place] = notes[0, 0, place - 1]
                 place -= 1
-            notes[0, 0, place] = run.asked[i]
+            notes[0, 0, place] = run.drives[i]
             count += 1
     return count
 
@@ -222,6 +216,8 @@ def keep_injections(
         if run.asked[pair] == 0.0 or run.side[pair] != chamber // half:
             continue
         motion, fill = motions[pair], _driven_fill(loop, run, pair)
+        if run.drives[pair] == 0.0:
+            forget(motion, fill)
         moved = abs(fill - motion.fill_before) > NOTICEABLE
         filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
         run.gas += motion.closing_pressure * filled

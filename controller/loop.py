@@ -60,7 +60,7 @@ def simulate(
         sensor: default the scene's noise from the scene's seed.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
             default all that the scene gives numbers for.
-        residual_fill: of a driven chamber; injections are shortened so that none falls below it. Default the
+        residual_fill: of a driven chamber; the rest of an injection is lost there. Default the
             fill at which gas enters the port.
         speed: factor on the law's velocity.
         noise: random numbers of the scene's sensor; default those of the scene's seed.
@@ -160,8 +160,6 @@ class _Outside:
     def answer(self, run: np.void) -> None:
         """Write a sample, and the command that answers it, into an element of type `RUN`."""
         seen = self.sensor(float(run["time"]), complex(run["vibration"]))
-        if seen is not None:
-            seen = replace(seen, at_residual=tuple(map(bool, run["at_residual"][: self.chambers])))
         show(run, seen)
         self.measurements.append(seen)
         if self.controller is not None:

@@ -122,8 +122,6 @@ class LoopPlan:
         table = moments or MomentTable.of(model=model, total=total)
         loop["lowest"], loop["moment_step"], loop["moment"][0] = table
         loop["axis"][0, : chambers // 2] = chamber_directions(chambers)[: chambers // 2]
-        offsets = np.array(scene.controller.offsets(chambers))
-        loop["shortest"][0, :chambers] = scene.controller.minimum_gas_time + offsets
         loop["rises_tolerated"], loop["most_samples"] = controller.rises_tolerated, most_samples
         loop["sensed"], loop["to_time_limit"] = sensed or not built_in, to_time_limit
         loop["exact"] = not sensed and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0

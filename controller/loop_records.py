@@ -11,6 +11,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.controller.algorithms.law_steps import FIRST_CHANGE, PER_CHANGE
+from ringbalance.controller.algorithms.target_steps import DIRECTIONS, FIRST_CHAMBER
+from ringbalance.controller.algorithms.valve_steps import PER_CHAMBER
 from ringbalance.controller.rotor import MAX_CHAMBERS
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import ComplexArray
@@ -23,8 +25,8 @@ TAIL_POINTS: Final = 12
 MOMENT_NODES: Final = 513
 """Of the table of a pair's moment."""
 PAIRS: Final = MAX_CHAMBERS // 2
-MEMORY: Final = FIRST_CHANGE + PER_CHANGE * PAIRS
-"""Numbers that the law-based algorithm remembers."""
+MEMORY: Final = max(FIRST_CHANGE + PER_CHANGE * PAIRS, FIRST_CHAMBER + PER_CHAMBER * MAX_CHAMBERS)
+"""Numbers that an algorithm remembers."""
 TARGET_VECTOR: Final = 0
 TRIAL: Final = 1
 LAW_BASED: Final = 2
@@ -66,9 +68,6 @@ _REAL: Final = (
     "rest_limit",  # algorithm: amplitude at which it is content, m
     "minimum_gas_time",  # s
     "maximum_gas_time",  # s
-    "assumed_lag",  # target vector: rad
-    "integral_time",  # s, infinite for no integral part
-    "derivative_time",  # s
     "first_trial",  # trial: s
     "long_step",  # s
     "short_step",  # s
@@ -90,7 +89,6 @@ _WHOLE: Final = (
     "rises_tolerated",
     "idle_tolerated",
     "most_samples",
-    "resets",  # target vector: whether the integral is dropped when the residual turns round
     "trials",  # trial: chambers in the sequence
 )
 LOOP: Final = np.dtype(
@@ -99,9 +97,9 @@ LOOP: Final = np.dtype(
     + [
         ("start", np.complex128),  # vibration with level chambers, m
         ("influence", np.complex128),  # that is assumed, m/(kg m)
+        ("target", np.float64, (DIRECTIONS + 3 * MAX_CHAMBERS,)),  # of `target_steps`
         ("sequence", np.int64, (MAX_CHAMBERS,)),
         ("offset", np.float64, (MAX_CHAMBERS,)),  # that the algorithm adds to a valve's share, s
-        ("shortest", np.float64, (MAX_CHAMBERS,)),  # valve-open time that is left of a shortened one, s
         ("axis", np.complex128, (PAIRS,)),  # directions of the pairs
         ("moment", np.complex128, (MOMENT_NODES, 2)),  # of a pair, along and across: value, slope per step
         ("assumed_moment", np.complex128, (MOMENT_NODES, 2)),
@@ -129,10 +127,9 @@ _RUN_REAL: Final = (
     "first_seen",  # m, of the first sample; not a number where that showed none
     "last_seen",  # m, of the last sample that showed one
     "last_phase",  # rad, of the last one with a phase
-    "integral",  # target vector: m s
-    "before_time",  # of its last sample above the limit, s, infinite for none; law-based: last sample
+    "before_time",  # target vector: of its last sample above the limit, s, infinite for none; law-based: last
     "before_amplitude",  # m
-    "before_phase",  # rad
+    "before_phase",  # law-based: rad
     "gas",  # what vented chambers have released, above ambient pressure, Pa m^3
 )
 _RUN_WHOLE: Final = (
@@ -150,7 +147,7 @@ _RUN_WHOLE: Final = (
     "idle",
     "overshoots",
     "misadjustments",
-    "shortened",  # injections, to keep the residual fill
+    "shortened",  # injections that gas in the port has ended before their valves
     "samples",
     "samples_before",  # those before the first row of the trace
     "cause",
@@ -163,6 +160,7 @@ _RUN_WHOLE: Final = (
 _RUN_PAIRS: Final = (
     "fill",  # x of the chamber on the positive side
     "asked",  # valve-open time of the command, s, zero for none
+    "drives",  # part of it in which gas drives liquid, s: until gas enters the port
     "lowest",  # fill that the driven chamber comes to by it
     "given",  # law-based: valve-open time of the last command, s
 )
@@ -182,9 +180,9 @@ RUN: Final = np.dtype(
 )
 """One run: what differs between runs, its state and what its algorithm remembers.
 
-`gain`: vibration per balancing moment, m/(kg m). `at_residual`: of every chamber, whether its last injection
-was shortened to keep its residual fill, and none has filled it since; `refused`: the same of the last command
-alone. `memory`: law-based, see `law_steps`.
+`gain`: vibration per balancing moment, m/(kg m). `at_residual`: of every chamber, whether a sensor of the
+caller's says that it has no more liquid to give; `refused`: whether gas has entered its port in the last
+command. `memory`: of `target_steps` or `law_steps`.
 """
 INJECTION: Final = np.dtype(
     [

@@ -244,7 +244,7 @@ class Simulation(PresentedResult):
 
     @property
     def shortened(self) -> int:
-        """Injections shortened or left out so that the driven chamber keeps its residual fill."""
+        """Injections that go on with gas in the port of the driven chamber, which keeps its residual fill."""
         return int(self.state["shortened"])
 
     @property

@@ -6,7 +6,6 @@ the same for every host.
 
 from __future__ import annotations
 
-import cmath
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,13 +15,13 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from ringbalance.controller.algorithms import law_steps
+from ringbalance.controller.algorithms import law_steps, target_steps, valve_steps
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.export import chamber, controller, disc, law_based, valves
+from ringbalance.export import chamber, disc, law_based
 from ringbalance.export.compact import VELOCITIES, CompactLaw, Tables, compact_law
 from ringbalance.export.translate import Source, number_text
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -264,18 +263,20 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
 
     def place(offset: str, chamber: int | None) -> int:
         if chamber is None:
-            return int(getattr(controller, offset))
-        return controller.FIRST_CHAMBER + valves.PER_CHAMBER * chamber + int(getattr(valves, offset))
+            return int(getattr(target_steps, offset))
+        return (
+            target_steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chamber + int(getattr(valve_steps, offset))
+        )
 
     return Block(
         kind="controller",
         title="Target-vector controller of a liquid-ring balancer",
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
-        constants=_settings(scene),
+        constants=TargetVector(scene=scene).constants,
         tables=None,
-        start=(0.0,) * (controller.FIRST_CHAMBER + valves.PER_CHAMBER * chambers),
-        modules=(point, valves, controller),
+        start=(0.0,) * (target_steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chambers),
+        modules=(point, valve_steps, target_steps),
         steps="step",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),
@@ -305,7 +306,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     beside = law_steps.change_of(r, half)
     row += [*run["memory"][: beside - r].tolist(), *[0.0] * law_based.FIRST_CHAMBER]
     first_chamber = len(row)
-    row += [0.0] * (valves.PER_CHAMBER * chambers)
+    row += [0.0] * (valve_steps.PER_CHAMBER * chambers)
     places = {"VIBRATION_X": r + law_steps.SEEN_X, "VIBRATION_Y": r + law_steps.SEEN_Y}
     places |= {"RESTING": beside + law_based.RESTS, "SAMPLES": beside + law_based.SAMPLES}
     places["WAIT"] = beside + law_based.WAIT
@@ -313,7 +314,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     def place(offset: str, chamber: int | None) -> int:
         if chamber is None:
             return places[offset]
-        return first_chamber + valves.PER_CHAMBER * chamber + int(getattr(valves, offset))
+        return first_chamber + valve_steps.PER_CHAMBER * chamber + int(getattr(valve_steps, offset))
 
     return Block(
         kind="controller",
@@ -323,29 +324,10 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
-        modules=(point, query, chamber, disc, valves, law_steps, law_based),
+        modules=(point, query, chamber, disc, valve_steps, law_steps, law_based),
         steps="control",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),
-    )
-
-
-def _settings(scene: Scene) -> Numbers:
-    """What `controller` finds in its constants."""
-    settings, chambers = scene.controller, scene.disc.chambers
-    sectors = zip(chamber_directions(chambers).tolist(), settings.offsets(chambers), strict=True)
-    return (
-        float(chambers),
-        settings.limit,
-        settings.proportional,
-        0.0 if settings.integral_time is None else 1.0 / settings.integral_time,
-        settings.derivative_time,
-        settings.minimum_gas_time,
-        settings.maximum_gas_time,
-        settings.period,
-        float(TargetVector.on_reversal == "reset"),
-        *_parts(cmath.rect(1.0, settings.assumed_lag_angle)),
-        *(number for axis, offset in sectors for number in (*_parts(axis), offset)),
     )
 
 

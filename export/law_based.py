@@ -13,21 +13,33 @@ from ringbalance.controller.algorithms.law_steps import (
     AXIS_X,
     AXIS_Y,
     CHANGE,
-    HIGHEST_CHANGE,
     LAST_MOMENT_X,
     LAST_MOMENT_Y,
     LAST_X,
     LAST_Y,
     LEARNT_X,
     LEARNT_Y,
-    LOWEST_CHANGE,
+    MOMENT_NOW,
     NOW_X,
     NOW_Y,
     SEEN_X,
     SEEN_Y,
+    SHOULD,
     change_of,
+    is_try,
     learn,
+    see_response,
+    set_bounds,
+    set_should,
     split,
+)
+from ringbalance.controller.algorithms.valve_steps import (
+    GREATEST,
+    INSTANT,
+    OPEN_TIME,
+    PER_CHAMBER,
+    cut_short,
+    longest_open,
 )
 from ringbalance.export.chamber import moment
 from ringbalance.export.disc import (
@@ -48,7 +60,6 @@ from ringbalance.export.disc import (
     keep_primed,
     pass_pair,
 )
-from ringbalance.export.valves import GREATEST, INSTANT, OPEN_TIME, PER_CHAMBER, cut_short, longest_open
 from ringbalance.reduced_model.pieces.point import (
     AMBIENT,
     BLOCK,
@@ -110,7 +121,7 @@ def along(c: Law, k: Cells, p: Pieces, fill: float) -> float:
 
 
 def set_moment(c: Law, k: Cells, p: Pieces, w: Query) -> None:
-    """The disc's moment, kg m, with the liquid where it is followed to."""
+    """The disc's moment, kg m, with the liquid where it is followed to, and each pair's change."""
     d = int(c[BLOCK])
     r = memory(c)
     w[r + NOW_X] = 0.0
@@ -118,6 +129,9 @@ def set_moment(c: Law, k: Cells, p: Pieces, w: Query) -> None:
     pair = 0
     while pair < int(c[d + PAIRS]):
         value = along(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
+        at = change_of(r, pair)
+        set_should(w, r, pair, value, w[at + SHOULD] != 0.0)
+        w[at + MOMENT_NOW] = value
         w[r + NOW_X] = w[r + NOW_X] + value * w[change_of(r, pair) + AXIS_X]
         w[r + NOW_Y] = w[r + NOW_Y] + value * w[change_of(r, pair) + AXIS_Y]
         pair = pair + 1
@@ -162,6 +176,13 @@ def falling(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float) -> fl
     return c[d + PER_SECOND] * w[VELOCITY]
 
 
+def try_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, change: float) -> float:
+    """Valve-open time for a fill to change where no more liquid is expected, s: as if chambers were level."""
+    w[beside(c) + FLOW_PRIMED] = 1.0
+    speed = falling(c, k, p, q, w, c[int(c[BLOCK]) + TOTAL] / 2.0)
+    return smaller(change / larger(speed, SLOWEST_FALL), c[settings(c) + PERIOD])
+
+
 def flow_time(
     c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float, target: float, longest: float
 ) -> float:
@@ -185,7 +206,7 @@ def flow_time(
             part = part / 2.0
             w[r + FLOW_PRIMED] = primed
     if x <= end and target < end:
-        time = time + (end - target) / larger(falling(c, k, p, q, w, end), SLOWEST_FALL)
+        time = time + try_time(c, k, p, q, w, end - target)
     return smaller(time, longest)
 
 
@@ -221,6 +242,7 @@ def open_valve(c: Law, w: Query, pair: int, side: int, time: float) -> None:
         command(c, w, at)
         w[at + ASKED + side] = 0.0
         w[beside(c) + OPENED] = 1.0
+        w[change_of(memory(c), pair) + SHOULD] = 1.0
 
 
 def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
@@ -233,10 +255,8 @@ def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     highest = c[d + TOTAL] - lowest
     pair = 0
     while pair < half:
-        at = change_of(r, pair)
         now = along(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
-        w[at + LOWEST_CHANGE] = along(c, k, p, lowest) - now
-        w[at + HIGHEST_CHANGE] = along(c, k, p, highest) - now
+        set_bounds(w, r, pair, now, along(c, k, p, lowest), along(c, k, p, highest))
         pair = pair + 1
     kx = w[r + LEARNT_X]
     ky = w[r + LEARNT_Y]
@@ -253,7 +273,9 @@ def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
             side = 0
             if wanted >= fill:
                 side = 1
-            if wanted != fill:
+            if is_try(w, r, pair, side):
+                open_valve(c, w, pair, side, try_time(c, k, p, q, w, larger(wanted - fill, fill - wanted)))
+            elif wanted != fill:
                 open_valve(c, w, pair, side, gas_time(c, k, p, q, w, pair, wanted))
         pair = pair + 1
 
@@ -284,7 +306,10 @@ def sample(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     shut(c, w)
     set_moment(c, k, p, w)
     if w[b + OPENED] != 0.0:
-        learn(w, r, c[e + AMPLITUDE_SQUARE], c[e + PHASE_SQUARE], c[e + LAW_SQUARE], c[e + ASSUMED])
+        noise = c[e + AMPLITUDE_SQUARE]
+        by_phase = c[e + PHASE_SQUARE]
+        if see_response(w, r, int(c[int(c[BLOCK]) + PAIRS]), noise, by_phase):
+            learn(w, r, noise, by_phase, c[e + LAW_SQUARE], c[e + ASSUMED])
     w[b + OPENED] = 0.0
     w[r + LAST_X] = w[r + SEEN_X]
     w[r + LAST_Y] = w[r + SEEN_Y]

@@ -81,7 +81,7 @@ class ResidualLiquid:
         least = min(max(x, stalled), top / 2)
         usable, share = (
             _pair_moment(law, top, least),
-            reach_share(scene.disc.chambers, passes_on=x >= stalled),
+            reach_share(scene.disc.chambers),
         )
         depth = float(port_depth(scene, flow_rate=rate))
         return cls(
@@ -101,17 +101,15 @@ class ResidualLiquid:
         )
 
 
-def reach_share(chambers: int, *, passes_on: bool = True) -> float:
+def reach_share(chambers: int) -> float:
     """Smallest radius of what n pairs cancel together, over what one does along its axis: cot(pi/(2 n)).
 
     Each of n pairs, pi/n apart, gives a moment between -U and U along its axis: together a regular polygon of
     2 n sides, U/sin(pi/(2 n)) to its corners and U cot(pi/(2 n)) to its sides: U with four chambers,
-    1.73 U with six.
-    Args: `passes_on`: whether a chamber that is emptied leaves its share to other pairs, as one at its
-        residual fill does. One that the gas drives no further is asked again and again: then U, along a pair.
+    1.73 U with six, as a chamber that has nothing to give leaves its share to other pairs.
     Source: elementary geometry (a sum of segments is a zonotope).
     """
-    return 1 / math.tan(math.pi / chambers) if passes_on else 1.0
+    return 1 / math.tan(math.pi / chambers)
 
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:

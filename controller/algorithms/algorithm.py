@@ -30,7 +30,7 @@ class Measurement:
     phase: float
     """rad, any multiple of a full turn away."""
     at_residual: tuple[bool, ...] = ()
-    """Of every chamber, whether its last injection was shortened to keep its residual fill; empty: none."""
+    """Of every chamber, whether a sensor says that it has no more liquid to give; empty: there is none."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
+from ringbalance.controller.algorithms.target_steps import (
+    FIRST_CHAMBER,
+    GAIN,
+    HAS_BEFORE,
+    RESTING,
+    SINCE,
+    VIBRATION_X,
+    VIBRATION_Y,
+    sample,
+)
+from ringbalance.controller.algorithms.valve_steps import AT_RESIDUAL, OPEN_TIME, PER_CHAMBER
 from ringbalance.controller.loop_records import (
     NO_PHASE,
     TARGET_VECTOR,
@@ -18,7 +28,7 @@ from ringbalance.controller.loop_records import (
     UNUSABLE,
     USABLE,
 )
-from ringbalance.controller.rotor import chamber_letters
+from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.reduced_model.injection.dynamics import MOTION
 from ringbalance.scene.arrays import Record, Records
 from ringbalance.scene.models import Scene
@@ -115,104 +125,51 @@ class TargetVector(BuiltIn):
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
         super().fill(loop, run)
-        settings = self.scene.controller
-        loop["algorithm"], loop["resets"] = TARGET_VECTOR, self.on_reversal == "reset"
-        loop["assumed_lag"], loop["derivative_time"] = settings.assumed_lag_angle, settings.derivative_time
-        loop["integral_time"] = math.inf if settings.integral_time is None else settings.integral_time
-        run["proportional"], run["before_time"] = settings.proportional, math.inf
+        constants = self.constants
+        loop["algorithm"], loop["target"][: len(constants)] = TARGET_VECTOR, constants
+        run["proportional"], run["before_time"] = self.scene.controller.proportional, math.inf
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """What `target_steps` finds in its constants."""
+        settings, chambers = self.scene.controller, self.scene.disc.chambers
+        sensor = self.scene.sensor
+        lag, axes = settings.assumed_lag_angle, chamber_directions(chambers).tolist()
+        sectors = zip(axes, settings.offsets(chambers), strict=True)
+        return (
+            float(chambers),
+            settings.limit,
+            settings.proportional,
+            0.0 if settings.integral_time is None else 1.0 / settings.integral_time,
+            settings.derivative_time,
+            settings.minimum_gas_time,
+            settings.maximum_gas_time,
+            settings.period,
+            float(self.on_reversal == "reset"),
+            *(math.cos(lag), math.sin(lag)),
+            *(sensor.amplitude_noise**2, sensor.phase_noise**2),
+            *(number for axis, offset in sectors for number in (axis.real, axis.imag, offset)),
+        )
 
 
 @in_place
 def target_vector_step(loop: Record, run: Record) -> None:
     """One step of `TargetVector` on a usable sample."""
-    if run.seen_amplitude <= loop.rest_limit:
-        run.resting, run.integral, run.before_time = 1, 0.0, math.inf
-        return
-    wanted, run.integral = _vector_gas_time(
-        run.seen_amplitude,
-        run.seen_phase,
-        run.time,
-        run.integral,
-        run.before_amplitude,
-        run.before_phase,
-        run.before_time,
-        run.proportional,
-        loop.integral_time,
-        loop.derivative_time,
-        loop.maximum_gas_time,
-        loop.resets > 0,
-    )
-    run.before_amplitude, run.before_phase, run.before_time = run.seen_amplitude, run.seen_phase, run.time
-    length = min(max(wanted, 0.0), loop.maximum_gas_time)
-    angle = run.seen_phase + loop.assumed_lag
-    first, share, second, other = vector_shares(loop.chambers, angle, length, run.at_residual)
-    open_valve(loop, run, first, share, loop.offset[first])
-    open_valve(loop, run, second, other, loop.offset[second])
-
-
-@in_place
-def _vector_gas_time(
-    amplitude: float,
-    phase: float,
-    time: float,
-    integral: float,
-    before_amplitude: float,
-    before_phase: float,
-    before_time: float,
-    proportional: float,
-    integral_time: float,
-    derivative_time: float,
-    maximum_gas_time: float,
-    resets: bool,
-) -> tuple[float, float]:
-    """PID on the amplitude, T = Kc (e + 1/Ti int e dt + Td de/dt), s, not limited yet, and the new integral.
-
-    An infinite `before_time`: there was no sample before; an infinite Ti: no integral part. While T is above
-    `maximum_gas_time` the integral stands still; with `resets` it is dropped when the residual has turned by
-    more than 90 degrees.
-    """
-    dt = time - before_time
-    if not dt > 0.0:
-        return proportional * amplitude, integral
-    turned = resets and math.cos(phase - before_phase) < 0.0
-    summed = 0.0 if turned else integral + (amplitude + before_amplitude) / 2.0 * dt
-    slope = derivative_time * (amplitude - before_amplitude) / dt
-    wanted = proportional * (amplitude + summed / integral_time + slope)
-    if turned or wanted <= maximum_gas_time:
-        return wanted, summed
-    return wanted, integral
-
-
-@in_place
-def vector_shares(
-    chambers: int, angle: float, length: float, at_residual: Sequence[bool]
-) -> tuple[int, float, int, float]:
-    """Split a vector over the two chamber directions on either side of it; each chamber takes its component.
-
-    Args: `at_residual`: of every chamber, whether it is passed over for the next one.
-    Returns: Chamber index and share of either; a share of zero where one chamber takes all.
-    """
-    if chambers == 2:
-        along = length * math.cos(angle)
-        return (0, along, 1, 0.0) if along >= 0.0 else (1, -along, 0, 0.0)
-    spacing = 2.0 * math.pi / chambers
-    turn = angle % (2.0 * math.pi)
-    nearest = min(int(turn / spacing), chambers - 1)
-    before, after = nearest, nearest + 1
-    while at_residual[before % chambers] and after - before < chambers:
-        before -= 1
-    while at_residual[after % chambers] and after - before < chambers:
-        after += 1
-    if 2 * (after - before) >= chambers:
-        before, after = nearest, nearest + 1
-    between, past = (after - before) * spacing, turn - before * spacing
-    scale = length / math.sin(between)
-    return (
-        before % chambers,
-        scale * max(math.sin(between - past), 0.0),
-        after % chambers,
-        scale * max(math.sin(past), 0.0),
-    )
+    c, w = loop.target, run.memory
+    c[GAIN] = run.proportional
+    w[VIBRATION_X] = run.seen_amplitude * math.cos(run.seen_phase)
+    w[VIBRATION_Y] = run.seen_amplitude * math.sin(run.seen_phase)
+    w[SINCE] = run.time - run.before_time if w[HAS_BEFORE] != 0.0 else 0.0
+    for chamber in range(loop.chambers):
+        at = FIRST_CHAMBER + PER_CHAMBER * chamber
+        w[at + OPEN_TIME], w[at + AT_RESIDUAL] = 0.0, float(run.at_residual[chamber])
+    sample(c, w)
+    run.resting, run.before_time = int(w[RESTING]), run.time if w[HAS_BEFORE] != 0.0 else math.inf
+    for chamber in range(loop.chambers):
+        if w[FIRST_CHAMBER + PER_CHAMBER * chamber + OPEN_TIME] > 0.0:
+            pair = chamber % (loop.chambers // 2)
+            run.asked[pair] = w[FIRST_CHAMBER + PER_CHAMBER * chamber + OPEN_TIME]
+            run.side[pair] = chamber // (loop.chambers // 2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,21 +14,24 @@ from ringbalance.controller.algorithms.law_steps import (
     AXIS_X,
     AXIS_Y,
     CHANGE,
-    HIGHEST_CHANGE,
     LAST_MOMENT_X,
     LAST_MOMENT_Y,
     LAST_X,
     LAST_Y,
     LEARNT_X,
     LEARNT_Y,
-    LOWEST_CHANGE,
+    MOMENT_NOW,
     NOW_X,
     NOW_Y,
     SEEN_X,
     SEEN_Y,
     VARIANCE,
     change_of,
+    is_try,
     learn,
+    see_response,
+    set_bounds,
+    set_should,
     split,
 )
 from ringbalance.controller.liquid_ring.plant import LiquidRing
@@ -204,7 +207,9 @@ def _follow(
     if not interval > 0.0:
         return
     half, opened, before = loop.chambers // 2, False, _disc_moment(loop, plant, liquid)
+    m = run.memory
     for i in range(half):
+        m[change_of(0, i) + MOMENT_NOW] = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
         if run.given[i] > 0.0:
             opened = True
             offset = loop.offset[i + half * run.given_side[i]]
@@ -213,17 +218,20 @@ def _follow(
                 command(plant, liquid[i], run.given_side[i], acting)
         liquid[i].steps = 0
         advance(plant, liquid[i], interval, notes, 1, 0, w)
+        moment = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
+        set_should(m, 0, i, moment, run.given[i] > 0.0)
     if opened:
         seen, last = (
             _vector(run.seen_amplitude, run.seen_phase),
             _vector(run.before_amplitude, run.before_phase),
         )
-        after, m = _disc_moment(loop, plant, liquid), run.memory
+        after = _disc_moment(loop, plant, liquid)
         m[SEEN_X], m[SEEN_Y], m[LAST_X], m[LAST_Y] = seen.real, seen.imag, last.real, last.imag
         m[NOW_X], m[NOW_Y] = after.real, after.imag
         m[LAST_MOMENT_X], m[LAST_MOMENT_Y] = before.real, before.imag
         noise = loop.assumed_amplitude_noise**2, loop.assumed_phase_noise**2
-        learn(m, 0, noise[0], noise[1], loop.law_deviation**2, abs(loop.influence))
+        if see_response(m, 0, half, noise[0], noise[1]):
+            learn(m, 0, noise[0], noise[1], loop.law_deviation**2, abs(loop.influence))
 
 
 @in_place
@@ -234,7 +242,7 @@ def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatA
     least, most = _along(loop, lowest), _along(loop, highest)
     for i in range(half):
         now = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
-        m[change_of(0, i) + LOWEST_CHANGE], m[change_of(0, i) + HIGHEST_CHANGE] = least - now, most - now
+        set_bounds(m, 0, i, now, least, most)
     wanted_moment = -_vector(run.seen_amplitude, run.seen_phase) / complex(m[LEARNT_X], m[LEARNT_Y])
     split(m, 0, half, wanted_moment.real, wanted_moment.imag)
     for i in range(half):
@@ -250,7 +258,10 @@ def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatA
                 highest,
             )
             side = 0 if wanted < fill else 1
-            time = _gas_time(loop, plant, liquid, i, side, wanted, notes, w)
+            if is_try(m, 0, i, side):
+                time = _try_time(loop, plant, abs(wanted - fill))
+            else:
+                time = _gas_time(loop, plant, liquid, i, side, wanted, notes, w)
             chamber = i + side * half
             open_valve(loop, run, chamber, time, loop.offset[chamber])
 
@@ -288,8 +299,8 @@ def _gas_time(
 ) -> float:
     """Valve-open time that brings a pair to a fill of its positive chamber, t = (V/S) integral dx/u(x), s.
 
-    At most the longest; the time of the stall when the flow stalls before; below the smallest possible fill
-    the last velocity is kept; the probe's where nothing flows.
+    At most the longest; the time of the stall when the flow stalls before; a try more below the smallest
+    possible fill; the probe's where nothing flows.
     """
     longest, fill = loop.maximum_gas_time, shown(plant, liquid[pair], liquid[pair].state[X])
     target, now = (plant.total - wanted, plant.total - fill) if side else (wanted, fill)
@@ -308,10 +319,19 @@ def _gas_time(
     # What an earlier command has emptied does not flow again.
     ended, more = motion.ended if flows else 0.0, 0.0
     if motion.event in (_EMPTY, _FULL):
-        p = plant.gas_pressure
-        speed = steady(plant, lowest, plant.total - lowest, p, 0.0, True, 0.0)[0]
-        more = (reached - target) * plant.chamber_volume / (plant.tube_area * max(speed, 1e-12))
+        more = _try_time(loop, plant, reached - target)
     return float(min(ended + more, longest))
+
+
+@in_place
+def _try_time(loop: Record, plant: Record, change: float) -> float:
+    """Valve-open time for a change of a fill where no more liquid is expected, s: as if chambers were level.
+
+    At most the probe's, for it may be lost; where it is not, the response shows it.
+    """
+    level = plant.total / 2.0
+    speed = steady(plant, level, level, plant.gas_pressure, 0.0, True, 0.0)[0]
+    return float(min(change * plant.chamber_volume / (plant.tube_area * max(speed, 1e-12)), loop.probe))
 
 
 @in_place

@@ -14,18 +14,115 @@ from ringbalance.scene.platform.both_ways import both_ways
 # Vibration of this sample and the one before, the disc's moment at both, and the influence coefficient
 # with the mean square of its error, of both components together.
 SEEN_X, SEEN_Y, LAST_X, LAST_Y, NOW_X, NOW_Y, LAST_MOMENT_X, LAST_MOMENT_Y = 0, 1, 2, 3, 4, 5, 6, 7
-LEARNT_X, LEARNT_Y, VARIANCE, FIRST_CHANGE, PER_CHANGE = 8, 9, 10, 11, 6
-# Of each pair what is asked of its moment, bounds of that, at which of them it is, and its direction.
+LEARNT_X, LEARNT_Y, VARIANCE, FIRST_CHANGE, PER_CHANGE = 8, 9, 10, 11, 9
+# Of each pair what is asked of its moment, bounds of that, at which of them it is, and its direction; then
+# its moment, what the last operation should have changed of it, and in which sense it gave nothing.
 CHANGE, LOWEST_CHANGE, HIGHEST_CHANGE, FIXED, AXIS_X, AXIS_Y = 0, 1, 2, 3, 4, 5
+MOMENT_NOW, SHOULD, GAVE_NOTHING = 6, 7, 8
 # fmt: on
 
 MAGNITUDE_RANGE, NEARLY = 10.0, 1e-12
+# Of squares: the vibration has not moved as it should where it is this many variances off, and a pair gave
+# nothing where it is that much nearer without the pair.
+DEVIATIONS, NEARER = 9.0, 9.0
 
 
 @both_ways
 def change_of(r: int, pair: int) -> int:
     """Place of what is asked of a pair."""
     return r + FIRST_CHANGE + PER_CHANGE * pair
+
+
+@both_ways
+def set_should(m: Query, r: int, pair: int, moment: float, opened: bool) -> None:
+    """Change that a pair's moment should have made, kg m: as the liquid is followed, or as asked of a try."""
+    at = change_of(r, pair)
+    m[at + SHOULD] = 0.0
+    if opened:
+        m[at + SHOULD] = moment - m[at + MOMENT_NOW]
+        if m[at + GAVE_NOTHING] != 0.0:
+            m[at + SHOULD] = m[at + CHANGE]
+
+
+@both_ways
+def distance(m: Query, r: int, ux: float, uy: float) -> float:
+    """Square of how far the vibration's change is from that by a change of the moment, m^2."""
+    x = m[r + SEEN_X] - m[r + LAST_X] - (m[r + LEARNT_X] * ux - m[r + LEARNT_Y] * uy)
+    y = m[r + SEEN_Y] - m[r + LAST_Y] - (m[r + LEARNT_X] * uy + m[r + LEARNT_Y] * ux)
+    return x * x + y * y
+
+
+@both_ways
+def see_response(m: Query, r: int, half: int, amplitude_square: float, phase_square: float) -> bool:
+    """See whether the vibration has not moved as it should, and one pair that gave nothing explains it.
+
+    Only what neither noise nor a coefficient that is still learnt makes is taken for that. Any other pair
+    that was asked for more than noise gives liquid.
+    Returns: whether all opened pairs are followed as they move.
+    """
+    x = m[r + SEEN_X]
+    y = m[r + SEEN_Y]
+    seen = x * x + y * y + m[r + LAST_X] * m[r + LAST_X] + m[r + LAST_Y] * m[r + LAST_Y]
+    noise = 2.0 * amplitude_square + phase_square * seen
+    square = m[r + LEARNT_X] * m[r + LEARNT_X] + m[r + LEARNT_Y] * m[r + LEARNT_Y]
+    ux = 0.0
+    uy = 0.0
+    followed = True
+    pair = 0
+    while pair < half:
+        at = change_of(r, pair)
+        ux = ux + m[at + SHOULD] * m[at + AXIS_X]
+        uy = uy + m[at + SHOULD] * m[at + AXIS_Y]
+        if m[at + SHOULD] != 0.0 and m[at + GAVE_NOTHING] != 0.0:
+            followed = False
+        pair = pair + 1
+    off = distance(m, r, ux, uy)
+    best = 0.0
+    if off > DEVIATIONS * (noise + m[r + VARIANCE] * (ux * ux + uy * uy)):
+        best = off / NEARER
+    nothing = half
+    pair = 0
+    while pair < half:
+        at = change_of(r, pair)
+        should = m[at + SHOULD]
+        if should * should * square > DEVIATIONS * noise:
+            m[at + GAVE_NOTHING] = 0.0
+            without = distance(m, r, ux - should * m[at + AXIS_X], uy - should * m[at + AXIS_Y])
+            if without < best:
+                best = without
+                nothing = pair
+        pair = pair + 1
+    if nothing < half:
+        at = change_of(r, nothing)
+        m[at + GAVE_NOTHING] = 1.0
+        if m[at + SHOULD] < 0.0:
+            m[at + GAVE_NOTHING] = -1.0
+        followed = False
+    return followed
+
+
+@both_ways
+def set_bounds(m: Query, r: int, pair: int, now: float, least: float, most: float) -> None:
+    """Bounds of a pair's change by its moments, kg m; in the sense in which it gave nothing there is none."""
+    at = change_of(r, pair)
+    m[at + LOWEST_CHANGE] = least - now
+    m[at + HIGHEST_CHANGE] = most - now
+    if m[at + GAVE_NOTHING] < 0.0:
+        m[at + LOWEST_CHANGE] = 0.0
+    if m[at + GAVE_NOTHING] > 0.0:
+        m[at + HIGHEST_CHANGE] = 0.0
+
+
+@both_ways
+def is_try(m: Query, r: int, pair: int, side: int) -> bool:
+    """Whether a chamber gave nothing before; opening the opposite one gives it liquid again."""
+    at = change_of(r, pair)
+    sense = 1.0
+    if side == 0:
+        sense = -1.0
+    if m[at + GAVE_NOTHING] * sense <= 0.0:
+        m[at + GAVE_NOTHING] = 0.0
+    return m[at + GAVE_NOTHING] != 0.0
 
 
 @both_ways

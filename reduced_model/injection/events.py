@@ -93,8 +93,13 @@ def command(plant: Record, motion: Record, chamber: int, duration: float) -> Non
     """A valve opens and closes a lag after its command, which begins a new record of what it does."""
     x = shown(plant, motion, motion.state[X])
     motion.chamber, motion.opens, motion.closes = chamber, plant.valve_lag, plant.valve_lag + duration
-    motion.fill_before = plant.total - x if chamber else x
-    motion.least_fill = motion.fill_before
+    forget(motion, plant.total - x if chamber else x)
+
+
+@in_place
+def forget(motion: Record, fill: float) -> None:
+    """Begin a new record of what a valve does, with the fill of the driven chamber."""
+    motion.fill_before, motion.least_fill = fill, fill
     motion.state[WORK], motion.state[WORK + 1] = 0.0, 0.0
     motion.regime_start, motion.regime_end, motion.event = RESTING, RESTING, _BLOCKED
     motion.closing_pressure, motion.run_dry = 0.0, 0.0

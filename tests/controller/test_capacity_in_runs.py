@@ -23,8 +23,7 @@ NEAR: Final = 0.0025
 def driven(scene: Scene, calibration: Calibration, *, share: float) -> Simulation:
     """A run against an unbalance in the worst direction, in injections of a fiftieth of a chamber's volume.
 
-    Chambers at their residual fill leave their share to others: the worst direction is across a pair. Those
-    that the gas no longer empties do not: the worst one is along a pair.
+    Chambers that have nothing to give leave their share to others: the worst direction is across a pair.
     Args: `share`: of the unbalance over what a pair can form by geometry.
     """
     rotor, disc = scene.rotor, scene.disc
@@ -35,11 +34,10 @@ def driven(scene: Scene, calibration: Calibration, *, share: float) -> Simulatio
     # Each injection fills the tube up to the crest before any liquid passes.
     moved = 0.02 * start * calibration.chamber.volume + 0.5 * scene.tube.length * scene.tube.area
     longest = moved / (scene.tube.area * float(flow.velocity))
-    across = math.pi / 2 if calibration.residual.limited_by == "draw_down" else 0.0
     amplitude = share * calibration.residual.pair_moment * rotor.influence_coefficient
     changed = scene.with_values(
         {
-            "rotor.initial_vibration": {"amplitude": amplitude, "phase": across - rotor.lag_angle},
+            "rotor.initial_vibration": {"amplitude": amplitude, "phase": math.pi / 2 - rotor.lag_angle},
             "sensor.amplitude_noise": 0.0,
             "sensor.phase_noise": 0.0,
             "controller.proportional": 25 * longest / amplitude,

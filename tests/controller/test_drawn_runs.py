@@ -22,6 +22,7 @@ from ringbalance.reduced_model.injection.march import SPARE, advance, least_late
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid, residual_fill_ratio
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths, nominal_value
@@ -46,9 +47,14 @@ def test_a_traced_run_comes_to_the_same(balancer: LiquidRingBalancer, first: Out
     assert traced.ended == first.ended
     both = np.isfinite(first.settling_time)
     assert traced.settling_time[both] == pytest.approx(first.settling_time[both], rel=1e-5)
-    # Steps of untraced runs may err by 1e-6 of a fill, some 1e-11 m here.
-    assert traced.final_amplitude == pytest.approx(first.final_amplitude, rel=1e-5, abs=5e-11)
-    assert traced.energy == pytest.approx(first.energy, rel=1e-5)
+    # Steps of untraced runs may err by 1e-6 of a fill, some 1e-11 m here. A sample nearer to the limit may be
+    # answered in one of the runs alone, and a run that never settles makes errors grow.
+    seen = [np.array([each.measurement.amplitude for each in one.run.samples]) for one in traced.traced]
+    alike = both & [bool(np.all(np.abs(each - balancer.limit) > 1e-11)) for each in seen]
+    assert np.count_nonzero(alike) >= 6
+    final = traced.final_amplitude, first.final_amplitude
+    assert final[0][alike] == pytest.approx(final[1][alike], rel=1e-5, abs=5e-11)
+    assert traced.energy[alike] == pytest.approx(first.energy[alike], rel=1e-5)
     assert traced.usable_moment == pytest.approx(first.usable_moment, rel=1e-9)
     assert traced.unbalance == pytest.approx(first.unbalance, rel=1e-9)
 
@@ -174,3 +180,12 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
         assert lowest(longest) >= under.residual > lowest(1.000001 * longest)
         half = longest / 2
         assert opening_within(plant, motions, 0, 1, 0, half, lowest(half), w) == half
+
+
+def test_chambers_that_are_empty_are_found_by_what_the_vibration_does() -> None:
+    """28 of 64 settle where an empty chamber is asked again and again, 52 where a sensor tells of it."""
+    scene = load_scene(bundled_scene("six_chamber")).with_values(
+        {"controller.proportional": "0.117 s/um", "rotor.initial_vibration.amplitude": "16 um"}
+    )
+    (found,) = balancer_of(scene).run_all([{"controller.gas_time_offset": (2.8e-3,)}], Draws.first(64))
+    assert np.count_nonzero(found.settled) >= 52

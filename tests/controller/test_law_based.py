@@ -34,6 +34,7 @@ from ringbalance.reduced_model.injection.dynamics import WORKSPACE
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 RingOf = Callable[..., LiquidRing]
@@ -65,14 +66,21 @@ def with_chambers(scene: Scene, chambers: int) -> Scene:
 
 
 def gas_time_of(
-    ring: LiquidRing, *, side: int, wanted: float, longest: float, fill: float = 0.25, ended: float = 0.0
+    ring: LiquidRing,
+    *,
+    side: int,
+    wanted: float,
+    longest: float,
+    fill: float = 0.25,
+    ended: float = 0.0,
+    probe: float = 0.0,
 ) -> float:
     """Valve-open time that brings a pair to a fill of its positive chamber, s; zero: nothing flows.
 
     Args: `ended`: when the flow of an earlier command did.
     """
     plant, loop = ring.dynamics.kept_plant(total=0.5), np.zeros(1, dtype=LOOP)
-    loop["maximum_gas_time"] = longest
+    loop["maximum_gas_time"], loop["probe"] = longest, probe
     liquid = np.repeat(at_rest(plant, fill=fill), 2)
     liquid["ended"] = ended
     room = np.zeros((2, 1)), np.zeros(WORKSPACE)
@@ -110,15 +118,21 @@ def test_a_gas_time_ends_at_the_stall_and_at_the_longest(gas_time: Callable[...,
     assert gas_time("square_root", 0.1, gas_pressure=0.0) == 0
 
 
-def test_a_fill_beyond_empty_goes_on_at_the_last_velocity(gas_time: Callable[..., float]) -> None:
-    assert gas_time("constant", -0.1) == pytest.approx(0.35 / (0.02 * 5))
+@pytest.mark.parametrize(("probe", "more"), [(10.0, 0.1 / (0.02 * 5)), (0.5, 0.5)])
+def test_a_fill_beyond_empty_is_tried_for_a_probe_at_most(
+    laws: Mapping[str, Any], model: BalancerModel, ring_of: RingOf, probe: float, more: float
+) -> None:
+    """No valve says that a chamber is empty: a try takes its whole time."""
+    ring = ring_of(replace(model, flow=laws["constant"], tube_area=0.02 * model.chamber_volume))
+    found = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, probe=probe)
+    assert found == pytest.approx(0.25 / (0.02 * 5) + more)
 
 
 def test_a_chamber_that_an_earlier_command_has_emptied_is_asked_for_what_is_missing_alone(
     laws: Mapping[str, Any], model: BalancerModel, ring_of: RingOf
 ) -> None:
     ring = ring_of(replace(model, flow=laws["constant"], tube_area=0.02 * model.chamber_volume))
-    found = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, fill=0.0, ended=0.7)
+    found = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, fill=0.0, ended=0.7, probe=10.0)
     assert found == pytest.approx(0.1 / (0.02 * 5))
 
 
@@ -212,6 +226,44 @@ def learnt(
     row[steps.LEARNT_X :] = known.value.real, known.value.imag, known.variance
     steps.learn(row, 0, noise / 2, 0.0, deviation**2, assumed)
     return Estimate(complex(row[steps.LEARNT_X], row[steps.LEARNT_Y]), row[steps.VARIANCE])
+
+
+def after_operation(*, seen: complex, should: Sequence[float], noise: float, sure: float) -> FloatArray:
+    """Memory after a response of V/K to changes of three pairs. Args: `sure`: relative deviation of K."""
+    row = first_memory(chamber_directions(6)[:3])
+    row[[steps.LEARNT_X, steps.LEARNT_Y]], row[steps.VARIANCE] = (K.real, K.imag), abs(sure * K) ** 2
+    row[[steps.SEEN_X, steps.SEEN_Y]] = (K * seen).real, (K * seen).imag
+    for pair, change in enumerate(should):
+        row[steps.change_of(0, pair) + steps.SHOULD] = change
+    row[-1] = steps.see_response(row, 0, 3, noise**2 / 2, 0.0)
+    return row
+
+
+def nothing_of(row: FloatArray) -> list[float]:
+    return [float(row[steps.change_of(0, pair) + steps.GAVE_NOTHING]) for pair in range(3)]
+
+
+def test_a_pair_whose_share_of_the_response_is_missing_gave_nothing() -> None:
+    """Beyond noise and what is not known of the coefficient; it then is not asked in that sense."""
+    axes = chamber_directions(6)
+    seen, little = complex(2.0 * axes[0]), 1e-3 * abs(K)
+    row = after_operation(seen=seen, should=(2.0, -3.0, 0.0), noise=little, sure=0.1)
+    assert (nothing_of(row), row[-1]) == ([0.0, -1.0, 0.0], 0.0)
+    steps.set_bounds(row, 0, 1, 0.0, -5.0, 5.0)
+    at = steps.change_of(0, 1)
+    assert (row[at + steps.LOWEST_CHANGE], row[at + steps.HIGHEST_CHANGE]) == (0.0, 5.0)
+    assert steps.is_try(row, 0, 1, 0)
+    assert not steps.is_try(row, 0, 1, 1)
+    assert nothing_of(row) == [0.0, 0.0, 0.0]
+    as_it_should = complex(2.0 * axes[0] - 3.0 * axes[1])
+    for other in (
+        {"seen": as_it_should},
+        {"noise": 2.0 * abs(K)},
+        {"sure": 0.9},
+        {"seen": 0.7 * as_it_should},
+    ):
+        given: Any = {"seen": seen, "noise": little, "sure": 0.1, **other}
+        assert nothing_of(after_operation(should=(2.0, -3.0, 0.0), **given)) == [0.0, 0.0, 0.0]
 
 
 def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> Estimate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.built_in import OnReversal, TargetVector, vector_shares
+from ringbalance.controller.algorithms.built_in import OnReversal, TargetVector
+from ringbalance.controller.algorithms.target_steps import (
+    DIRECTIONS,
+    FIRST_CHAMBER,
+    INTEGRAL,
+    nearest,
+    split,
+)
+from ringbalance.controller.algorithms.valve_steps import AT_RESIDUAL, OPEN_TIME, PER_CHAMBER
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.stepped import Memory, Stepped
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
@@ -47,14 +56,26 @@ def components(
     *, chambers: int, angle: float, length: float, at_residual: tuple[bool, ...] = ()
 ) -> tuple[tuple[int, float], ...]:
     """Chamber and share of a vector split over the directions on either side of it."""
-    without = np.array(at_residual or (False,) * chambers)
-    first, share, second, other = vector_shares(chambers, angle, length, without)  # type: ignore[arg-type]
-    return ((first, share),) if chambers == 2 else ((first, share), (second, other))
+    c, w = np.zeros(DIRECTIONS + 3 * chambers), np.zeros(FIRST_CHAMBER + PER_CHAMBER * chambers)
+    c[0], c[6], c[DIRECTIONS::3], c[DIRECTIONS + 1 :: 3] = (
+        chambers,
+        1e9,
+        *chamber_directions(chambers).view(float).reshape(-1, 2).T,
+    )
+    w[FIRST_CHAMBER + AT_RESIDUAL :: PER_CHAMBER] = at_residual or (False,) * chambers
+    split(c, w, math.cos(angle), math.sin(angle), length)
+    opened = w[FIRST_CHAMBER + OPEN_TIME :: PER_CHAMBER]
+    found = np.flatnonzero(opened)
+    if found.size < 2 < chambers:
+        before = nearest(c, math.cos(angle), math.sin(angle))
+        found = np.array([before, (before + 1) % chambers])
+    found = found[::-1] if chambers > 2 and found[1] - found[0] > chambers / 2 else found
+    return tuple((int(i), float(opened[i])) for i in found)
 
 
 def integral(state: Memory) -> float:
     """What the algorithm has integrated, m s."""
-    return float(state.run["integral"][0])
+    return float(state.run["memory"][0, INTEGRAL])
 
 
 def gas(command: Command) -> dict[int, float]:
@@ -244,3 +265,34 @@ def test_the_step_is_pure_and_within_limits(amplitudes: list[float], phases: lis
         assert len({valve.chamber % 2 for valve in command.valves}) == len(command.valves)
         assert math.isfinite(integral(state))
         assert integral(state) >= 0
+
+
+def test_a_chamber_that_moves_nothing_is_passed_over_until_its_opposite_opens() -> None:
+    """Beyond noise; six chambers, A and B on either side of the unbalance."""
+    scene = liquid_ring_scene(load_scene(bundled_scene("six_chamber")))
+    controller = Stepped(TargetVector(scene=scene))
+    lag, between = scene.controller.assumed_lag_angle, math.radians(20.0)
+
+    def stepped(state: Memory, time: float, vector: complex) -> tuple[Memory, set[int]]:
+        seen = Measurement(time=time, amplitude=abs(vector), phase=cmath.phase(vector) - lag)
+        after, command = controller.step(state, seen)
+        return after, set(gas(command))
+
+    first = cmath.rect(8e-6, between)
+    state, opened = stepped(controller.start(), 0.0, first)
+    assert opened == {0, 1}
+    # What chamber B took away, and A not.
+    b = cmath.rect(1.0, math.pi / 3)
+    moved = 8e-6 * math.sin(between) / math.sin(math.pi / 3) * b
+    passed, opened = stepped(state, 1.0, first - moved)
+    assert opened == {5, 1}
+    _, opened = stepped(state, 1.0, 0.5 * first)
+    assert opened == {0, 1}
+    turned, opened = stepped(passed, 2.0, -first)
+    assert 3 in opened
+    _, opened = stepped(turned, 3.0, first)
+    assert opened == {0, 1}
+    near = cmath.rect(0.08e-6, between)
+    state, _ = stepped(controller.start(), 0.0, near)
+    _, opened = stepped(state, 1.0, near)
+    assert opened == {0, 1}

@@ -19,9 +19,6 @@ int main(void)
         size_t i;
         ctrl.w[CTRL_VIBRATION_X] = plant.w[PLANT_VIBRATION_X];
         ctrl.w[CTRL_VIBRATION_Y] = plant.w[PLANT_VIBRATION_Y];
-        for (i = 0; i < CHAMBERS; i++) {
-            ctrl.w[emptied[i]] = plant.w[held[i]];
-        }
         ctrl_step(&ctrl, since);
         if ((int)ctrl.w[CTRL_SAMPLES] > seen) {
             seen++;

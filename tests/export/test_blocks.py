@@ -47,8 +47,6 @@ def loop_in_c(folder: Path, disc: Block, controller: Block, *, samples: int, lon
     of_chambers = {
         "asked": places(disc, "open_time"),
         "told": places(controller, "open_time"),
-        "held": places(disc, "at_residual"),
-        "emptied": places(controller, "at_residual"),
         "fills": places(disc, "fill_ratio"),
     }
     header = f"enum {{ SAMPLES = {samples} }};\nstatic const double LONGEST = {longest!r};\n"
@@ -90,8 +88,8 @@ def test_in_c_they_run_as_the_programs_own_loop(
 ) -> None:
     """The spindle has valves and a gas line; on the paper's disc a chamber comes to its residual fill.
 
-    There the host takes small steps, since the controller sees at a step's end that a valve was closed.  The
-    law-based controller has to learn another influence coefficient, or to bring a pair to its end.
+    Nobody tells the controller of that: it sees what the vibration does.  The law-based one has to learn
+    another influence coefficient, or to bring a pair to its end.
     """
     scene = exact_scene(name, values)
     law = rb.calibrate(scene).flow_law

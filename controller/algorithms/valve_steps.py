@@ -1,16 +1,19 @@
-"""What both exported controllers do with valves, in + - * / and comparisons alone.
+"""What the controllers do with valves, in + - * / and comparisons alone.
 
-`w` holds of each chamber how long its valve stays open and whether it has no more liquid to give, from the
-place `first` on.  A vibration above `GREATEST` is none, a time up to `INSTANT` is over.
+`w` holds of each chamber, from the place `first` on, how long its valve stays open, whether a sensor says
+that it has no more liquid to give, what was asked of it last, and whether that moved nothing.  A vibration
+above `GREATEST` is none, a time up to `INSTANT` is over.
 """
 
 from ringbalance.reduced_model.pieces.point import Query, larger
+from ringbalance.scene.platform.both_ways import both_ways
 
-PER_CHAMBER, OPEN_TIME, AT_RESIDUAL = 2, 0, 1
+PER_CHAMBER, OPEN_TIME, AT_RESIDUAL, SHARE, GAVE_NOTHING = 4, 0, 1, 2, 3
 
 GREATEST, INSTANT = 1e6, 1e-9
 
 
+@both_ways
 def longest_open(w: Query, first: int, chambers: int) -> float:
     """How long the last valve stays open, s."""
     longest = 0.0
@@ -21,6 +24,7 @@ def longest_open(w: Query, first: int, chambers: int) -> float:
     return longest
 
 
+@both_ways
 def cut_short(w: Query, first: int, chambers: int, time: float) -> bool:
     """Let a time pass, s, and close valves of chambers with no more liquid; whether there were any."""
     cut = False

@@ -2,33 +2,42 @@
 
 `c` holds its settings, `w` its memory with its inputs and outputs; the names below are places in them.  It
 samples the vibration as soon as its wait is over, answers with the time that each valve is to stay open, and
-waits for the longest of these and one period more.  Source: `controller.algorithms.built_in`, whose
-`TargetVector` this is; the phase enters by the components of the vibration.
+waits for the longest of these and one period more.  The program's loop compiles `sample`, an export
+translates all, see `reduced_model.pieces.point`; the phase enters by the components of the vibration.
 """
 
 from math import sqrt
 
-from ringbalance.export.valves import (
+from ringbalance.controller.algorithms.valve_steps import (
     AT_RESIDUAL,
+    GAVE_NOTHING,
     GREATEST,
     INSTANT,
     OPEN_TIME,
     PER_CHAMBER,
+    SHARE,
     cut_short,
     longest_open,
 )
 from ringbalance.reduced_model.pieces.point import Law, Query, larger, smaller
+from ringbalance.scene.platform.both_ways import both_ways
 
 # fmt: off
 # Settings; of each chamber its direction, twice, so that what follows the last is the first, and its offset.
 CHAMBERS, LIMIT, GAIN, PER_TIME, DERIVATIVE, LEAST, MOST, PERIOD, RESETS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-LAG_COSINE, LAG_SINE, DIRECTIONS = 9, 10, 11
+LAG_COSINE, LAG_SINE, AMPLITUDE_SQUARE, PHASE_SQUARE, DIRECTIONS = 9, 10, 11, 12, 13
 
 VIBRATION_X, VIBRATION_Y, RESTING, SAMPLES, WAIT = 0, 1, 2, 3, 4
-INTEGRAL, BEFORE_X, BEFORE_Y, BEFORE, SINCE, HAS_BEFORE, WANTED, FIRST_CHAMBER = 5, 6, 7, 8, 9, 10, 11, 12
+INTEGRAL, BEFORE_X, BEFORE_Y, BEFORE, SINCE, HAS_BEFORE, WANTED = 5, 6, 7, 8, 9, 10, 11
+RESPONSE, FIRST_CHAMBER = 12, 13
 # fmt: on
 
+# A chamber is judged that was asked for as much as this of the longest share, and of noise; it gives nothing
+# where less than this of what it should moves.
+OF_LONGEST, OF_NOISE, OF_ASKED = 0.5, 12.0, 0.1
 
+
+@both_ways
 def direction(c: Law, chamber: int) -> int:
     """Place of a chamber's direction; chambers are counted on, a round below zero and a round above."""
     count = int(c[CHAMBERS])
@@ -40,14 +49,30 @@ def direction(c: Law, chamber: int) -> int:
     return DIRECTIONS + 3 * at
 
 
+@both_ways
+def place_of(c: Law, chamber: int) -> int:
+    """Place of what belongs to a chamber, counted as for `direction`."""
+    return FIRST_CHAMBER + PER_CHAMBER * ((direction(c, chamber) - DIRECTIONS) // 3)
+
+
+@both_ways
 def set_open_time(c: Law, w: Query, chamber: int, share: float) -> None:
-    """Of a chamber with its offset, unless its share is below the least."""
+    """Of a chamber with its offset, unless its share is below the least; one that gives nothing is tried.
+
+    The opposite chamber then has liquid again.
+    """
     at = direction(c, chamber)
-    if share > 0.0 and share >= c[LEAST]:
-        place = FIRST_CHAMBER + PER_CHAMBER * ((at - DIRECTIONS) // 3)
-        w[place + OPEN_TIME] = smaller(share + c[at + 2], c[MOST])
+    place = place_of(c, chamber)
+    asked = share
+    if w[place + GAVE_NOTHING] != 0.0:
+        asked = smaller(share, c[PERIOD])
+    if asked > 0.0 and asked >= c[LEAST]:
+        w[place + SHARE] = asked
+        w[place + OPEN_TIME] = smaller(asked + c[at + 2], c[MOST])
+        w[place_of(c, chamber + int(c[CHAMBERS]) // 2) + GAVE_NOTHING] = 0.0
 
 
+@both_ways
 def cross(c: Law, before: int, after: int) -> float:
     """Sine of the angle from one chamber to another."""
     a = direction(c, before)
@@ -55,12 +80,73 @@ def cross(c: Law, before: int, after: int) -> float:
     return c[a] * c[b + 1] - c[a + 1] * c[b]
 
 
+@both_ways
 def emptied(c: Law, w: Query, chamber: int) -> bool:
-    """Whether a chamber has no more liquid to give."""
-    place = FIRST_CHAMBER + PER_CHAMBER * ((direction(c, chamber) - DIRECTIONS) // 3)
-    return w[place + AT_RESIDUAL] != 0.0
+    """Whether a chamber has no more liquid to give, by a sensor or by what it gave last."""
+    place = place_of(c, chamber)
+    return w[place + AT_RESIDUAL] != 0.0 or w[place + GAVE_NOTHING] != 0.0
 
 
+@both_ways
+def judge(c: Law, w: Query, chamber: int, moved: float, longest: float, noise: float) -> None:
+    """See whether a chamber gave what its share asks for by the gain, or by the best response if less.
+
+    Args: `moved`: vibration that it took away, m. `noise`: standard deviation of that, m.
+    """
+    place = place_of(c, chamber)
+    asked = w[place + SHARE]
+    usual = 1.0
+    if w[RESPONSE] > 0.0:
+        usual = w[RESPONSE]
+    if asked >= OF_LONGEST * longest and usual * asked > OF_NOISE * noise * c[GAIN]:
+        w[place + GAVE_NOTHING] = 1.0
+        if moved * c[GAIN] >= OF_ASKED * usual * asked:
+            w[place + GAVE_NOTHING] = 0.0
+            w[RESPONSE] = smaller(1.0, larger(w[RESPONSE], moved * c[GAIN] / asked))
+
+
+@both_ways
+def see_response(c: Law, w: Query) -> None:
+    """Judge the chambers of the last command by what the vibration has done since, and forget the command."""
+    count = int(c[CHAMBERS])
+    before = count
+    after = count
+    longest = 0.0
+    chamber = 0
+    while chamber < count:
+        share = w[place_of(c, chamber) + SHARE]
+        longest = larger(longest, share)
+        if share > 0.0 and before < count:
+            after = chamber
+        if share > 0.0 and before == count:
+            before = chamber
+        chamber = chamber + 1
+    if before == count:
+        return
+    x = w[VIBRATION_X]
+    y = w[VIBRATION_Y]
+    squares = x * x + y * y + w[BEFORE] * w[BEFORE]
+    noise = sqrt(2.0 * c[AMPLITUDE_SQUARE] + squares * c[PHASE_SQUARE])
+    x = w[BEFORE_X] - x
+    y = w[BEFORE_Y] - y
+    along = x * c[LAG_COSINE] - y * c[LAG_SINE]
+    across = x * c[LAG_SINE] + y * c[LAG_COSINE]
+    a = direction(c, before)
+    if after == count:
+        judge(c, w, before, along * c[a] + across * c[a + 1], longest, noise)
+    else:
+        b = direction(c, after)
+        between = cross(c, before, after)
+        noise = noise / larger(between, -between)
+        judge(c, w, before, (along * c[b + 1] - across * c[b]) / between, longest, noise)
+        judge(c, w, after, (across * c[a] - along * c[a + 1]) / between, longest, noise)
+    chamber = 0
+    while chamber < count:
+        w[place_of(c, chamber) + SHARE] = 0.0
+        chamber = chamber + 1
+
+
+@both_ways
 def nearest(c: Law, x: float, y: float) -> int:
     """The chamber before a direction, next to which it lies."""
     found = 0
@@ -77,6 +163,7 @@ def nearest(c: Law, x: float, y: float) -> int:
     return found
 
 
+@both_ways
 def split(c: Law, w: Query, x: float, y: float, time: float) -> None:
     """Open times of the two chambers on either side of a direction, each by its component."""
     if int(c[CHAMBERS]) == 2:
@@ -101,6 +188,7 @@ def split(c: Law, w: Query, x: float, y: float, time: float) -> None:
     set_open_time(c, w, after, time * larger(y * c[a] - x * c[a + 1], 0.0) / between)
 
 
+@both_ways
 def set_wanted(c: Law, w: Query, amplitude: float) -> None:
     """Open time of the vector, s, by a PID on the amplitude; the integral stands still where it is cut."""
     w[WANTED] = c[GAIN] * amplitude
@@ -116,6 +204,7 @@ def set_wanted(c: Law, w: Query, amplitude: float) -> None:
         w[INTEGRAL] = summed
 
 
+@both_ways
 def sample(c: Law, w: Query) -> None:
     """React to the vibration as it is; one that is not a number changes nothing."""
     x = w[VIBRATION_X]
@@ -124,6 +213,7 @@ def sample(c: Law, w: Query) -> None:
     w[RESTING] = 0.0
     if not amplitude <= GREATEST:
         return
+    see_response(c, w)
     if amplitude <= c[LIMIT]:
         w[RESTING] = 1.0
         w[INTEGRAL] = 0.0
@@ -140,11 +230,13 @@ def sample(c: Law, w: Query) -> None:
     split(c, w, along, across, larger(0.0, smaller(w[WANTED], c[MOST])))
 
 
+@both_ways
 def set_wait(c: Law, w: Query) -> None:
     """Until one period after the last valve has closed."""
     w[WAIT] = longest_open(w, FIRST_CHAMBER, int(c[CHAMBERS])) + c[PERIOD]
 
 
+@both_ways
 def step(c: Law, w: Query, time: float) -> None:
     """Let a time pass, s, and sample the vibration if it is time to."""
     w[SINCE] = w[SINCE] + time

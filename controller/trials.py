@@ -67,6 +67,8 @@ class DrawnInput:
     """Code of the finding that says what to measure to know it better; empty: nothing can be measured."""
     path: str = ""
     """Of its key in the scene; empty: the scene has none."""
+    name: str = ""
+    """Under which it is ranked with what belongs to it, as both parts of a model's error; empty: its own."""
 
 
 def drawn_key(scene: SceneFile, path: str) -> DrawnInput:

@@ -107,10 +107,11 @@ class Ranking:
 def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
     """The inputs of judged devices."""
     name, outcome = _outcome(judgement)
-    places = judgement.outcomes.inputs.items()
-    rows = [
-        _row(balancer, judgement, of, place, name, _first_order_index(outcome, place)) for of, place in places
-    ]
+    groups: dict[str, list[tuple[float, str]]] = {}
+    for of, place in judgement.outcomes.inputs.items():
+        index = _first_order_index(outcome, place)
+        groups.setdefault(balancer.drawn_input(of).name or of, []).append((index, of))
+    rows = [_row(balancer, judgement, group, each, name) for group, each in groups.items()]
     return Ranking(inputs=tuple(sorted(rows, key=lambda each: -each.index)))
 
 
@@ -125,15 +126,18 @@ def _outcome(judgement: Judgement) -> tuple[str, FloatArray]:
 
 
 def _row(
-    balancer: Balancer, judgement: Judgement, name: str, place: FloatArray, outcome: str, index: float
+    balancer: Balancer, judgement: Judgement, name: str, inputs: Sequence[tuple[float, str]], outcome: str
 ) -> Deciding:
-    drawn, half, met = balancer.drawn_input(name), np.abs(place - 0.5) < 0.25, judgement.meets
+    """A row of inputs that are ranked as one, whose first-order indices add up."""
+    most = max(inputs)[1]
+    drawn, met = balancer.drawn_input(most), judgement.meets
+    half = np.abs(judgement.outcomes.inputs[most] - 0.5) < 0.25
     return Deciding(
         name=name,
         path=drawn.path,
         outcome=outcome,
-        index=index,
-        noise=math.sqrt(2 * (_PARTS - 1)) / met.size,
+        index=sum(index for index, _ in inputs),
+        noise=math.sqrt(2 * (_PARTS - 1) * len(inputs)) / met.size,
         common=drawn.common,
         measure=drawn.measure,
         middle=Proportion(count=int(np.count_nonzero(met[half])), of=int(np.count_nonzero(half))),

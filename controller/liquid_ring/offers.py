@@ -199,8 +199,10 @@ def drawn_input(name: str) -> DrawnInput:
         measure = _MEASURED.get(name, MEASURE_INPUT)
         return DrawnInput(common=kind.varies == NOT_KNOWN, measure=measure, path=kind.acts_on)
     if name.startswith(MODEL):
-        common = name not in MODEL_ERRORS or MODEL_KINDS[MODEL_ERRORS[name]].varies == NOT_KNOWN
-        return DrawnInput(common=common, measure=_MEASURED.get(name, ""))
+        cause = MODEL_ERRORS.get(name)
+        common = cause is None or MODEL_KINDS[cause].varies == NOT_KNOWN
+        group = name if cause is None else f"{MODEL}{cause}"
+        return DrawnInput(common=common, measure=_MEASURED.get(name, ""), name=group)
     if name.startswith(FITTED_DIRECTION):
         return DrawnInput(common=True, measure="measure_fitted")
     return DrawnInput(common=False, measure="", path=name)

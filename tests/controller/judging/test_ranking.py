@@ -120,5 +120,25 @@ def test_kinds_of_inputs_of_a_liquid_ring() -> None:
     designs = ("model: ends, even", "model: pressure of the cavity", "model: end of the crest")
     assert set(designs) < set(MODEL_ERRORS)
     for name in (LOSS, *designs):
-        assert drawn_input(name) == DrawnInput(common=True, measure="measure_flow")
+        group = name.partition(",")[0]
+        assert drawn_input(name) == DrawnInput(common=True, measure="measure_flow", name=group)
+
+
+def test_both_parts_of_a_models_error_are_ranked_as_one() -> None:
+    """Of y = a + b over equal ranges each has half of the variance; together they decide."""
+
+    class Paired(Named):
+        def drawn_input(self, name: str) -> DrawnInput:
+            return replace(super().drawn_input(name), name="both" if name in "ab" else "")
+
+    drawn = places(1024)
+    balancer: Any = Paired()
+    found = judgement(np.full(1024, True), drawn)
+    ranks: dict[str, Any] = {"settling_time": drawn["a"] + drawn["b"]}
+    ranking = ranked(balancer, replace(found, outcomes=replace(found.outcomes, **ranks)))
+    assert [each.name for each in ranking.inputs] == ["both", "c"]
+    assert ranking.inputs[0].index == pytest.approx(1.0, abs=0.05)
+
+
+def test_where_a_vibration_starts_varies_between_devices() -> None:
     assert drawn_input(PHASE) == DrawnInput(common=False, measure="", path="rotor.initial_phase")

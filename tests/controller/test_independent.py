@@ -171,6 +171,10 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
     half, total = len(letters) // 2, 2 * second.scene.disc.initial_fill
     worst, backward = 0.0, 0
     primed, driven = [False] * half, [0] * half
+    # From the negative chamber of a pair the crest is as far as from the other end of the tube.
+    tube = second.scene.tube
+    mirrored = replace(second.scene, tube=replace(tube, hump_position=1 - tube.hump_position))
+    of_side = second, Second(mirrored)
     for start, end, injections in cycles(run):
         at, until = (int(np.argmin(np.abs(run.time - t))) for t in (start, end))
         for pair in range(half):
@@ -179,7 +183,7 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
             x = float(run.fill_ratio[letters[driven[pair]]][at])
             for done in own:
                 driven[pair] = letters.index(done.chamber)
-                x, primed[pair] = second.after(
+                x, primed[pair] = of_side[driven[pair] // half].after(
                     done.fill_before, total, second.scene.gas.pressure, done.duration, primed=primed[pair]
                 )
                 closed = int(np.argmin(np.abs(run.time - (start + done.duration))))
@@ -190,7 +194,7 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
                 worst = max(worst, abs(done.fill_after - float(later)))
             if (primed[pair] or second.scene.tube.hump_radius is None) and rest > 0:
                 begun = x
-                x, primed[pair] = second.after(x, total, 0.0, rest, primed=True)
+                x, primed[pair] = of_side[driven[pair] // half].after(x, total, 0.0, rest, primed=True)
                 backward += x != begun
                 worst = max(worst, abs(x - float(run.fill_ratio[letters[driven[pair]]][until])))
     return worst, backward

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise, product
 from typing import Final
 
@@ -47,7 +47,7 @@ _SETTLED: Final = 0.9
 """Of the devices that the best settings serve: by when these have settled decides between equals."""
 _ROUNDS: Final = 6
 """In which neighbours are tried."""
-_ALONG: Final = 4
+_ALONG: Final = 3
 """The same at a level of an axis, from the best of a level beside it."""
 _CURVE: Final = tuple(Draws.block(256 + first, count, whole=False) for first, count in ((0, 16), (16, 48)))
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
@@ -132,13 +132,20 @@ _Ran = dict[object, Tried | None]
 
 
 def search(
-    balancer: Balancer, trials: Sequence[Trials], *, along: float | None = None, progress: Progress
+    balancer: Balancer,
+    trials: Sequence[Trials],
+    *,
+    along: float | None = None,
+    ran: Mapping[str, _Ran] | None = None,
+    progress: Progress,
 ) -> tuple[Tried, ...]:
     """The best settings of every kind of controller, the kind to take first.
 
-    Args: `along`: level on `Trials.along`; default the scene's.
+    Args: `along`: level on `Trials.along`; default the scene's. `ran`: by kind, what ran at that level.
     """
-    best = (_best_of(balancer, each, along, progress) for each in trials)
+    best = (
+        _best_of(balancer, each, along, dict((ran or {}).get(each.kind, {})), progress) for each in trials
+    )
     return _ordered([each for each in best if each is not None], trials)
 
 
@@ -148,9 +155,10 @@ def _ordered(found: Sequence[Tried], trials: Sequence[Trials]) -> tuple[Tried, .
     return tuple(sorted(found, key=lambda each: -each.fraction - _MORE * (each.candidate.trials.kind == own)))
 
 
-def _best_of(balancer: Balancer, trials: Trials, along: float | None, progress: Progress) -> Tried | None:
-    tried: _Ran = {}
-    _climb(balancer, tried, _coarse(trials, along), rounds=_ROUNDS, progress=progress)
+def _best_of(
+    balancer: Balancer, trials: Trials, along: float | None, tried: _Ran, progress: Progress
+) -> Tried | None:
+    _climb(balancer, tried, _coarse(trials, along), rounds=_ROUNDS, wide=True, progress=progress)
     return _final(balancer, [each for each in tried.values() if each])
 
 
@@ -162,24 +170,36 @@ def _coarse(trials: Trials, along: float | None) -> list[Candidate]:
 
 
 def _climb(
-    balancer: Balancer, tried: _Ran, field: list[Candidate], *, rounds: int, progress: Progress
+    balancer: Balancer,
+    tried: _Ran,
+    field: list[Candidate],
+    *,
+    rounds: int,
+    wide: bool,
+    other: Tried | None = None,
+    progress: Progress,
 ) -> None:
-    """Add what a field comes to, and the neighbours of the best again and again."""
+    """Add what a field comes to, and the neighbours of the best again and again.
+
+    Args: `wide`: as `_starts`. `other`: the best of another kind of controller; what is surely worse than it
+    is dropped.
+    """
     for _ in range(rounds):
-        fresh = [each for each in field if each.key not in tried]
-        if not fresh:
+        if not (fresh := [each for each in field if each.key not in tried]):
             break
         progress(f"{len(fresh)} settings, {fresh[0].trials.kind.replace('_', ' ')}")
-        ran = _raced(balancer, fresh, leading=chosen(each for each in tried.values() if each))
+        known = [each for each in (*tried.values(), other) if each]
+        ran = _raced(balancer, fresh, leading=max(known, key=lambda each: each.fraction, default=None))
         tried |= {each.key: None for each in fresh} | {each.candidate.key: each for each in ran}
-        starts = _starts([each for each in tried.values() if each])
+        starts = _starts([each for each in tried.values() if each], wide=wide)
         field = [near for each in starts for near in each.candidate.neighbours()]
 
 
-def _starts(tried: Sequence[Tried]) -> list[Tried]:
-    """The best, and where it serves too few devices the best of those that are not beside it."""
-    if (best := chosen(tried)) is None:
-        return []
+def _starts(tried: Sequence[Tried], *, wide: bool) -> list[Tried]:
+    """The best, where it serves any device. Args: `wide`: where it serves too few, the best of those that are
+    not beside it, too."""
+    if (best := chosen(tried)) is None or not wide:
+        return [best] if best is not None and best.count else []
     apart = [each for each in tried if not each.candidate.is_beside(best.candidate)]
     second = chosen(apart) if best.fraction < _ENOUGH else None
     return [best] if second is None else [best, second]
@@ -299,18 +319,21 @@ def searched_along(
     levels = _Levels(balancer=balancer, trials=trials, axis=axis, searched=searched)
     answered: dict[int, Along] = {}
     places: Sequence[int] = axis.first
+    levels.add(sorted(places, key=lambda at: abs(at - own)))
+    if levels.top is not None:
+        levels.search(levels.top, progress)
     while True:
         levels.add(sorted(places, key=lambda at: abs(at - own)))
         progress(f"{len(answered)} levels of {axis.name}")
         answered |= levels.answered(answered)
-        top = _top(answered)
+        top = _top({at: each.judgement.fraction.count for at, each in answered.items()})
         served = answered[top].judgement.fraction.count > 0
         beside = (top - 1, top + 1) if served else (min(answered) - 1, max(answered) + 1)
         places = [at for at in beside if at not in answered and 0 <= at < len(axis.levels)]
         if not places:
             if top in levels.searched or not served:
                 break
-            levels.searched[top] = search(balancer, trials, along=axis.levels[top], progress=progress)
+            levels.search(top, progress)
     along = tuple(answered[at] for at in sorted(answered))
     return Curve(levels=along, top=answered[top], searched=levels.searched.get(top, ()))
 
@@ -333,13 +356,25 @@ class _Levels:
         """Search levels from what serves at the nearest; then each from both beside it."""
         for at in places:
             for trials in self.trials:
-                known = [place for place in self._known if trials.kind in self._serving(place)]
-                self._climb(at, trials, min(known, key=lambda place: abs(place - at), default=None))
+                self._climb(at, trials, self._nearest(at, trials.kind))
         known = self._known
         for before, at in (*pairwise(known), *pairwise(reversed(known))):
             for trials in self.trials:
                 if trials.kind in self._serving(before):
                     self._climb(at, trials, before)
+
+    def search(self, at: int, progress: Progress) -> None:
+        """Search a level as widely as the scene's."""
+        if at not in self.searched:
+            level, ran = self.axis.levels[at], self.ran.get(at)
+            self.searched[at] = search(self.balancer, self.trials, along=level, ran=ran, progress=progress)
+
+    @property
+    def top(self) -> int | None:
+        """Place of the level that serves most of the devices of the search; None: none serves any."""
+        best = {at: chosen(self._serving(at).values()) for at in self._known}
+        counts = {at: each.fraction * DEVICES for at, each in best.items() if each}
+        return _top(counts) if counts else None
 
     @property
     def _known(self) -> list[int]:
@@ -350,17 +385,42 @@ class _Levels:
         widely = {each.candidate.trials.kind: each for each in self.searched.get(at, ()) if each.count}
         return widely if at in self.searched else self.serving.get(at, {})
 
+    def _nearest(self, at: int, kind: str) -> int | None:
+        """Place of the nearest level where a kind of controller serves."""
+        serving = (place for place in self._known if kind in self._serving(place))
+        return min(serving, key=lambda place: abs(place - at), default=None)
+
     def _climb(self, at: int, trials: Trials, near: int | None) -> None:
         """From what serves at another level; from all that is tried at first where nothing does."""
         level, kind = self.axis.levels[at], trials.kind
-        if at in self.searched:
+        if at in self.searched or (trials is not self.trials[0] and self._needless(at, kind, near)):
             return
+        ran, serving = self.ran.setdefault(at, {}).setdefault(kind, {}), self.serving.setdefault(at, {})
+        before = serving.get(kind)
         start = _coarse(trials, level) if near is None else [self._serving(near)[kind].candidate.at(level)]
-        ran = self.ran.setdefault(at, {}).setdefault(kind, {})
-        _climb(self.balancer, ran, start, rounds=_ALONG, progress=lambda _: None)
+        climb = partial(_climb, self.balancer, ran, wide=False, progress=lambda _: None)
+        climb(start, rounds=1, other=chosen(serving.values()))
         best = chosen(each for each in ran.values() if each)
-        if best is not None and best.count:
-            self.serving.setdefault(at, {})[kind] = best
+        if best is None or best.count <= (before.count if before else 0):
+            return
+        serving[kind] = best
+        for each in self.trials[1:] if trials is self.trials[0] else ():
+            # Where these serve more, neighbours that are surely worse are left after few devices.
+            self._climb(at, each, self._nearest(at, each.kind))
+        climb(best.candidate.neighbours(), rounds=_ALONG - 1, other=chosen(serving.values()))
+        serving[kind] = chosen(each for each in ran.values() if each) or best
+
+    def _needless(self, at: int, kind: str, near: int | None) -> bool:
+        """Whether a kind of controller beside the scene's is not tried: the scene's serves enough, or too few
+        at every level from one on at which the other serves no more."""
+        asked, own = self.balancer.asked_fraction(), self.trials[0].kind
+        known = self._known
+        fractions = {each: best[own].fraction for each in known if own in (best := self._serving(each))}
+        if near is None or fractions.get(at, 0.0) >= asked:
+            return fractions.get(at, 0.0) >= asked
+        no_more = self._serving(near)[kind].fraction <= fractions.get(near, 0.0) + _MORE
+        between = (each for each in known if min(at, near) <= each <= max(at, near))
+        return no_more and all(fractions.get(each, 0.0) < asked for each in between)
 
     def answered(self, before: Mapping[int, Along]) -> dict[int, Along]:
         """Levels on devices of their own, but those that have been under the same settings."""
@@ -391,12 +451,11 @@ def _answered(balancer: Balancer, settings: Mapping[int, Settings], axis: Axis) 
     return {at: Along(level=axis.levels[at], judgement=each) for at, each in judged.items()}
 
 
-def _top(found: dict[int, Along]) -> int:
+def _top(count: Mapping[int, float]) -> int:
     """Place of the level to take: most devices, and then amid levels that serve about as many."""
-    count = {at: each.judgement.fraction.count for at, each in found.items()}
-    near = {at: sum(count.get(at + by, 0) for by in (-1, 0, 1)) for at in found}
+    near = {at: sum(count.get(at + by, 0) for by in (-1, 0, 1)) for at in count}
     most = max(count.values())
-    return max((at for at in found if count[at] >= most - 1), key=lambda at: (near[at], count[at]))
+    return max((at for at in count if count[at] >= most - 1), key=lambda at: (near[at], count[at]))
 
 
 def searched(

@@ -41,6 +41,9 @@ class Remedied:
     """Of the best settings of the changed scene."""
     size: float
     """Sum of |ln| of every number's change."""
+    along: str = ""
+    """Path of the axis along which settings may move, such as the supply's pressure: what they set is changed
+    by the remedy, too."""
 
     @property
     def code(self) -> str:
@@ -49,8 +52,15 @@ class Remedied:
 
     @property
     def changes(self) -> Settings:
-        """Of the scene, by path, SI, without the settings."""
-        return _merged(self.remedies)
+        """Of the scene, by path, SI, without the settings of its controller."""
+        moved = {path: value for path, value in self.judgement.settings.items() if path == self.along}
+        return {**_merged(self.remedies), **moved}
+
+    @property
+    def settings(self) -> Settings:
+        """The best ones under these changes."""
+        changed = self.changes
+        return {path: value for path, value in self.judgement.settings.items() if path not in changed}
 
     @property
     def met(self) -> bool:
@@ -72,7 +82,7 @@ class Remedied:
             "changes": dict(self.changes),
             "settings": {
                 path: list(value) if isinstance(value, tuple) else value
-                for path, value in self.judgement.settings.items()
+                for path, value in self.settings.items()
             },
             "fraction": self.judgement.fraction.document(),
             "verdict": self.judgement.verdict,
@@ -82,7 +92,7 @@ class Remedied:
 
 
 def tried_remedies(
-    balancer: Balancer, own: Judgement, *, search: Search, told: Told | None = None
+    balancer: Balancer, own: Judgement, *, search: Search, along: str = "", told: Told | None = None
 ) -> tuple[Remedied, ...]:
     """What the remedies of a balancer come to, the best first.
 
@@ -90,12 +100,13 @@ def tried_remedies(
     fewer devices meet than before; where no device of the scene as it is does, until one kind meets.  Where
     none meets by itself, the best two together follow.  The best, and all that meet, are then judged on
     devices on which nothing was chosen.
-    Args: `own`: judgement of the best settings of the scene as it is. `search`: best settings.
+    Args: `own`: judgement of the best settings of the scene as it is. `search`: best settings. `along`: as
+        `Remedied`.
     """
     kinds: dict[str, list[Remedy]] = {}
     for each in balancer.remedies():
         kinds.setdefault(each.code, []).append(each)
-    trial = _Trial(balancer=balancer, search=search, told=told or (lambda _: None))
+    trial = _Trial(balancer=balancer, search=search, along=along, told=told or (lambda _: None))
     rows: list[Remedied] = []
     for some in kinds.values():
         rows += trial.series(some, own.fraction)
@@ -107,9 +118,11 @@ def tried_remedies(
     return tuple(trial.afresh(row) if row.met or row is rows[0] else row for row in rows)
 
 
-def tried_choices(balancer: Balancer, *, search: Search, told: Told | None = None) -> tuple[Remedied, ...]:
+def tried_choices(
+    balancer: Balancer, *, search: Search, along: str = "", told: Told | None = None
+) -> tuple[Remedied, ...]:
     """What things that can be bought make of a scene that leaves them open."""
-    trial = _Trial(balancer=balancer, search=search, told=told or (lambda _: None), start=FRESH)
+    trial = _Trial(balancer=balancer, search=search, along=along, told=told or (lambda _: None), start=FRESH)
     return tuple(row for each in balancer.choices() if (row := trial.of([each])) is not None)
 
 
@@ -127,6 +140,7 @@ class _Trial:
 
     balancer: Balancer
     search: Search
+    along: str
     told: Told
     start: int = CHOOSING
     """Number of the first device."""
@@ -141,11 +155,14 @@ class _Trial:
             judgement = _judged(changed, settings, self.start)
         except SceneError:
             return None
-        return Remedied(remedies=tuple(remedies), judgement=judgement, size=_size(self.balancer, changes))
+        size = _size(self.balancer, changes)
+        return Remedied(remedies=tuple(remedies), judgement=judgement, size=size, along=self.along)
 
     def afresh(self, row: Remedied) -> Remedied:
         """On devices on which nothing was chosen."""
-        return replace(row, judgement=_judged(self._changed(row.changes), row.judgement.settings, FRESH))
+        return replace(
+            row, judgement=_judged(self._changed(_merged(row.remedies)), row.judgement.settings, FRESH)
+        )
 
     def _changed(self, changes: Settings) -> Balancer:
         scene = rechecked(self.balancer.scene).with_values(changes, origin="inferred")
@@ -183,7 +200,7 @@ class _Trial:
         """The best two of different kinds together."""
         best = sorted(rows, key=lambda row: row.order)
         for one, other in combinations(best, 2):
-            if one.code != other.code and not set(one.changes) & set(other.changes):
+            if one.code != other.code and not set(_merged(one.remedies)) & set(_merged(other.remedies)):
                 row = self.of([*one.remedies, *other.remedies])
                 if row is not None:
                     yield row

@@ -59,6 +59,7 @@ def tuned(
     axis = trials[0].along if trials else None
     level = None if axis is None else best.settings.get(axis.name)
     own_level = None if axis is None else value_at(balancer.scene, axis.name)
+    name = axis.name if axis else ""
     settings = partial(searched, along=level)
     mends = remedies is not False and best.verdict != MET
     return Tuning(
@@ -71,13 +72,13 @@ def tuned(
             _agreeing(each, best, own_level if level is None else level)
             for each in (curve.levels if curve else ())
         ),
-        along_name=axis.name if axis else "",
+        along_name=name,
         along_unit=axis.unit if axis else "1",
         information=balancer.information(with_values_at(balancer.scene, best.settings)),
         capacity=_capacity(balancer, own, best),
         ranking=ranked(balancer, best),
-        remedies=tried_remedies(balancer, best, search=settings, told=told) if mends else (),
-        choices=tried_choices(balancer, search=settings, told=told) if remedies else (),
+        remedies=tried_remedies(balancer, best, search=settings, along=name, told=told) if mends else (),
+        choices=tried_choices(balancer, search=settings, along=name, told=told) if remedies else (),
         open_choice=bool(balancer.choices()),
     )
 

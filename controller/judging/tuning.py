@@ -275,9 +275,8 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
     meeting = [each for each in tuning.remedies if each.met]
     for each in (meeting or tuning.remedies)[:1]:
         code = "remedy_meets" if each.met else "remedy_best"
-        changes = {**each.changes, **_level_of(tuning, each.judgement)}
-        values = {**share_values(each.judgement), "what": _changes_text(changes, ", ")}
-        yield Finding(code=code, values=values, change=changes)
+        values = {**share_values(each.judgement), "what": _changes_text(each.changes, ", ")}
+        yield Finding(code=code, values=values, change=each.changes)
     if best.verdict != MET:
         yield from tuning.ranking.findings()
     states = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
@@ -288,11 +287,6 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
     if clipped:
         values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
         yield Finding(code="inputs_clipped", values=values)
-
-
-def _level_of(tuning: Tuning, judgement: Judgement) -> Settings:
-    """The level of the axis that settings move, such as the supply's pressure: a part of a remedy as well."""
-    return {path: value for path, value in judgement.settings.items() if path == tuning.along_name}
 
 
 def _changes_text(changes: Settings, between: str = "\n") -> str:
@@ -307,12 +301,12 @@ def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
             _share_text(each.judgement),
             each.judgement.verdict,
             *(given(time, "s", digits=3) for time in times_of(each.judgement).values()),
-            _changes_text(each.judgement.settings),
+            _changes_text(each.settings),
         )
         for each in tried
     ]
     heads = ["remedy", "change", "devices that meet all", "verdict", "half within", "90 % within", "settings"]
-    if not any(each.judgement.settings for each in tried):
+    if not any(each.settings for each in tried):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     return Table(caption=caption, heads=heads, rows=rows)
 

@@ -174,6 +174,21 @@ def test_what_is_chosen_is_judged_on_devices_that_chose_nothing(paper_scene: Sce
     assert not beside & missed
 
 
+def test_a_remedy_names_the_pressure_that_goes_with_it(paper_scene: Scene) -> None:
+    """In the list, in JSON and in the sentence: settings found at another gas pressure need it."""
+    found = tuned(cast("Any", Machine(at(paper_scene, 0.7), needs=0.9)), remedies=True)
+    changes = found.remedies[0].changes
+    assert changes == {"tube.bore": pytest.approx(changes["tube.bore"]), PRESSURE: BEST}
+    assert changes["tube.bore"] < 1.6e-3
+    document = found.to_dict()["remedies"][0]
+    assert document["changes"] == changes
+    assert set(document["settings"]) == {"controller.gas_time_offset"}
+    (table,) = (each for each in found.rows().tables if "remedies" in each.caption.lower())
+    assert "gas.pressure 0.56 MPa" in str(table.rows[0][1])
+    (finding,) = (each for each in found.rows().findings if each.code == "remedy_meets")
+    assert finding.changes == changes
+
+
 @pytest.mark.heavy
 def test_the_curve_of_the_papers_disc_is_the_same_from_five_pressures() -> None:
     paper = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))

@@ -195,7 +195,7 @@ class Simulation(PresentedResult):
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
         >>> run = rb.simulate(scene)
         >>> len(run.injections), float(run.amplitude[-1]) < scene.controller.limit
-        (10, True)
+        (9, True)
     """
 
     scene: Scene

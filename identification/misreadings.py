@@ -191,6 +191,7 @@ def joint_misreadings() -> Iterator[Joint]:
 
 
 def words_of(joint: Joint) -> str:
+    """Phrase that names misreadings that were made together, for the advice of a fit."""
     turned = [each.words for each in joint if each in SENSES]
     others = [each.words for each in joint if each not in SENSES]
     listed = " and ".join(filter(None, (", ".join(turned[:-1]), *turned[-1:])))

@@ -74,6 +74,8 @@ class _Rows:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
+    """Likelihood of a fit's files as they stand, and as other readings of them would have it."""
+
     problem: Problem
     rows: tuple[_Rows, ...]
     given: float
@@ -83,6 +85,7 @@ class Comparison:
 
     @classmethod
     def of(cls, best: Optimum) -> Comparison:
+        """Predictions and slopes about the scene's values, and the fit that readings are compared with."""
         problem, start = best.residuals.problem, best.residuals.problem.start
         raw = _unwhitened(problem, problem.at(start)[:, None])
         slopes = _unwhitened(problem, problem.quick_slopes(start))

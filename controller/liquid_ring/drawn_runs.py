@@ -139,7 +139,13 @@ class DrawnRuns:
             plan.loop["limit"] = self.limit
             plan.loop["time_limit"] = min(self.scene.run.time_limit, draws.until)
             gains = [each.scene.controller.proportional for each in tried]
-            runs = under.carried(plan, gains, seed=self.scene.run.seed)
+            seed, number = self.scene.run.seed, under.device.number
+            # The scene as it is has the noise of a single run of it, from the next seed for each number.
+            noise = [
+                run_noise(seed, number) if draws.devices else np.random.default_rng(seed + number)
+                for _ in gains
+            ]
+            runs = under.carried(plan, gains, noise=noise)
             for each, run in zip(tried, runs, strict=True):
                 yield each.place, _result(under, run, limit=self.limit)
 
@@ -223,14 +229,15 @@ class _Under:
             unbalance=device.moment * abs(scene.rotor.initial_unbalance),
         )
 
-    def carried(self, plan: LoopPlan, gains: Sequence[float], *, seed: int) -> Records:
-        """Runs to their ends, one for each gain, all with the noise of the device's number."""
+    def carried(
+        self, plan: LoopPlan, gains: Sequence[float], *, noise: Sequence[np.random.Generator]
+    ) -> Records:
+        """Runs to their ends, one for each gain and its random numbers of the sensor."""
         runs = plan.runs(len(gains))
         runs["speed"], runs["proportional"] = self.device.speed, gains
         runs["gain"] = self.scene.rotor.influence
         runs["residual_fill"] = self.residual
-        quiet = bool(plan.loop["exact"][0])
-        plan.carry(runs, [] if quiet else [run_noise(seed, self.device.number) for _ in gains])
+        plan.carry(runs, [] if plan.loop["exact"][0] else noise)
         return runs
 
 

@@ -302,7 +302,8 @@ def _sampled(scene: Scene, log_velocity: FloatArray, *, falls: float = _LEVELLED
     places = log_velocity[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         values = log_heads(scene, places)
-    if scene.tube.model_errors and np.all(np.isfinite(values)):
+    # Heads that nothing differs in have one column beside those of many designs.
+    if scene.tube.model_errors and all(np.all(np.isfinite(value)) for value in values):
         values = [_growing(scene, places, value, falls) for value in values]
     if not all(np.all(np.isfinite(value)) and np.all(np.diff(value, axis=0) > 0) for value in values):
         raise _inconsistent(scene)

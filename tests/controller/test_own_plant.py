@@ -82,17 +82,18 @@ def both(scene: Scene, count: int, *, offset: float = 0.0) -> tuple[Share, Share
 # (scene, values, offset in s, draws), and between which bounds the fraction is to lie.  At an
 # offset of 15 ms the fractions do not agree: of 64 the program serves 58, the own plant 64 (at 12 ms 44 and
 # 38).  A device that was traced rests just above the limit: noise takes every other sample below it, which
-# sets the integral back, and 19 ms of gas move no liquid.
+# sets the integral back, and 19 ms of gas move no liquid.  Of six chambers at their own gain a further plant
+# with other correlations settles 957 to 979 of 1,000.
 LIGHT: Final = {
     "paper's disc at 0.42 MPa": (PAPER, {"gas.pressure": "0.42 MPa"}, 0.0, 32, 0.0, 0.02),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 128, 0.80, 0.88),
-    "six chambers at their own gain": (SIX, {}, 0.0, 128, 0.97, 1.0),
+    "six chambers at their own gain": (SIX, {}, 0.0, 128, 0.95, 0.98),
     "six chambers with a valve": (SIX, VALVE, 17e-3, 64, 0.0, 1.0),
 }
 HEAVY: Final = {
     "paper's disc at 0.56 MPa": (PAPER, {"gas.pressure": "0.56 MPa"}, 1.2e-3, 256, 0.9, 1.0),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 512, 0.80, 0.88),
-    "six chambers at their own gain": (SIX, {}, 0.0, 512, 0.97, 1.0),
+    "six chambers at their own gain": (SIX, {}, 0.0, 512, 0.95, 0.98),
     "six chambers with an offset": (SIX, {}, 2e-3, 256, 0.97, 1.0),
     "six chambers with a valve": (SIX, VALVE, 17e-3, 128, 0.0, 1.0),
     "narrow tube with a valve": (CALIBRATED, VALVE, 30e-3, 128, 0.0, 1.0),

@@ -29,7 +29,7 @@ from ringbalance.reduced_model.tube.flow import Waves
 from ringbalance.reduced_model.tube.regime import stall_pressure
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.designs import Designs, alike, changes_of
 from ringbalance.scene.errors import (
     MOMENT,
     VOLUME,
@@ -304,8 +304,12 @@ class _Changes:
             for error, each in zip(self.errors, row.tolist(), strict=True):
                 scene = error.moved(scene, error.deviation_of_normal(each))
             scenes.append(scene)
-        waves = replace(self.waves, deviation=z[:, [each.name for each in self.errors].index(WAVES)])
-        values = _quantities(Designs.stacked(scenes), waves=waves)
+        waves = z[:, [each.name for each in self.errors].index(WAVES)]
+        values = np.empty((len(UNITS), len(scenes)))
+        # Chambers of a mesh move with the scene, so that each scene has its own.
+        for rows in alike(scenes):
+            designs = Designs.stacked([scenes[row] for row in rows])
+            values[:, rows] = _quantities(designs, waves=replace(self.waves, deviation=waves[rows]))
         found, alone = [], both_sides(self.alone)
         for row, (place, side) in enumerate(asked):
             moved = side * (values[place, row] - self.values[place])

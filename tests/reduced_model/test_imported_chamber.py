@@ -117,3 +117,14 @@ def test_a_gas_pressure_at_which_nothing_flows(scene: Scene) -> None:
     assert found.residual.least_fill_ratio == pytest.approx(scene.disc.initial_fill)
     assert found.budgets["usable_moment"].value == found.residual.reach == 0
     assert found.residual.pair_moment > 0
+
+
+def test_both_ends_of_an_interval_move_the_chamber(scene: Scene) -> None:
+    """Half of an interval lies on each side of what the chamber's size moves in proportion."""
+    budgets = calibrate(scene).budgets
+    for name in ("lambda", "wall_pressure", "moment"):
+        found = budgets[name]
+        assert min(found.lowered, found.raised) > 0.97 * max(found.lowered, found.raised), name
+        assert max(found.lowered, found.raised) == pytest.approx(
+            np.hypot(found.input, found.model), rel=0.03
+        ), name

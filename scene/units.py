@@ -234,7 +234,7 @@ def unit_factor(unit: str) -> float:
 
 def shortest(value: float) -> str:
     """The fewest digits that give a value back to 1e-6 of it."""
-    texts = (f"{float(f'{value:.{digits}g}'):.16g}" for digits in range(1, 17))
+    texts = (f"{float(f'{value:.{digits}g}'):.15g}" for digits in range(1, 16))
     return next(text for text in texts if math.isclose(float(text), value, rel_tol=_READS_BACK))
 
 

@@ -130,7 +130,7 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
         return float(np.log(moved.rotor.influence_coefficient * moment * flow))
 
     def moved_by(steps: FloatArray) -> Scene:
-        moved = device
+        moved: Scene = device
         for name, step in zip(names, steps.tolist(), strict=True):
             moved = liquid_ring_scene(inputs_of(moved).changed(name, step))
         return moved

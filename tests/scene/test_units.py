@@ -13,7 +13,13 @@ from ringbalance.scene.describe import setting_text
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.models import Gas
-from ringbalance.scene.units import DIMENSIONS, FieldError, format_quantity, parse_quantity
+from ringbalance.scene.units import (
+    DIMENSIONS,
+    FieldError,
+    format_quantity,
+    parse_quantity,
+    shortest_quantity,
+)
 
 EVERY_UNIT = [(dimension, unit) for dimension, kind in DIMENSIONS.items() for unit in kind.units]
 
@@ -196,3 +202,11 @@ def test_any_text_is_read_or_refused(text: str) -> None:
 )
 def test_a_setting_stands_in_minutes_where_these_are_round(path: str, value: float, text: str) -> None:
     assert setting_text(path, value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(560000.0, "0.56 MPa"), (290000.0, "0.29 MPa"), (7e5, "0.7 MPa")]
+)
+def test_a_pressure_of_two_digits_is_written_with_two(value: float, text: str) -> None:
+    """0.56 has no exact binary form; its sixteenth digit is none of the number's."""
+    assert shortest_quantity(value, "MPa") == text

@@ -346,7 +346,7 @@ class Review:
             criticism=_Criticism.of(fit),
             laws=tuple(_comparisons(result, fit)),
             explained=tuple(_shares_explained(best)),
-            readings=other_readings(best, ranges),
+            readings=other_readings(best, ranges, stated=result.stated),
             ranges=ranges,
         )
 

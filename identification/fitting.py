@@ -21,7 +21,7 @@ from ringbalance.identification.intervals import (
 )
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.optimisation import Optimum, optimum
+from ringbalance.identification.optimisation import Optimum, optimum_as_stated
 from ringbalance.identification.parameters import (
     FitError,
     Parameter,
@@ -178,6 +178,8 @@ class FitResult:
     """Of the data at the optimum, priors and held inputs with it, but for constants."""
     scene: Any
     """With the fitted values, the values to which held inputs are pulled, and corrected models."""
+    stated: Any
+    """The scene that was fitted."""
     joint: Joint
     """Parameters and held inputs together."""
     optimum: Optimum
@@ -202,8 +204,6 @@ class FitResult:
 
 Loss = Literal["linear", "soft_l1"]
 _STARTS: Final = 3
-_NO_EFFECT: Final = 1e-3
-"""Of a standard deviation of the data, in all, below which a held input is left out."""
 _HALF: Final = 0.5
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""
@@ -225,16 +225,8 @@ def fit(
     Source: `likelihood`, `optimisation`, `intervals`, `identifiability`.
     """
     problem = problem_of(scene, data, parameters)
-    names = [p.name for p in problem.parameters]
-    inputs = inputs_of(scene)
-    held = inputs.held(names)
-    nothing = np.zeros((problem.measured.size, 0))
-    first = optimum(problem, nothing, loss=loss, starts=starts)
-    effects = problem.held_effects(first.t, [inputs.both_sides(*each) for each in held.items()])
-    counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
-    best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
-    kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
-    return _result(about_pulls(best, kept, scene=scene, loss=loss), kept, loss)
+    best, kept = optimum_as_stated(problem, loss=loss, starts=starts)
+    return _result(about_pulls(best, kept, scene=scene, loss=loss), kept, loss, scene)
 
 
 def problem_of(
@@ -271,7 +263,7 @@ def exact_inputs(result: FitResult) -> list[str]:
     return found
 
 
-def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
+def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) -> FitResult:
     problem, spread = best.residuals.problem, covariance(best.slopes)
     data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
     intervals = profiles(best, spread)
@@ -292,6 +284,7 @@ def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
         evaluations=problem.evaluations,
         log_likelihood=_log_likelihood(best),
         scene=scene_as_fitted(best, held),
+        stated=stated,
         joint=joint_of(best, held),
         optimum=best,
     )

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ringbalance.identification.likelihood import Problem, Residuals
-from ringbalance.identification.parameters import FitError
+from ringbalance.identification.parameters import FitError, inputs_of
 from ringbalance.scene.arrays import FloatArray
 
 _FIRST_NOISE: Final = 0.02
@@ -23,6 +23,8 @@ _ROUNDS: Final = 25
 _AGREES: Final = 1e-3
 """Relative change of the noise at which it is found."""
 _EVALUATIONS: Final = 40
+_NO_EFFECT: Final = 1e-3
+"""Of a standard deviation of the data, in all, below which a held input is left out."""
 _NEARBY: Final = 1e-2
 """Change of the sum of squares, relative or of few standard deviations, that tells one start's minimum from
 another's."""
@@ -103,6 +105,21 @@ def optimum(
             break
     used = starts if before is None else before.starts
     return Optimum(t=t, residuals=residuals, freedom=freedom, starts=used)
+
+
+def optimum_as_stated(problem: Problem, *, loss: str, starts: int) -> tuple[Optimum, dict[str, float]]:
+    """The optimum with held inputs as stated, and the standard deviations of those that count.
+
+    Raises: FitError: as `optimum`.
+    """
+    inputs = inputs_of(problem.scene)
+    held = inputs.held([each.name for each in problem.parameters])
+    nothing = np.zeros((problem.measured.size, 0))
+    first = optimum(problem, nothing, loss=loss, starts=starts)
+    effects = problem.held_effects(first.t, [inputs.both_sides(*each) for each in held.items()])
+    counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
+    kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
+    return optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first), kept
 
 
 def _same(one: Residuals, other: Residuals) -> bool:

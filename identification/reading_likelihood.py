@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from scipy.special import stdtr
@@ -25,7 +25,8 @@ from scipy.special import stdtr
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.misreadings import Joint, Misreading
-from ringbalance.identification.optimisation import Optimum
+from ringbalance.identification.optimisation import Optimum, optimum_as_stated
+from ringbalance.identification.parameters import FitError
 from ringbalance.scene.arrays import FloatArray
 
 _ROUNDS: Final = 12
@@ -95,10 +96,7 @@ class Comparison:
             for b, f, s, h in zip(problem.blocks, raw, slopes, held, strict=True)
         )
         pulled = best.residuals.pulled
-        here = _Linear.at(
-            problem, best.t, problem.at(best.t), best.of_prediction, best.residuals.held, pulled=pulled
-        )
-        return cls(problem=problem, rows=rows, given=here.settled().deviance, pulled=pulled)
+        return cls(problem=problem, rows=rows, given=deviance_of(best), pulled=pulled)
 
     @cached_property
     def given_from_scene(self) -> float:
@@ -107,17 +105,38 @@ class Comparison:
 
     def gain(self, joint: Joint, chosen: Sequence[int]) -> float | None:
         """Of the log likelihood, by reading some files otherwise; None where nothing can be predicted."""
-        rows, jacobian = list(self.rows), 0.0
+        rows = list(self.rows)
         for i in chosen:
             changed = self._changed(joint, i)
             if changed is None:
                 return None
             rows[i] = changed
-            jacobian += changed.block.measured.size * sum(math.log(each.scale) for each in joint)
         problem = replace(self.problem, blocks=tuple(r.block for r in rows))
         found = min(self._deviance(problem, rows, t) for t in self._starts(problem, rows))
-        gain = (self.given - found) / 2 + jacobian
+        gain = (self.given - found) / 2 + self.jacobian(joint, chosen)
         return gain if math.isfinite(gain) else None
+
+    def jacobian(self, joint: Joint, chosen: Sequence[int]) -> float:
+        """ln |dy'/dy|."""
+        size = sum(self.rows[i].block.measured.size for i in chosen)
+        return size * sum(math.log(each.scale) for each in joint)
+
+    def refitted(self, joint: Joint, chosen: Sequence[int], scene: Any) -> float:
+        """The gain by a fit from the scene as stated; minus infinity where there is none.
+
+        The scene to which wrong readings pull held inputs is far from where another reading has them.
+        """
+        blocks = list(self.problem.blocks)
+        for i in chosen:
+            for each in joint:
+                changed = each.change(blocks[i].observations, scene)
+                blocks[i] = Block(observations=changed) if changed is not None else blocks[i]
+        problem = replace(self.problem, scene=scene, blocks=tuple(blocks))
+        try:
+            best, _ = optimum_as_stated(problem, loss="linear", starts=1)
+        except (FitError, ValueError):
+            return -math.inf
+        return (self.given - deviance_of(best)) / 2 + self.jacobian(joint, chosen)
 
     @cached_property
     def _response(self) -> tuple[int, int] | None:
@@ -211,6 +230,13 @@ class Comparison:
             return None
         held = _in_proportion(block, rows, predicted)
         return _Rows(block=block, predicted=predicted, slopes=slopes, held=held)
+
+
+def deviance_of(best: Optimum) -> float:
+    """-2 ln L at an optimum."""
+    problem, of = best.residuals.problem, best.of_prediction
+    there, held, pulled = problem.at(best.t), best.residuals.held, best.residuals.pulled
+    return _Linear.at(problem, best.t, there, of, held, pulled=pulled).settled().deviance
 
 
 def _in_proportion(block: Block, rows: _Rows, predicted: FloatArray) -> FloatArray:

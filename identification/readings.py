@@ -16,10 +16,10 @@ A reading is named from a gain of `_DECISIVE` on: of thirty, and one file in a h
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -95,6 +95,10 @@ _TELLS: Final = math.log(1e3)
 """Loss of the log likelihood from which a sense of the angles is ruled out."""
 
 
+_Choice = tuple[Joint, tuple[int, ...]]
+"""A reading, and places of the files that are read so."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Reading:
     """Files read in another way."""
@@ -111,11 +115,14 @@ class Reading:
     text: str
 
 
-def other_readings(best: Optimum, ranges: Sequence[ComparedColumn] = ()) -> tuple[Reading, ...]:
+def other_readings(
+    best: Optimum, ranges: Sequence[ComparedColumn] = (), *, stated: Any = None
+) -> tuple[Reading, ...]:
     """Every other reading of the data, the likeliest first.
 
     Args: `ranges`: columns compared with the scene. Where those that a reading changes are far from it in all
         of its files, it is named from the first gain on: a free loss takes up a pressure ten times too large.
+        `stated`: the scene before held inputs are pulled; None: they are not.
     """
     compare, far = Comparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
     problem = compare.problem
@@ -125,13 +132,7 @@ def other_readings(best: Optimum, ranges: Sequence[ComparedColumn] = ()) -> tupl
         for chosen in _choices(problem, joint)
         if (gain := compare.gain(joint, chosen)) is not None
     }
-    # A factor that the parameters take up says nothing beside a sense of the angles that explains as much.
-    for (joint, chosen), gain in tuple(gains.items()):
-        alone = max(
-            (g for (j, c), g in gains.items() if j == joint[:-1] and set(chosen) <= {*c}), default=0.0
-        )
-        if joint[-1] in AMPLITUDES and gain < alone + _DECISIVE:
-            del gains[joint, chosen]
+    gains = _without_idle_factors(compare, gains, problem.scene if stated is None else stated)
     ordered = sorted(gains.items(), key=lambda each: -each[1])
     likeliest = ordered[0][1] if ordered else 0.0
     named = [
@@ -148,6 +149,35 @@ def other_readings(best: Optimum, ranges: Sequence[ComparedColumn] = ()) -> tupl
     ]
     each = zip(ordered, named, undecided, strict=True)
     return tuple(_reading(problem, *of, gain, named=n, undecided=u) for (of, gain), n, u in each)
+
+
+def _without_idle_factors(
+    compare: Comparison, gains: Mapping[_Choice, float], scene: Any
+) -> dict[_Choice, float]:
+    """Gains of readings whose factor of the amplitude the parameters do not take up as well.
+
+    It has to pay beside the sense of the angles alone, and the likeliest after a fit of both, too: where the
+    scene of the fit is pulled far off, what is linear there is wrong by more than a factor gains.
+    """
+    kept = dict(gains)
+
+    def idle(choice: _Choice, *, refitted: bool) -> bool:
+        joint, chosen = choice
+        alone = [(j, c) for j, c in gains if j == joint[:-1] and {*chosen} <= {*c}]
+        if not refitted:
+            return gains[choice] < max((gains[each] for each in alone), default=0.0) + _DECISIVE
+        fitted = [compare.refitted(*each, scene) for each in (choice, *alone)]
+        return fitted[0] < max(fitted[1:], default=0.0) + _DECISIVE
+
+    for choice in gains:
+        if choice[0][-1] in AMPLITUDES and idle(choice, refitted=False):
+            del kept[choice]
+    for choice in sorted(kept, key=lambda each: -kept[each]):
+        if choice[0][-1] not in AMPLITUDES or kept[choice] < max(kept.values()) - _TELLS:
+            break
+        if len(choice[0]) > 1 and idle(choice, refitted=True):
+            del kept[choice]
+    return kept
 
 
 def _asked(problem: Problem, joint: Joint, chosen: Sequence[int], far: Collection[tuple[str, str]]) -> float:

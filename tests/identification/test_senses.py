@@ -17,8 +17,9 @@ from ringbalance.cli import main
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import problem_of
+from ringbalance.identification.intervals import about_pulls
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.optimisation import optimum
+from ringbalance.identification.optimisation import optimum, optimum_as_stated
 from ringbalance.identification.reading import KINDS
 from ringbalance.identification.readings import Reading, other_readings
 from ringbalance.scene import load_scene
@@ -149,6 +150,33 @@ def test_a_lag_too_near_to_its_ends_leaves_the_sense_undecided(rig_scene: Scene,
     assert told(readings(rig_scene, [counted(made, (True, True, False))])) == (set(), {both})
     alone = {"phases_turned", "weights_turned"}
     assert told(readings(rig_scene, [counted(made, (True, False, False))])) == (alone, alone)
+
+
+def test_a_factor_that_a_fit_takes_up_is_no_part_of_the_sense(paper_scene: Scene) -> None:
+    """Chambers alone turned, on a device other than stated: the wrong fit pulls the held inputs far off."""
+    names = ["influence_coefficient", "lag_angle", "lambda_factor", "bore", "extra_loss"]
+    made = rig(paper_scene, paper_scene.rotor.lag_angle, "ABCDAB", weights=WEIGHTS)
+    problem = problem_of(paper_scene, made, names)
+    truth = problem.scene_at(problem.start + np.array([0, 0.03, -0.03, -0.02, 0]))
+    models, random = Models.of(truth), np.random.default_rng(7)
+    data = []
+    for each in made:
+        change = KINDS[each.kind].predict(truth, each, models)
+        columns = seen(change, each.kind, random)
+        noise = {name: np.full(len(each), 2 * NOISE) for name in columns if name.startswith("amplitude")}
+        right = replace(each.with_columns(**columns), uncertainty=noise)
+        data.append(counted(right, (False, False, True)))
+    problem = problem_of(paper_scene, data, names)
+    best, held = optimum_as_stated(problem, loss="linear", starts=1)
+    best = about_pulls(best, held, scene=paper_scene, loss="linear")
+    assert told(other_readings(best, stated=paper_scene)) == ({"chambers_turned"}, set())
+
+
+def test_doubled_amplitudes_are_named_with_the_sense(rig_scene: Scene) -> None:
+    weights, injections = rig(rig_scene, math.radians(40), "ABCDAB", weights=WEIGHTS)
+    halved = {n: v / 2 for n, v in injections.columns.items() if n.startswith("amplitude")}
+    data = [weights, counted(injections.with_columns(**halved), (False, False, True))]
+    assert told(readings(rig_scene, data)) == ({"chambers_turned+amplitudes_doubled"}, set())
 
 
 def test_weights_on_one_line_do_not_tell_their_sense(rig_scene: Scene) -> None:

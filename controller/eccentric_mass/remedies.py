@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.balancer import Outcomes, Remedy, Settings
+from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.origins import raw_value_at, value_at

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
 from typing import ClassVar, Final
 
@@ -30,6 +29,7 @@ from ringbalance.controller.eccentric_mass.memory import (
     STALLED,
     TOO_SLOW,
 )
+from ringbalance.controller.eccentric_mass.outcome import OF_DRIVES, EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
@@ -54,37 +54,6 @@ _WRONG_MODEL: Final = 1.5
 within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
 
 
-class EccentricOutcome(StrEnum):
-    """How a run ended."""
-
-    SETTLED = "settled"
-    RISES_AGAIN = "rises_again"
-    SATURATED = "saturated"
-    RESIDUAL = "residual"
-    TUNING_TIME = "tuning_time"
-    SPEED_CHANGED = "speed_changed"
-    TOO_SLOW = "too_slow"
-    SPEED_NOT_CONSTANT = "speed_not_constant"
-    MASSES_MOVE = "masses_move"
-    IMBALANCE_UNCERTAIN = "imbalance_uncertain"
-    FRICTION_UNCERTAIN = "friction_uncertain"
-    STALLED = "stalled"
-    NOT_ARRIVED = "not_arrived"
-    TIME_LIMIT = "time_limit"
-    DIVERGED = "diverged"
-    LOCKED = "locked"
-
-
-_OF_DRIVES: Final = frozenset(
-    {
-        EccentricOutcome.TIME_LIMIT,
-        EccentricOutcome.NOT_ARRIVED,
-        EccentricOutcome.MASSES_MOVE,
-        EccentricOutcome.STALLED,
-        EccentricOutcome.FRICTION_UNCERTAIN,
-    }
-)
-"""Ends that drives bring about which are unstable or give more than friction takes."""
 _OFTEN: Final = 0.5
 """Share of a run with a voltage at its limit, beyond which that is what keeps masses from their goals."""
 _RUN_AWAY: Final = 5.0
@@ -374,10 +343,10 @@ class EccentricRun(PresentedResult):
         code = f"masses_{self.outcome.value}"
         if self.outcome is EccentricOutcome.RISES_AGAIN:
             code = "masses_not_kept" if self.left is None else _risen(self, self.left)
-        if self.outcome in _OF_DRIVES and (unstable := next(_unstable(self.scene), None)):
+        if self.outcome in OF_DRIVES and (unstable := next(_unstable(self.scene), None)):
             numbers = {**_numbers(self), **unstable.values}
             return replace(_finding("masses_unstable", numbers), change=unstable.change)
-        if self.outcome in _OF_DRIVES and self.run_away > _RUN_AWAY:
+        if self.outcome in OF_DRIVES and self.run_away > _RUN_AWAY:
             code = "masses_run_away" if self.saturation > _OFTEN * self.end else "masses_turn"
         if self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"

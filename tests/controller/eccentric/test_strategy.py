@@ -9,9 +9,10 @@ import pytest
 from eccentric_runs import bundled, stage_names, stage_of
 
 from ringbalance.controller.eccentric_mass.memory import MEMORY, EccentricMeasurement
+from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step

@@ -143,7 +143,7 @@ class DrawnRuns:
             # The scene as it is has the noise of a single run of it, from the next seed for each number.
             noise = [
                 run_noise(seed, number) if draws.devices else np.random.default_rng(seed + number)
-                for _ in gains
+                for _ in (() if plan.loop["exact"][0] else gains)
             ]
             runs = under.carried(plan, gains, noise=noise)
             for each, run in zip(tried, runs, strict=True):
@@ -232,12 +232,12 @@ class _Under:
     def carried(
         self, plan: LoopPlan, gains: Sequence[float], *, noise: Sequence[np.random.Generator]
     ) -> Records:
-        """Runs to their ends, one for each gain and its random numbers of the sensor."""
+        """Runs to their ends, one for each gain. Args: `noise`: of each sensor; none where it is exact."""
         runs = plan.runs(len(gains))
         runs["speed"], runs["proportional"] = self.device.speed, gains
         runs["gain"] = self.scene.rotor.influence
         runs["residual_fill"] = self.residual
-        plan.carry(runs, [] if plan.loop["exact"][0] else noise)
+        plan.carry(runs, noise)
         return runs
 
 

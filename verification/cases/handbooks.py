@@ -1,0 +1,344 @@
+"""k of the tube by the library `fluids` alone: what a designer without this program would add up.
+
+k = f L/d + K_entrance + sum of K_bend + extra + (K_exit - 1), each part by every method of `fluids` that
+holds there, the tube at rest. The library knows no rotation, and no laminar loss of an entrance or a bend.
+
+A method's range is what its source claims. It is held to that by rules that stood before the numbers:
+
+* friction: the range that `fluids` states, and in it at most 5 % from Colebrook's equation, for which all of
+  them are made to stand;
+* bends: the angles, radii and Re of the source. Crane's are multiples of the friction of commercial steel
+  pipes, from 15 mm on. Miller's chart begins at Re = 1e4, Ito's measurements at 2e4; Swamee's formula knows
+  no Re. So nothing but the program's own formula follows Re below 1e4, and nothing is judged there;
+* an entrance that projects: the methods that need the thickness of the wall, which no scene gives, are asked
+  for a thin edge and for a twentieth of the bore.
+
+What the program itself calculates with is shown among the methods; it is judged by the others alone, by the
+middle between the smallest and the largest, all between being equally likely. A comparison wider than its
+limit would say nothing. Limits: of friction 15 %, what a chart of it claims on a real wall and half as much
+again; of bends 75 %, half the spread of handbooks and the program's own quarter; of k 25 %, where neither a
+bend left out nor an exit counted twice could hide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from fluids.fittings import (
+    bend_rounded,
+    bend_rounded_methods,
+    entrance_distance,
+    entrance_distance_methods,
+    entrance_rounded,
+    entrance_rounded_methods,
+    entrance_sharp,
+    entrance_sharp_methods,
+    exit_normal,
+)
+from fluids.friction import friction_factor, friction_factor_methods
+
+from ringbalance.physics.tube.local_losses import straight_length
+from ringbalance.physics.tube.loss import VELOCITIES, FlowState, model_parts, tube_loss
+from ringbalance.physics.tube.state import TubeState, tube_state_at
+from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
+from ringbalance.results.numbers import MISSING
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Bend, Scene, Tube
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+    Table,
+    figure,
+    from_range,
+)
+from ringbalance.verification.loops import flow_law_of
+
+_JUDGED_FROM: Final = 1e4
+"""Re."""
+_TURBULENT: Final = 4000.0
+_COLEBROOK: Final = 0.05
+"""Largest departure from it, relative."""
+_EDGES: Final = (0.0, 0.05)
+"""Thickness of the wall over the bore."""
+_BENDS: Final[Mapping[str, tuple[float, float, float, float, float]]] = {
+    "Rennels": (0.0, 0.0, 180.0, 0.5, math.inf),
+    "Miller": (1e4, 10.0, 180.0, 0.5, 10.0),
+    "Ito": (2e4, 45.0, 180.0, 1.0, 50.0),
+    "Swamee": (0.0, 0.0, 180.0, 1.0, math.inf),
+}
+"""Smallest Re, angles in degrees from and to, r/d from and to; those of Crane's are for steel pipes alone."""
+_OWN: Final = {"friction": ("Churchill_1977",), "bends": ("Rennels",), "entrance": ("Rennels", "Crane")}
+"""What the program calculates with itself; Crane's entrance is that of a projecting tube."""
+_CAUSES: Final[Mapping[str, tuple[str, ...]]] = {"friction": ("friction correlation",), "bends": ("bends",)}
+"""Of `model_parts`, by part of k."""
+_SHOWN: Final = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+"""m/s."""
+_POINTS: Final = 33
+Parts = dict[str, dict[str, float]]
+"""What each method makes of each part of k, by part and method."""
+
+
+def by_fluids(tube: Tube, reynolds: float, *, without: frozenset[str] = frozenset()) -> Parts:
+    """Parts of k of a tube at rest by every method of `fluids` that holds at a Reynolds number.
+
+    Args: `without`: methods for friction that depart from Colebrook's equation.
+    Raises: ValueError: arcs longer than the tube.
+    """
+    rough = tube.roughness / tube.bore
+    friction = {
+        name: straight_length(tube=tube) / tube.bore * friction_factor(reynolds, rough, Method=name)
+        for name in friction_factor_methods(reynolds, rough)
+        if name not in without and name != "laminar"
+    }
+    if not friction:
+        friction = {"laminar": straight_length(tube=tube) / tube.bore * friction_factor(reynolds, rough)}
+    bends = {
+        name: float(sum(_bend(tube, bend, reynolds, name) for bend in tube.bends))
+        for name in bend_rounded_methods
+        if all(_bend_holds(tube, bend, reynolds, name) for bend in tube.bends)
+    }
+    entrances = {"sharp": _sharp, "rounded": _rounded, "projecting": _projecting}[tube.entrance](tube)
+    # The "+1" of k + 1 is the exit of turbulent flow.
+    return {
+        "friction": friction,
+        "bends": bends,
+        "entrance": dict(entrances),
+        "exit": {"normal": exit_normal() - 1},
+        "extra": {"scene": tube.extra_loss},
+    }
+
+
+def _bend(tube: Tube, bend: Bend, reynolds: float, method: str) -> float:
+    angle = math.degrees(bend.angle)
+    k: float = bend_rounded(
+        Di=tube.bore, angle=angle, rc=bend.radius, Re=reynolds, roughness=tube.roughness, method=method
+    )
+    return k
+
+
+def _bend_holds(tube: Tube, bend: Bend, reynolds: float, method: str) -> bool:
+    if method not in _BENDS:
+        return False
+    least, first, last, tightest, widest = _BENDS[method]
+    angle, radius = math.degrees(bend.angle) / (1 + 1e-9), bend.radius / tube.bore
+    return reynolds >= least and first <= angle <= last and tightest <= radius <= widest
+
+
+def _sharp(_tube: Tube) -> Iterator[tuple[str, float]]:
+    for name in entrance_sharp_methods:
+        yield name, entrance_sharp(method=name)
+
+
+def _rounded(tube: Tube) -> Iterator[tuple[str, float]]:
+    for name in entrance_rounded_methods:
+        yield name, entrance_rounded(Di=tube.bore, rc=tube.entrance_radius, method=name)
+
+
+def _projecting(tube: Tube) -> Iterator[tuple[str, float]]:
+    for name in entrance_distance_methods:
+        for edge in _EDGES if name != "Crane" else (0.0,):
+            k = entrance_distance(Di=tube.bore, t=edge * tube.bore, method=name)
+            yield (name if name == "Crane" else f"{name}, edge {edge:g} d"), k
+
+
+def _departs(tube: Tube, reynolds: FloatArray) -> dict[str, float]:
+    """Methods for friction that leave Colebrook's equation in the range they state, and how far at worst."""
+    rough, worst = tube.roughness / tube.bore, dict[str, float]()
+    for re in map(float, reynolds[reynolds >= _TURBULENT]):
+        exact = friction_factor(re, rough, Method="Clamond")
+        for name in friction_factor_methods(re, rough):
+            away = abs(friction_factor(re, rough, Method=name) / exact - 1)
+            worst[name] = max(away, worst.get(name, 0.0))
+    return {name: away for name, away in worst.items() if away > _COLEBROOK}
+
+
+def _range(parts: Parts, *names: str, others: bool = False) -> tuple[float, float]:
+    """Smallest and largest sum of some parts. Args: `others`: without what the program calculates with."""
+    ends = np.zeros(2)
+    for part in names or parts:
+        known = parts[part]
+        kept = [k for name, k in known.items() if not others or name not in _OWN.get(part, ())]
+        ends += (min(kept), max(kept))
+    return float(ends[0]), float(ends[1])
+
+
+def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """k by `fluids` alone beside the program's, at rest and turning."""
+    tube = replace(scene.tube, drag_coefficient=None)
+    per_velocity = tube.bore / scene.liquid.kinematic_viscosity
+    slowest = max(VELOCITIES[0], _JUDGED_FROM / per_velocity * (1 + 1e-9))
+    if slowest >= VELOCITIES[1]:
+        raise NotRunError(
+            f"up to {VELOCITIES[1]:g} m/s this tube stays below Re = {_JUDGED_FROM:g}, from which on methods of "
+            "`fluids` for bends hold"
+        )
+    if not all(_bend_holds(tube, bend, _JUDGED_FROM, "Miller") for bend in tube.bends):
+        raise NotRunError("a bend lies outside 10 to 180 degrees or 0.5 to 10 bores, where methods hold")
+    velocity = np.geomspace(slowest, VELOCITIES[1], _POINTS)
+    departs = _departs(tube, velocity * per_velocity)
+    without = frozenset(departs)
+    at_rest = _program(tube, velocity * per_velocity, defect)
+    library = [by_fluids(tube, float(re), without=without) for re in at_rest.reynolds]
+    found = {
+        "friction": _worst(tube, at_rest, library, "friction"),
+        "bends": _worst(tube, at_rest, library, "bends"),
+        "k": _worst(tube, at_rest, library),
+    }
+    turning = replace(scene, tube=tube)
+    return Evidence(
+        found=found,
+        numbers=_numbers(turning, slowest, without),
+        series=(_figure(turning, without),),
+        tables=(_over_velocity(turning, without), _methods(tube, float(at_rest.reynolds[-1]), departs)),
+    )
+
+
+def _program(tube: Tube, reynolds: FloatArray, defect: str | None) -> TubeState:
+    """The program's terms of the tube at rest."""
+    state = tube_state_at(tube=tube, reynolds=reynolds, rotation_reynolds=np.zeros(reynolds.shape))
+    terms = dict(state.terms)
+    if defect == "fanning_factor":
+        terms["friction"] = terms["friction"] / 4
+    elif defect == "bend_left_out":
+        terms["bends"] = terms["bends"] - state.bends[-1]
+    elif defect == "exit_counted_twice":
+        terms["exit"] = terms["exit"] + 1
+    return replace(state, terms=terms)
+
+
+def _half_width(tube: Tube, state: TubeState, *causes: str) -> FloatArray:
+    """Expanded uncertainty (95 %) of the program's k at rest, or of some of its parts, by its models."""
+    parts = model_parts(tube=tube, state=state)
+    return np.asarray(np.sqrt(sum(parts[cause] ** 2 for cause in causes or parts)))
+
+
+def _worst(tube: Tube, state: TubeState, library: list[Parts], part: str = "") -> Found:
+    """The program's number where it departs most from the library's, in units of what both leave open."""
+    number = state.terms[part] if part else state.k
+    width = _half_width(tube, state, *_CAUSES.get(part, ()))
+    names = (part,) if part else ()
+    found = [
+        Found.within(value, half).against(Reference(value=sum(ends) / 2, uncertainty=from_range(ends)))
+        for value, half, ends in zip(
+            number, width, (_range(each, *names, others=True) for each in library), strict=True
+        )
+    ]
+    return max(found, key=_departure)
+
+
+def _departure(found: Found) -> float:
+    reference = found.reference or Reference(value=0.0)
+    both = found.compared(reference)
+    return abs(both.error) / both.half_width
+
+
+def _running(scene: Scene, slowest: float) -> float:
+    """Velocity at equal fills under the scene's gas, m/s, within what is judged."""
+    law = flow_law_of(scene)
+    flow = law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=scene.gas.pressure, primed=True)
+    return float(np.clip(flow.velocity, slowest, VELOCITIES[1]))
+
+
+def _numbers(scene: Scene, slowest: float, without: frozenset[str]) -> dict[str, float]:
+    """At the velocity of equal fills, for the text."""
+    tube, velocity = scene.tube, _running(scene, slowest)
+    loss = tube_loss(scene, np.array([velocity]))
+    at_rest = _program(tube, loss.reynolds, None)
+    parts = by_fluids(tube, float(loss.reynolds[0]), without=without)
+    low, high = _range(parts)
+    return {
+        "velocity": velocity,
+        "reynolds": loss.reynolds[0],
+        "k_low": low,
+        "k_high": high,
+        "k_rest": at_rest.k[0],
+        "k_rest_half_width": _half_width(tube, at_rest)[0],
+        "k": loss.k.value[0],
+        "k_half_width": loss.k.uncertainty[0],
+        "rotation": loss.k.value[0] - at_rest.k[0],
+        "times_50": PAPER_DRAG_COEFFICIENT / high,
+        "frictions": len(parts["friction"]),
+        "bends": len(parts["bends"]),
+        "entrances": len(parts["entrance"]),
+        "left_out": len(without),
+    }
+
+
+def _spread(scene: Scene, reynolds: FloatArray, without: frozenset[str]) -> FloatArray:
+    """Smallest and largest k by the library at each Re, shape (2, n)."""
+    ends = [_range(by_fluids(scene.tube, float(re), without=without)) for re in reynolds]
+    return np.array(ends).T
+
+
+def _figure(scene: Scene, without: frozenset[str]) -> Series:
+    loss = tube_loss(scene, np.geomspace(*VELOCITIES, _POINTS))
+    low, high = _spread(scene, loss.reynolds, without)
+    fifty = np.full(low.shape, PAPER_DRAG_COEFFICIENT)
+    return figure(
+        "k of the tube by the library and by the program",
+        ("velocity", "m/s", loss.velocity),
+        Curve("fluids, all methods", "1", (low + high) / 2, "reference", (high - low) / 2),
+        Curve("program, at rest", "1", _program(scene.tube, loss.reynolds, None).k, "points"),
+        Curve("program, turning", "1", loss.k.value, uncertainty=loss.k.uncertainty),
+        Curve("50", "1", fifty, "paper"),
+        log=True,
+    )
+
+
+def _over_velocity(scene: Scene, without: frozenset[str]) -> Table:
+    loss = tube_loss(scene, np.array(_SHOWN))
+    low, high = _spread(scene, loss.reynolds, without)
+    columns = {
+        "velocity": loss.velocity,
+        "Reynolds number": loss.reynolds,
+        "fluids, least": low,
+        "fluids, most": high,
+        "program, at rest": _program(scene.tube, loss.reynolds, None).k,
+        "program, turning": loss.k.value,
+        "half-width": loss.k.uncertainty,
+    }
+    elements = "finite elements"
+    return Table(
+        name="k over velocity; below Re = 10,000 bends by the library are outside what was measured",
+        columns={
+            **{name: values.tolist() for name, values in columns.items()},
+            "program by": [elements if s == FlowState.LAMINAR else "correlations" for s in loss.flow_state],
+        },
+        units={"velocity": "m/s"},
+    )
+
+
+def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> Table:
+    """Every method of the library at one Re, those left out with the reason."""
+    parts, rough = by_fluids(tube, reynolds, without=frozenset(departs)), tube.roughness / tube.bore
+    rows = [
+        (part, name, k, "the program’s own" if name in _OWN.get(part, ()) else "")
+        for part in ("friction", "bends", "entrance")
+        for name, k in parts[part].items()
+    ]
+    stated = friction_factor_methods(reynolds, rough)
+    for name in friction_factor_methods(reynolds, rough, check_ranges=False):
+        if name in departs:
+            why = f"left out: {100 * departs[name]:.0f} % from Colebrook’s equation"
+            rows.append(("friction", name, MISSING, why))
+        elif name not in stated:
+            rows.append(("friction", name, MISSING, "left out: beyond its stated Re or roughness"))
+    for name in bend_rounded_methods:
+        if name not in parts["bends"]:
+            steel = "left out: friction of steel pipes from 15 mm on, for all bores"
+            why = "left out: beyond the angles, radii or Re of its source" if name in _BENDS else steel
+            rows.append(("bends", name, MISSING, why))
+    heads = ("part", "method", "share of k", "remark")
+    return Table(
+        name=f"methods of fluids at Re = {reynolds:,.0f}",
+        columns=dict(zip(heads, map(list, zip(*rows, strict=True)), strict=True)),
+    )

@@ -20,7 +20,7 @@ from ringbalance.controller.judging.tuning import (
     plain_settings,
     required_document,
 )
-from ringbalance.reports.prose import key_words
+from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.results.rows import Finding
@@ -148,8 +148,7 @@ def _remedy(row: Record) -> str:
     """The change of the scene in words."""
     changes = [f"{key_words(path)} {setting_text(path, value)}" for path, value in row["changes"].items()]
     # What a sensor does, a filter may be told in a key of the same name.
-    text = ", ".join(dict.fromkeys(changes))
-    return f"{text[0].upper()}{text[1:]}"
+    return opening(", ".join(dict.fromkeys(changes)))
 
 
 def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:

@@ -93,6 +93,12 @@ def typeset(text: str) -> str:
     return raised
 
 
+def opening(text: str) -> str:
+    """A text as it begins a sentence; a symbol at its head, such as k, stays as it is."""
+    first = text.partition(" ")[0]
+    return text if len(first) == 1 and first != "a" else f"{text[0].upper()}{text[1:]}"
+
+
 def key_words(path: str) -> str:
     """The key of a path in the scene file as a reader knows it, such as "siphon crest radius"."""
     if path == FITTED:

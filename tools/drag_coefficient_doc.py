@@ -16,7 +16,7 @@ from ringbalance.reports.pages.drag_map import DragMap, read_by_eq_18
 from ringbalance.reports.section import Record, Work
 from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.runner import paper_scene
+from ringbalance.verification.runner import paper_scene, run_case
 
 _VISCOSITIES: Final = (0.7e-6, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)
 _BORES: Final = np.geomspace(0.2e-3, 5e-3, 61)
@@ -32,6 +32,7 @@ def document_tables() -> dict[str, str]:
         "liquids": _liquids_table(found["liquids"]),
         "bores": _bores_table(calibration),
         "rule": rule(calibration),
+        "library": _library_table(),
         "hidden": _hidden_table(found["separated"]["velocity_of_50_m_s"], calibration),
     }
 
@@ -91,6 +92,27 @@ def rule(calibration: Calibration) -> str:
         f"From 5 to 100 mm²/s the line k = 50 follows ν/d² = {low} to {high} mm²/s per mm² of bore squared, "
         f"for this length of 120 mm and the {speed} m/s that 0.7 MPa gives water’s density at k = 50."
     )
+
+
+def _library_table() -> str:
+    """k by the library `fluids` alone and by the program, over the velocity."""
+    evidence = run_case("k_by_fluids", scene=paper_scene()).evidence
+    assert evidence is not None
+    heads = ("velocity", "Re", "`fluids`, at rest", "program, at rest", "program, turning", "by")
+    rows = [
+        (
+            shown(velocity, "m/s", digits=2),
+            f"{reynolds:,.0f}",
+            f"{number(low, digits=3)} to {number(high, digits=3)}",
+            number(rest, digits=3),
+            measured(turning, width),
+            by,
+        )
+        for velocity, reynolds, low, high, rest, turning, width, by in zip(
+            *evidence.tables[0].columns.values(), strict=True
+        )
+    ]
+    return markdown(heads, rows)
 
 
 def _velocity_at_fifty(calibration: Calibration) -> FloatArray:

@@ -19,6 +19,7 @@ CASES: Final = {
     "claim_09_drag_coefficient",
     "claim_10_working_pressure",
     "bent_tube_3d",
+    "k_by_fluids",
     "extremes",
     "manufactured_2d",
     "measured_smooth_tubes",

@@ -25,7 +25,7 @@ from ringbalance.reports.figure import (
     line,
     logarithmic,
 )
-from ringbalance.reports.prose import equation_svg, input_name, typeset
+from ringbalance.reports.prose import equation_svg, input_name, opening, typeset
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import marked, printed
 from ringbalance.results.numbers import (
@@ -266,7 +266,7 @@ def _series_plot(name: str, series: Record) -> Drawing:
         name,
         *paints,
         x=(typeset(x["name"]), x["unit"].replace("*", " ")),
-        y=(title[:1].upper() + title[1:] if len(title) < _LONGEST_LABEL else "", curves[0]["unit"]),
+        y=(opening(title) if len(title) < _LONGEST_LABEL else "", curves[0]["unit"]),
     )
 
 
@@ -371,8 +371,7 @@ def _trade(trade: Record, evidence: Record) -> Record:
 
 def _quantity(quantity: Record, times: Record) -> Record:
     table = models_table(quantity, times)
-    title = quantity["title"][0].upper() + quantity["title"][1:]
-    return {"title": title, "status": table.note, "models": table}
+    return {"title": opening(quantity["title"]), "status": table.note, "models": table}
 
 
 TRADE: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_trade)

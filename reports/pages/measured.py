@@ -19,6 +19,7 @@ from ringbalance.reports.figure import (
     draw,
     line,
 )
+from ringbalance.reports.prose import opening
 from ringbalance.reports.section import Record, Section
 from ringbalance.results.numbers import rounded
 from ringbalance.scene.describe import usual_name
@@ -37,7 +38,7 @@ def _sentence(text: str, found: Record) -> str:
     for each in found["quantities"]:
         if "_" in each["quantity"]:
             text = text.replace(each["quantity"], usual_name(each["quantity"]))
-    return f"{text[0].upper()}{text[1:]}.".replace(" -", " \N{MINUS SIGN}")
+    return f"{opening(text)}.".replace(" -", " \N{MINUS SIGN}")
 
 
 SECTION: Final = Section(name="measured", title="Measurements and fit", show=_show, always=True)

@@ -119,12 +119,16 @@ def _bend(**numbers: Any) -> tuple[float, float]:
     return float(bend_loss(**numbers)), float(bend_uncertainty(**numbers))
 
 
-def test_a_turbulent_bend_is_the_librarys() -> None:
-    bend = Bend(angle=math.pi / 2, radius=3e-3)
-    k, width = _bend(bend=bend, bore=1.5e-3, friction_factor=0.02, reynolds=1e5)
-    expected = bend_rounded(Di=1.5e-3, angle=90.0, rc=3e-3, fd=0.02)
-    assert float(k) == pytest.approx(expected, rel=1e-3)
-    assert float(width) == pytest.approx(0.25 * expected, rel=1e-3)
+@pytest.mark.parametrize("angle", [1.0, 30.0, 90.0, 135.0, 180.0])
+@pytest.mark.parametrize("radius", [0.5, 1.0, 2.0, 20.0])
+def test_a_turbulent_bend_is_the_librarys(angle: float, radius: float) -> None:
+    """The array form of its formula, over all of its range."""
+    friction, bore = np.geomspace(0.008, 0.1, 9), 1.5e-3
+    bend = Bend(angle=math.radians(angle), radius=radius * bore)
+    numbers: Any = {"bend": bend, "bore": bore, "friction_factor": friction, "reynolds": 1e9}
+    expected = [bend_rounded(Di=bore, angle=angle, rc=radius * bore, fd=f) for f in friction]
+    np.testing.assert_allclose(bend_loss(**numbers), expected, rtol=1e-9)
+    np.testing.assert_allclose(bend_uncertainty(**numbers), 0.25 * np.array(expected), rtol=1e-9)
 
 
 @pytest.mark.parametrize("turns", [1.5, 2.0, 5.0])

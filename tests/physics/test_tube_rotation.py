@@ -179,11 +179,13 @@ def test_literature_turbulent_formula_of_ito_and_nanbu() -> None:
     assert float(below) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_literature_curved_tube_of_mori_and_nakayama() -> None:
-    re, ratio_of_diameters = 2e4, 0.05
-    published = helical_turbulent_fd_Mori_Nakayama(re, 1.0, 1 / ratio_of_diameters)
-    found = float(_curved_friction_ratio(curvature_number=re * ratio_of_diameters**2))
-    assert found == pytest.approx(published / (0.3164 * re**-0.25), rel=1e-9)
+@pytest.mark.parametrize("ratio_of_diameters", [0.02, 0.05, 0.2])
+def test_literature_curved_tube_of_mori_and_nakayama(ratio_of_diameters: float) -> None:
+    """The array form of the library's formula, where its T is above one."""
+    re = np.geomspace(1.01 / ratio_of_diameters**2, 1e6, 30)
+    published = [helical_turbulent_fd_Mori_Nakayama(r, 1.0, 1 / ratio_of_diameters) for r in re]
+    found = _curved_friction_ratio(curvature_number=re * ratio_of_diameters**2)
+    np.testing.assert_allclose(found, published / (0.3164 * re**-0.25), rtol=1e-9)
 
 
 def test_turbulent_half_width_reaches_from_no_effect_to_the_curved_tube() -> None:

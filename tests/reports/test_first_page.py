@@ -11,6 +11,7 @@ import pytest
 from ringbalance.reports.judged import settings_lines
 from ringbalance.reports.page import terminal_lines
 from ringbalance.reports.pages.first_page import SECTION, SETTINGS, _requirement_record
+from ringbalance.reports.prose import opening
 from ringbalance.scene import Scene
 from ringbalance.scene.toml import read_toml
 
@@ -173,3 +174,27 @@ def test_what_is_met_without_uncertainties_is_met_if_the_parts_are_exact(
     assert "if the parts are exact" not in said(evidence, "summary")
     evidence["scene"]["states_uncertainty"] = False
     assert "met if the parts are exact" in said(evidence, "summary")
+
+
+def test_page_one_answers_the_papers_question_by_the_library_too(evidence: Record, said: Said) -> None:
+    names = {
+        "claim_06": "claim_06_wall_pressure",
+        "claim_09": "claim_09_drag_coefficient",
+        "claim_11": "claim_11_lambda",
+    }
+    cases = evidence["verification"]
+    for case in cases:
+        case["id"] = names.get(case["id"], case["id"])
+    assert "library" not in said(evidence, "summary")
+    cases.append(
+        {**cases[-1], "id": "k_by_fluids", "numbers": {"k_low": 2.9, "k_high": 3.2}, "verdict": "passed"}
+    )
+    verdict = next(case["verdict"] for case in cases if case["id"] == names["claim_09"])
+    row = "k of this tube at rest, by the formulas of the library fluids alone | about 50 | 2.90 to 3.20 | "
+    assert row + verdict in said(evidence, "summary")
+
+
+def test_a_symbol_at_the_head_of_a_caption_stays_as_it_is() -> None:
+    assert opening("k against the velocity") == "k against the velocity"
+    assert opening("a tube") == "A tube"
+    assert opening("loss") == "Loss"

@@ -16,14 +16,14 @@ A method's range is what its source claims. It is held to that by rules that sto
 What the program itself calculates with is shown among the methods; it is judged by the others alone, by the
 middle between the smallest and the largest, all between being equally likely. A comparison wider than its
 limit would say nothing. Limits: of friction 15 %, what a chart of it claims on a real wall and half as much
-again; of bends 75 %, half the spread of handbooks and the program's own quarter; of k 25 %, where neither a
-bend left out nor an exit counted twice could hide.
+again; of bends 75 %, half the spread of handbooks and the program's own quarter; of k 25 %, in which an exit
+counted twice could not hide where k is below 4.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -44,9 +44,12 @@ from fluids.friction import friction_factor, friction_factor_methods
 from ringbalance.physics.tube.local_losses import straight_length
 from ringbalance.physics.tube.loss import VELOCITIES, FlowState, model_parts, tube_loss
 from ringbalance.physics.tube.state import TubeState, tube_state_at
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.results.numbers import MISSING
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Bend, Scene, Tube
 from ringbalance.verification.evidence import (
     Curve,
@@ -60,7 +63,6 @@ from ringbalance.verification.evidence import (
     figure,
     from_range,
 )
-from ringbalance.verification.loops import flow_law_of
 
 _JUDGED_FROM: Final = 1e4
 """Re."""
@@ -76,8 +78,12 @@ _BENDS: Final[Mapping[str, tuple[float, float, float, float, float]]] = {
     "Swamee": (0.0, 0.0, 180.0, 1.0, math.inf),
 }
 """Smallest Re, angles in degrees from and to, r/d from and to; those of Crane's are for steel pipes alone."""
-_OWN: Final = {"friction": ("Churchill_1977",), "bends": ("Rennels",), "entrance": ("Rennels", "Crane")}
-"""What the program calculates with itself; Crane's entrance is that of a projecting tube."""
+_OWN: Final = {
+    "friction": ("Churchill_1977",),
+    "bends": ("Rennels",),
+    "entrance": ("Rennels", "Crane, any edge"),
+}
+"""What the program calculates with itself."""
 _CAUSES: Final[Mapping[str, tuple[str, ...]]] = {"friction": ("friction correlation",), "bends": ("bends",)}
 """Of `model_parts`, by part of k."""
 _SHOWN: Final = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
@@ -106,12 +112,11 @@ def by_fluids(tube: Tube, reynolds: float, *, without: frozenset[str] = frozense
         for name in bend_rounded_methods
         if all(_bend_holds(tube, bend, reynolds, name) for bend in tube.bends)
     }
-    entrances = {"sharp": _sharp, "rounded": _rounded, "projecting": _projecting}[tube.entrance](tube)
     # The "+1" of k + 1 is the exit of turbulent flow.
     return {
         "friction": friction,
         "bends": bends,
-        "entrance": dict(entrances),
+        "entrance": _entrances(tube),
         "exit": {"normal": exit_normal() - 1},
         "extra": {"scene": tube.extra_loss},
     }
@@ -133,21 +138,20 @@ def _bend_holds(tube: Tube, bend: Bend, reynolds: float, method: str) -> bool:
     return reynolds >= least and first <= angle <= last and tightest <= radius <= widest
 
 
-def _sharp(_tube: Tube) -> Iterator[tuple[str, float]]:
-    for name in entrance_sharp_methods:
-        yield name, entrance_sharp(method=name)
-
-
-def _rounded(tube: Tube) -> Iterator[tuple[str, float]]:
-    for name in entrance_rounded_methods:
-        yield name, entrance_rounded(Di=tube.bore, rc=tube.entrance_radius, method=name)
-
-
-def _projecting(tube: Tube) -> Iterator[tuple[str, float]]:
-    for name in entrance_distance_methods:
-        for edge in _EDGES if name != "Crane" else (0.0,):
-            k = entrance_distance(Di=tube.bore, t=edge * tube.bore, method=name)
-            yield (name if name == "Crane" else f"{name}, edge {edge:g} d"), k
+def _entrances(tube: Tube) -> dict[str, float]:
+    bore = tube.bore
+    if tube.entrance == "sharp":
+        return {name: entrance_sharp(method=name) for name in entrance_sharp_methods}
+    if tube.entrance == "rounded":
+        radius = tube.entrance_radius
+        return {name: entrance_rounded(bore, radius, method=name) for name in entrance_rounded_methods}
+    thick = {
+        f"{name}, edge {edge:g} d": entrance_distance(bore, edge * bore, method=name)
+        for name in entrance_distance_methods
+        for edge in _EDGES
+        if name != "Crane"
+    }
+    return {**thick, "Crane, any edge": entrance_distance(bore, method="Crane")}
 
 
 def _departs(tube: Tube, reynolds: FloatArray) -> dict[str, float]:
@@ -178,8 +182,8 @@ def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     slowest = max(VELOCITIES[0], _JUDGED_FROM / per_velocity * (1 + 1e-9))
     if slowest >= VELOCITIES[1]:
         raise NotRunError(
-            f"up to {VELOCITIES[1]:g} m/s this tube stays below Re = {_JUDGED_FROM:g}, from which on methods of "
-            "`fluids` for bends hold"
+            f"up to {VELOCITIES[1]:g} m/s this tube stays below Re = {_JUDGED_FROM:,.0f}, "
+            "from which on methods of fluids for bends hold"
         )
     if not all(_bend_holds(tube, bend, _JUDGED_FROM, "Miller") for bend in tube.bends):
         raise NotRunError("a bend lies outside 10 to 180 degrees or 0.5 to 10 bores, where methods hold")
@@ -208,8 +212,8 @@ def _program(tube: Tube, reynolds: FloatArray, defect: str | None) -> TubeState:
     terms = dict(state.terms)
     if defect == "fanning_factor":
         terms["friction"] = terms["friction"] / 4
-    elif defect == "bend_left_out":
-        terms["bends"] = terms["bends"] - state.bends[-1]
+    elif defect == "bends_left_out":
+        terms["bends"] = np.zeros(reynolds.shape)
     elif defect == "exit_counted_twice":
         terms["exit"] = terms["exit"] + 1
     return replace(state, terms=terms)
@@ -243,9 +247,10 @@ def _departure(found: Found) -> float:
 
 def _running(scene: Scene, slowest: float) -> float:
     """Velocity at equal fills under the scene's gas, m/s, within what is judged."""
-    law = flow_law_of(scene)
-    flow = law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=scene.gas.pressure, primed=True)
-    return float(np.clip(flow.velocity, slowest, VELOCITIES[1]))
+    tube = TubeFlow.of(Designs(scene=scene, size=1))
+    level = chamber_pressure(scene=scene, fill_ratio=np.array([scene.disc.max_fill_ratio / 2]))
+    flow = tube.flow(tube.ends(level, level), primed=True)
+    return float(np.clip(flow.velocity[0], slowest, VELOCITIES[1]))
 
 
 def _numbers(scene: Scene, slowest: float, without: frozenset[str]) -> dict[str, float]:
@@ -284,7 +289,7 @@ def _figure(scene: Scene, without: frozenset[str]) -> Series:
     low, high = _spread(scene, loss.reynolds, without)
     fifty = np.full(low.shape, PAPER_DRAG_COEFFICIENT)
     return figure(
-        "k of the tube by the library and by the program",
+        "loss coefficient by the library and by the program",
         ("velocity", "m/s", loss.velocity),
         Curve("fluids, all methods", "1", (low + high) / 2, "reference", (high - low) / 2),
         Curve("program, at rest", "1", _program(scene.tube, loss.reynolds, None).k, "points"),
@@ -308,7 +313,7 @@ def _over_velocity(scene: Scene, without: frozenset[str]) -> Table:
     }
     elements = "finite elements"
     return Table(
-        name="k over velocity; below Re = 10,000 bends by the library are outside what was measured",
+        name="loss coefficient over velocity; below Re = 10,000 no measured bend stands behind the library's",
         columns={
             **{name: values.tolist() for name, values in columns.items()},
             "program by": [elements if s == FlowState.LAMINAR else "correlations" for s in loss.flow_state],
@@ -320,7 +325,7 @@ def _over_velocity(scene: Scene, without: frozenset[str]) -> Table:
 def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> Table:
     """Every method of the library at one Re, those left out with the reason."""
     parts, rough = by_fluids(tube, reynolds, without=frozenset(departs)), tube.roughness / tube.bore
-    rows = [
+    rows: list[tuple[str, str, float | str, str]] = [
         (part, name, k, "the program’s own" if name in _OWN.get(part, ()) else "")
         for part in ("friction", "bends", "entrance")
         for name, k in parts[part].items()
@@ -330,7 +335,7 @@ def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> Table
         if name in departs:
             why = f"left out: {100 * departs[name]:.0f} % from Colebrook’s equation"
             rows.append(("friction", name, MISSING, why))
-        elif name not in stated:
+        elif name not in stated and name != "laminar":
             rows.append(("friction", name, MISSING, "left out: beyond its stated Re or roughness"))
     for name in bend_rounded_methods:
         if name not in parts["bends"]:

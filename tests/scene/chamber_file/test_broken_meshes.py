@@ -14,6 +14,8 @@ import pytest
 from drawn_chamber import CHAMBER, Drawing, Element, drawn, inp, loaded, msh_2, msh_4, without
 
 from ringbalance.scene import Scene, SceneError
+from ringbalance.scene.chamber_file.body import Body
+from ringbalance.scene.chamber_file.soundness import oriented
 
 
 class Broken(NamedTuple):
@@ -489,3 +491,18 @@ def test_all_errors_are_reported_together(tmp_path: Path) -> None:
 
 def test_nothing_is_said_of_a_sound_mesh(tmp_path: Path) -> None:
     assert isinstance(loaded(tmp_path, msh_2(drawn())), Scene)
+
+
+@pytest.mark.parametrize(("height", "faults"), [(0.9e-9, 1), (1.5e-9, 0)])
+def test_a_cell_has_no_volume_below_a_billionth_of_its_cubed_size(height: float, faults: int) -> None:
+    body = Body(
+        kind="tetra",
+        points=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, height]]),
+        cells=np.array([[0, 1, 2, 3]]),
+        cell_names=(),
+        named=(),
+        lesser=(),
+        other_names=(),
+        drawing=np.array([], dtype=np.int64),
+    )
+    assert len(oriented(body)[1]) == faults

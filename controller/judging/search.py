@@ -126,6 +126,10 @@ class Tried:
         """By which so many devices have settled, s."""
         return float(np.sort(self.judgement.outcomes.settling_time)[max(count, 1) - 1])
 
+    def replaces(self, scenes: Tried) -> bool:
+        """Whether it is taken in place of the best of the scene's kind of controller."""
+        return self.fraction - scenes.fraction >= _MORE
+
 
 _Ran = dict[object, Tried | None]
 """What candidates came to, by key; None: not on every device."""
@@ -149,10 +153,15 @@ def search(
     return _ordered([each for each in best if each is not None], trials)
 
 
-def _ordered(found: Sequence[Tried], trials: Sequence[Trials]) -> tuple[Tried, ...]:
+def _ordered(best: Iterable[Tried], trials: Sequence[Trials]) -> tuple[Tried, ...]:
     """The best of every kind of controller, the kind to take first."""
-    own = trials[0].kind
-    return tuple(sorted(found, key=lambda each: -each.fraction - _MORE * (each.candidate.trials.kind == own)))
+    every = tuple(best)
+    scenes = next((each for each in every if each.candidate.trials.kind == trials[0].kind), None)
+
+    def order(each: Tried) -> tuple[bool, bool, float]:
+        return scenes is not None and not each.replaces(scenes), each is not scenes, -each.fraction
+
+    return tuple(sorted(every, key=order))
 
 
 def _best_of(
@@ -210,11 +219,15 @@ def _final(balancer: Balancer, tried: Sequence[Tried]) -> Tried | None:
     best = chosen(tried)
     if best is None or best.count == 0:
         return best
-    last = _finalists(tried, best)
+    return chosen(_on_more(balancer, _finalists(tried, best)))
+
+
+def _on_more(balancer: Balancer, tried: Sequence[Tried]) -> list[Tried]:
+    """On the devices that choose between the last few, too."""
     first, end = _FINAL
-    settings = [each.judgement.settings for each in last]
-    ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False))
-    return chosen(each.joined(outcomes) for each, outcomes in zip(last, ran, strict=True))
+    settings = [each.judgement.settings for each in tried]
+    ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False)) if tried else ()
+    return [each.joined(outcomes) for each, outcomes in zip(tried, ran, strict=True)]
 
 
 def _finalists(tried: Sequence[Tried], best: Tried) -> list[Tried]:
@@ -272,6 +285,12 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | N
 
 def _worse(each: Tried, best: BoolArray) -> bool:
     return Paired.of(best, each.judgement.meets).better(_BEHIND) == 0
+
+
+def _decided(tried: Iterable[Tried]) -> bool:
+    """Whether all but the best are surely worse than it."""
+    best = sorted(tried, key=lambda each: -each.fraction)
+    return all(_worse(each, best[0].judgement.meets) for each in best[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -351,6 +370,8 @@ class _Levels:
     """By place of another level and kind of controller: what ran there."""
     serving: dict[int, dict[str, Tried]] = field(default_factory=dict)
     """Likewise the best of it, where that serves any device."""
+    more: dict[object, Tried] = field(default_factory=dict)
+    """By key: the best of kinds between which the devices of the search do not decide, on more devices."""
 
     def add(self, places: Sequence[int]) -> None:
         """Search levels from what serves at the nearest; then each from both beside it."""
@@ -418,7 +439,8 @@ class _Levels:
         fractions = {each: best[own].fraction for each in known if own in (best := self._serving(each))}
         if near is None or fractions.get(at, 0.0) >= asked:
             return fractions.get(at, 0.0) >= asked
-        no_more = self._serving(near)[kind].fraction <= fractions.get(near, 0.0) + _MORE
+        there = self._compared(near)
+        no_more = own in there and not there[kind].replaces(there[own])
         between = (each for each in known if min(at, near) <= each <= max(at, near))
         return no_more and all(fractions.get(each, 0.0) < asked for each in between)
 
@@ -427,11 +449,20 @@ class _Levels:
         settings: dict[int, Settings] = {}
         for at in self._known:
             level = self.axis.levels[at]
-            best = _ordered(list(self._serving(at).values()), self.trials)
+            best = _ordered(self._compared(at).values(), self.trials)
             asked = (best[0].candidate.at(level).settings if best else None) or {self.axis.name: level}
             if at not in before or before[at].judgement.settings != asked:
                 settings[at] = asked
         return _answered(self.balancer, settings, self.axis)
+
+    def _compared(self, at: int) -> dict[str, Tried]:
+        """What serves at a level; on more devices where those of the search do not decide between kinds."""
+        serving = self._serving(at)
+        if at not in self.searched and not _decided(serving.values()):
+            near = [each for each in serving.values() if each.candidate.key not in self.more]
+            self.more.update((each.candidate.key, each) for each in _on_more(self.balancer, near))
+            return {kind: self.more[each.candidate.key] for kind, each in serving.items()}
+        return serving
 
 
 def _answered(balancer: Balancer, settings: Mapping[int, Settings], axis: Axis) -> dict[int, Along]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -172,6 +172,32 @@ def test_what_is_chosen_is_judged_on_devices_that_chose_nothing(paper_scene: Sce
     missed = {each.changes["tube.bore"] for each in others if not each.met}
     assert missed
     assert not beside & missed
+
+
+@dataclass(frozen=True, eq=False)
+class TwoKinds(Machine):
+    """A second kind of controller serves twice as many devices, and as many of the first 32."""
+
+    def trials(self) -> tuple[Trials, ...]:
+        (toy,) = super().trials()
+
+        def settings(point: Mapping[str, float]) -> Mapping[str, Any]:
+            return {**(toy.settings(point) or {}), "controller.kind": "second"}
+
+        return toy, Trials(kind="second", axes=toy.axes, settings=settings, along=toy.along)
+
+    def _outcomes(self, settings: Mapping[str, Any], draws: Draws) -> Outcomes:
+        outcomes, numbers = super()._outcomes(settings, draws), np.array(draws.numbers)
+        served = (numbers < 32) | (numbers % 2 == 0) | (settings.get("controller.kind") == "second")
+        return replace(outcomes, settling_time=np.where(served, outcomes.settling_time, math.inf))
+
+
+def test_kinds_of_controller_that_few_devices_do_not_tell_apart_run_on_more(paper_scene: Scene) -> None:
+    """Not only at the level to take: at every one of the curve the kind that serves more answers."""
+    curve = curve_of(TwoKinds(at(paper_scene, 0.62), needs=0.8))
+    serving = [each.judgement for each in curve if each.judgement.fraction.count]
+    assert len(serving) >= 6
+    assert all(each.settings["controller.kind"] == "second" for each in serving)
 
 
 def test_a_remedy_names_the_pressure_that_goes_with_it(paper_scene: Scene) -> None:

@@ -180,7 +180,7 @@ class Outcomes:
             as drawn, for each. `trace`: whether the runs are kept.
         """
         return cls(
-            **{name: np.array([getattr(each, name) for each in results]) for name in _ARRAYS},
+            **{name: np.array([getattr(each, name) for each in results]) for name in ARRAYS},
             ended=tuple(each.ended for each in results),
             numbers=numbers,
             inputs={name: np.array([each[name] for each in inputs]) for name in inputs[0]},
@@ -191,7 +191,7 @@ class Outcomes:
     def joined(self, more: Outcomes) -> Outcomes:
         """These draws and further ones."""
         return Outcomes(
-            **{name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in _ARRAYS},
+            **{name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in ARRAYS},
             ended=self.ended + more.ended,
             numbers=self.numbers + more.numbers,
             inputs={name: np.concatenate([at, more.inputs[name]]) for name, at in self.inputs.items()},
@@ -200,7 +200,8 @@ class Outcomes:
         )
 
 
-_ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
+ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
+"""Of `Outcomes`."""
 
 
 @dataclass(frozen=True, kw_only=True)

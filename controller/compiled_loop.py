@@ -1,15 +1,12 @@
 """The closed loop in plain numbers: sample, command, gas on, gas off, wait, sample again.
 
-One source for one run and for a thousand: runs are continued sample by sample, so that between two samples
-Python can look at a run, note its trace, or be its sensor and its algorithm.
+One source for one run and for a thousand: runs are continued up to a sample, so that between two samples
+Python can be a run's sensor and its algorithm.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
-
-import numpy.typing as npt
 
 from ringbalance.controller.algorithms.built_in import target_vector_step, trial_step
 from ringbalance.controller.algorithms.law_based import law_based_step
@@ -49,46 +46,44 @@ from ringbalance.scene.platform.compiled import in_place
 
 @in_place
 def continue_runs(
-    loop: Record,
-    plant: Record,
+    loops: Record,
+    plants: Record,
     assumed: Record,
     runs: Record,
     motions: Record,
     liquid: Record,
-    noise: npt.NDArray[Any],
+    noise: FloatArray,
+    until: int,
     instants: FloatArray,
     injections: Record,
     samples: Record,
     notes: FloatArray,
     w: FloatArray,
 ) -> None:
-    """Continue each run by as many samples as there is noise for, unless it ends.
+    """Continue each run up to some samples, unless it ends.
 
     Args:
-        loop: of type `LOOP`. plant: of type `PLANT`.
-        assumed: the same as the law-based algorithm has it; the others do not look at it.
-        runs: of type `RUN`, shape (n,), changed.
+        loops: one for each of some settings, type `LOOP`. plants: one for each device, type `PLANT`.
+        assumed: the device as the law-based algorithm has it; the others do not look at it.
+        runs: of type `RUN`, shape (n,), changed; each names its settings and its device.
         motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the pairs as they are and, with
             one more, as the law-based algorithm believes them to be.
-        noise: of amplitude and phase in standard deviations, shape (n, samples, 2); without samples runs
-            begin.
-        instants, injections, samples: rows of the first run's trace (time and every pair's fill; `INJECTION`;
-            `SAMPLE`); none are kept where they have no rows.
+        noise: of every device, amplitude and phase in standard deviations, shape (devices, samples, 2).
+        until: number of samples; with none runs begin.
+        instants, injections, samples: rows of the trace of a single run (time and every pair's fill;
+            `INJECTION`; `SAMPLE`); none are kept where they have no rows.
         notes: shape (2, 1 + pairs, points), room for the instants of a valve-open time and of a wait.
         w: a workspace.
     """
     for i in range(runs.size):
         run = runs[i]
-        if noise.shape[1] == 0:
+        loop, plant = loops[run.loop], plants[run.plant]
+        if until == 0:
             _begin(loop, plant, run, motions[i], instants)
-        for k in range(noise.shape[1]):
-            if run.cause == NONE and run.samples >= loop.most_samples:
-                run.cause = SAMPLES
-            if run.cause != NONE:
-                break
-            run.samples += 1
+        while run.cause == NONE and run.samples < until:
             if loop.sensed == 0:
-                _sense(loop, run, noise[i, k, 0], noise[i, k, 1])
+                _sense(loop, run, noise[run.plant, run.samples, 0], noise[run.plant, run.samples, 1])
+            run.samples += 1
             if loop.algorithm != OWN:
                 decide(loop, assumed, run, liquid[i], notes[0], w)
             _watch(loop, run)
@@ -96,12 +91,13 @@ def continue_runs(
             _keep_sample(loop, run, samples)
             if run.cause == NONE:
                 _act(loop, plant, run, motions[i], instants, injections, notes, w)
+                run.cause = SAMPLES if run.samples >= loop.most_samples else NONE
 
 
 @in_place
 def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: FloatArray) -> None:
     """Level chambers, vented, no tube full."""
-    half, ambient, fill = loop.chambers // 2, plant.ambient_pressure, loop.initial_fill
+    half, ambient, fill = loop.chambers // 2, plant.ambient_pressure, plant.total / 2.0
     for i in range(motions.size):
         motion = motions[i]
         y = motion.state
@@ -115,7 +111,7 @@ def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: 
         run.fill[i] = fill
     lowest = max(0.0, plant.total - plant.max_fill_ratio)
     run.floods = 1 if would_start(plant, (lowest, 0.0, ambient, ambient), False) != 0 else 0
-    run.vibration = vibration(loop, run)
+    run.vibration = vibration(loop, plant, run)
     run.amplitude = abs(run.vibration)
     run.initial_amplitude, run.first_seen, run.last_seen = run.amplitude, math.nan, math.nan
     run.last_phase, run.held_since, run.held = math.nan, math.inf, math.inf
@@ -161,7 +157,7 @@ def _watch(loop: Record, run: Record) -> None:
         if run.samples == 1:
             run.first_seen = run.seen_amplitude
         if run.operated > 0 and not math.isnan(run.last_seen):
-            higher = run.seen_amplitude - run.last_seen > loop.noise_floor
+            higher = run.seen_amplitude - run.last_seen > run.noise_floor
             run.rises = run.rises + 1 if higher else 0
             run.misadjustments += 1 if higher else 0
         run.last_seen, run.operated = run.seen_amplitude, 0
@@ -177,7 +173,7 @@ def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
     _hold(loop, run)
     if run.settled > 0 and loop.to_time_limit == 0:
         return HELD
-    above_first = run.last_seen - run.first_seen > loop.noise_floor
+    above_first = run.last_seen - run.first_seen > run.noise_floor
     if run.rises > loop.rises_tolerated or (run.rises == loop.rises_tolerated and above_first):
         return RISING
     ends = run.cut == 0 and loop.to_time_limit == 0 and run.resting > 0 and loop.exact > 0
@@ -232,8 +228,8 @@ def _act(
     commanded, before, start = limit_to_time(loop, run), run.vibration, run.time
     if commanded > 0 or not _rests(loop, plant, run, motions):
         move(loop, plant, run, motions, commanded, notes, w)
-        note_stretch(loop, run, notes[0], run.on_points, start, instants)
-        note_stretch(loop, run, notes[1], run.off_points, start + run.on, instants)
+        note_stretch(loop, plant, run, notes[0], run.on_points, start, instants)
+        note_stretch(loop, plant, run, notes[1], run.off_points, start + run.on, instants)
         look(loop, plant, run, motions)
     else:
         run.on, run.off = 0.0, max(min(loop.period, time_left(loop, run)), 0.0)
@@ -249,9 +245,8 @@ def _act(
 
 @in_place
 def _keep_sample(loop: Record, run: Record, samples: Record) -> None:
-    place = run.samples - 1 - run.samples_before
-    if place < samples.size:
-        row = samples[place]
+    if run.samples <= samples.size:
+        row = samples[run.samples - 1]
         row.time, row.resting, row.reason = run.time, run.resting, run.reason
         row.amplitude, row.phase = run.seen_amplitude, run.seen_phase
         for i in range(loop.chambers // 2):

@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
-from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS, pair_moment
+from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS
 from ringbalance.reduced_model.injection.dynamics import WORK, X
 from ringbalance.reduced_model.injection.events import command, forget
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
+from ringbalance.reduced_model.injection.moment import pair_moment
 from ringbalance.scene.arrays import FloatArray, Record
 from ringbalance.scene.platform.compiled import in_place
 
 
 @in_place
-def vibration(loop: Record, run: Record) -> complex:
+def vibration(loop: Record, plant: Record, run: Record) -> complex:
     """With the disc's liquid, m."""
     moment = 0j
     for i in range(loop.chambers // 2):
-        moment += loop.axis[i] * pair_moment(loop.moment, loop.lowest, loop.moment_step, run.fill[i])
-    return complex(loop.start + run.gain * moment)
+        moment += loop.axis[i] * pair_moment(plant, run.fill[i])
+    return complex(run.start + run.gain * moment)
 
 
 @in_place
@@ -66,7 +67,7 @@ def move(
     if guarded:
         for i in range(half):
             motions[half + i] = motions[i]
-            at_residual = _driven_fill(loop, run, i) <= run.residual_fill + NEAR_RESIDUAL
+            at_residual = _driven_fill(plant, run, i) <= run.residual_fill + NEAR_RESIDUAL
             if run.asked[i] > 0.0 and at_residual:
                 _gas_in_port(loop, run, i, 0.0)
     drift = _pass(loop, plant, run, motions, notes, w)
@@ -79,8 +80,8 @@ def move(
 
 
 @in_place
-def _driven_fill(loop: Record, run: Record, pair: int) -> float:
-    return float(loop.total - run.fill[pair] if run.side[pair] else run.fill[pair])
+def _driven_fill(plant: Record, run: Record, pair: int) -> float:
+    return float(plant.total - run.fill[pair] if run.side[pair] else run.fill[pair])
 
 
 @in_place
@@ -165,15 +166,21 @@ def _gas_instants(loop: Record, run: Record, notes: FloatArray) -> int:
 
 @in_place
 def note_stretch(
-    loop: Record, run: Record, notes: FloatArray, count: int, start: float, instants: FloatArray
+    loop: Record,
+    plant: Record,
+    run: Record,
+    notes: FloatArray,
+    count: int,
+    start: float,
+    instants: FloatArray,
 ) -> None:
     """Since when the amplitude is not above the limit, and the trace, from a stretch begun at `start`."""
-    largest = loop.total - loop.lowest
+    lowest, largest = plant.lowest_fill, plant.total - plant.lowest_fill
     for k in range(count):
         for i in range(loop.chambers // 2):
-            run.fill[i] = min(max(notes[i + 1, k], loop.lowest), largest)
+            run.fill[i] = min(max(notes[i + 1, k], lowest), largest)
         time = start + notes[0, k]
-        above = abs(vibration(loop, run)) > loop.limit
+        above = abs(vibration(loop, plant, run)) > loop.limit
         run.since = math.inf if above else min(run.since, time)
         keep_instant(loop, run, instants, time)
 
@@ -186,12 +193,12 @@ def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
         motion = motions[i]
         moves = motion.primed > 0 or motion.direction != 0 or (run.floods > 0 and plant.inertia == 0)
         run.runs_back[i] = 1 if moves and motion.ran_back > NOTICEABLE else 0
-        run.fill[i] = loop.total / 2.0 if run.runs_back[i] > 0 else shown(plant, motion, motion.state[X])
+        run.fill[i] = plant.total / 2.0 if run.runs_back[i] > 0 else shown(plant, motion, motion.state[X])
         back = back or run.runs_back[i] > 0
-    run.drains = 1 if back and abs(vibration(loop, run)) > loop.limit else 0
+    run.drains = 1 if back and abs(vibration(loop, plant, run)) > loop.limit else 0
     for i in range(half):
         run.fill[i] = shown(plant, motions[i], motions[i].state[X])
-    run.vibration = vibration(loop, run)
+    run.vibration = vibration(loop, plant, run)
     run.amplitude = abs(run.vibration)
 
 
@@ -215,7 +222,7 @@ def keep_injections(
         pair = chamber % half
         if run.asked[pair] == 0.0 or run.side[pair] != chamber // half:
             continue
-        motion, fill = motions[pair], _driven_fill(loop, run, pair)
+        motion, fill = motions[pair], _driven_fill(plant, run, pair)
         if run.drives[pair] == 0.0:
             forget(motion, fill)
         moved = abs(fill - motion.fill_before) > NOTICEABLE

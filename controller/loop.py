@@ -18,10 +18,11 @@ from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Trace
 from ringbalance.controller.outcome import run_findings
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
-from ringbalance.controller.simulation import Injection, Sample, Simulation
+from ringbalance.controller.simulation import Injection, Sample, Simulation, noise_floor
 from ringbalance.controller.terms import check_fit, dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
+from ringbalance.reduced_model.injection.moment import tabulate_moment
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.results.result import Presentation
@@ -78,16 +79,23 @@ def simulate(
     algorithm = controller or controller_of(scene, balancer)
     loop = loop_factor(scene, balancer, algorithm)
     plan = LoopPlan.of(
-        scene=scene,
-        model=balancer,
-        plant=dynamics.plant(total=2 * scene.disc.initial_fill, relative_error=RELATIVE_ERROR),
-        controller=algorithm,
+        [scene],
+        [algorithm],
         most_samples=MAX_SAMPLES,
         sensed=sensor is not None,
         to_time_limit=to_time_limit,
     )
-    runs = plan.runs(1)
-    runs["gain"], runs["residual_fill"], runs["speed"] = scene.rotor.influence, residual, speed
+    total = 2 * scene.disc.initial_fill
+    plant = dynamics.plant(total=total, relative_error=RELATIVE_ERROR)
+    tabulate_moment(plant[0], balancer, total=total)
+    runs = plan.runs(
+        1,
+        start=scene.rotor.initial_vibration,
+        gain=scene.rotor.influence,
+        noise_floor=noise_floor(scene),
+        residual_fill=residual,
+        speed=speed,
+    )
     own = None if isinstance(algorithm, BuiltIn) else algorithm
     outside = None
     if own is not None or sensor is not None:
@@ -100,9 +108,12 @@ def simulate(
         if outside is not None:
             outside.answer(runs[0])
 
+    random = noise or np.random.default_rng(scene.run.seed)
+    seen = random.standard_normal((1, MAX_SAMPLES, 2))
     trace = plan.carry(
         runs,
-        [noise or np.random.default_rng(scene.run.seed)],
+        plant,
+        lambda _: seen,
         traced=True,
         watch=None if progress is None and outside is None else watch,
     )
@@ -113,7 +124,7 @@ def simulate(
             model=balancer,
             chambers=scene.disc.chambers,
             dynamics=dynamics,
-            total=2 * scene.disc.initial_fill,
+            total=total,
         ),
         state=runs[0],
         controller=scene.controller.kind if own is None else type(own).__name__,

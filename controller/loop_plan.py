@@ -1,4 +1,4 @@
-"""The closed loop of a scene, ready to run: once with its trace, or for many draws."""
+"""The closed loop of a scene, ready to run: once with its trace, or for many settings and devices."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn
@@ -23,18 +24,15 @@ from ringbalance.controller.loop_records import (
     RUN,
     SAMPLE,
     TAIL_POINTS,
-    MomentTable,
 )
 from ringbalance.controller.rotor import chamber_directions
-from ringbalance.controller.simulation import noise_floor
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.injection.march import SPARE
-from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 
-CHUNK: Final = 128
-"""Samples for which runs are continued at once."""
+SAMPLES_AT_FIRST: Final = 256
+"""Up to which runs are continued at once; then twice as many."""
 ALLOWED: Final = 0.01
 """Fraction of the samples in that time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
@@ -43,7 +41,7 @@ IDLE_OPERATIONS: Final = 3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """What happened in one run, or in a part of it."""
+    """What happened in one run."""
 
     instants: FloatArray
     """Time, s, and the fill of every pair's positive chamber, shape (m, 1 + pairs)."""
@@ -52,166 +50,138 @@ class Trace:
     samples: Records
     """Type `SAMPLE`."""
 
-    @classmethod
-    def room(cls, samples: int, pairs: int) -> Trace:
-        """For some samples; for none: none is kept."""
-        rows = (GAS_POINTS + TAIL_POINTS + pairs) * samples + (1 if samples else 0)
-        return cls(
-            instants=np.empty((rows, 1 + pairs)),
-            injections=np.zeros(pairs * samples, dtype=INJECTION),
-            samples=np.zeros(samples, dtype=SAMPLE),
-        )
-
-    @classmethod
-    def joined(cls, parts: Sequence[Trace]) -> Trace:
-        """Parts of one run, one after the other."""
-        return cls(
-            instants=np.concatenate([part.instants for part in parts]),
-            injections=np.concatenate([part.injections for part in parts]),
-            samples=np.concatenate([part.samples for part in parts]),
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopPlan:
-    """What all runs of a scene share, ready for compiled code."""
+    """Settings of one kind of algorithm, ready for compiled code."""
 
-    loop: Records
-    """Type `LOOP`, shape (1,)."""
-    plant: Records
-    """Type `PLANT`, shape (1,)."""
-    assumed: Records
-    """The same as the law-based algorithm has it; the others do not look at it."""
-    memory: Records
-    """Type `RUN`, shape (1,), with what the algorithm remembers at the start."""
+    loops: Records
+    """Type `LOOP`, one for each."""
+    starts: Records
+    """Type `RUN`, with what the algorithm remembers at the start."""
+    assumed: Records | None
+    """Type `PLANT`, shape (1,): a device as the law-based algorithm has it; None: it does not look at one."""
     liquid: Records
     """Type `MOTION`: the pairs as the law-based algorithm believes them to be, and one more; else empty."""
 
     @classmethod
     def of(
         cls,
+        scenes: Sequence[Scene],
+        controllers: Sequence[Controller[Any] | BuiltIn],
         *,
-        scene: Scene,
-        model: BalancerModel,
-        plant: Records,
-        controller: Controller[Any] | BuiltIn,
         most_samples: int,
         sensed: bool = False,
         to_time_limit: bool = False,
         further: float = FURTHER,
-        moments: MomentTable | None = None,
     ) -> LoopPlan:
-        """Prepare the runs of a scene.
+        """Prepare runs of scenes that differ in settings of the controller alone.
 
         Args:
-            plant: what moves its liquid, type `PLANT`, shape (1,).
+            controllers: of each; those of the law-based algorithm assume the same device.
             most_samples: after which a run ends undecided.
             sensed: whether the caller's sensor writes its samples into the run.
             to_time_limit: whether a settled run continues.
             further: s, for which a run is watched after it has held its limit.
-            moments: those of the model, where they are known.
         """
-        loop, memory = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
-        total, chambers = 2 * scene.disc.initial_fill, scene.disc.chambers
-        built_in = isinstance(controller, BuiltIn)
-        loop["algorithm"] = OWN
-        if isinstance(controller, BuiltIn):
-            controller.fill(loop[0], memory[0])
-        for name, value in _settings(scene, further).items():
-            loop[name] = value
-        table = moments or MomentTable.of(model=model, total=total)
-        loop["lowest"], loop["moment_step"], loop["moment"][0] = table
-        loop["axis"][0, : chambers // 2] = chamber_directions(chambers)[: chambers // 2]
-        loop["rises_tolerated"], loop["most_samples"] = controller.rises_tolerated, most_samples
-        loop["sensed"], loop["to_time_limit"] = sensed or not built_in, to_time_limit
-        loop["exact"] = not sensed and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0
-        assumed = controller.plant if isinstance(controller, LawBased) else plant
-        liquid = controller.liquid() if isinstance(controller, BuiltIn) else np.zeros(0, dtype=MOTION)
-        return cls(loop=loop, plant=plant, assumed=assumed, memory=memory, liquid=liquid)
+        loops, starts = np.zeros(len(scenes), dtype=LOOP), np.zeros(len(scenes), dtype=RUN)
+        starts["loop"], starts["speed"] = np.arange(len(scenes)), 1.0
+        loops["algorithm"] = OWN
+        for scene, controller, loop, start in zip(scenes, controllers, loops, starts, strict=True):
+            if isinstance(controller, BuiltIn):
+                controller.fill(loop, start)
+            for name, value in _settings(scene, further).items():
+                loop[name] = value
+            loop["rises_tolerated"] = controller.rises_tolerated
+        first, chambers = controllers[0], scenes[0].disc.chambers
+        loops["axis"][:, : chambers // 2] = chamber_directions(chambers)[: chambers // 2]
+        loops["sensed"] = sensed or not isinstance(first, BuiltIn)
+        loops["exact"] &= not sensed
+        loops["most_samples"], loops["to_time_limit"] = most_samples, to_time_limit
+        return cls(
+            loops=loops,
+            starts=starts,
+            assumed=first.plant if isinstance(first, LawBased) else None,
+            liquid=first.liquid() if isinstance(first, BuiltIn) else np.zeros(0, dtype=MOTION),
+        )
 
-    @property
-    def pairs(self) -> int:
-        """Number of pairs of chambers."""
-        return int(self.loop["chambers"][0]) // 2
+    def runs(self, devices: int, **values: npt.ArrayLike) -> Records:
+        """Type `RUN`: every device under the first settings, then under the next.
 
-    def runs(self, size: int) -> Records:
-        """Runs with the law's own velocity, to be given the rest; type `RUN`."""
-        runs = np.repeat(self.memory, size)
-        runs["speed"] = 1.0
+        Args: `values`: of each device, by field.
+        """
+        runs = np.repeat(self.starts, devices)
+        for name, value in values.items():
+            runs[name] = np.tile(np.broadcast_to(value, devices), self.loops.size)
         return runs
 
     def carry(
         self,
         runs: Records,
-        random: Sequence[np.random.Generator],
+        plants: Records,
+        noise: Callable[[int], FloatArray],
         *,
         traced: bool = False,
         watch: Callable[[], None] | None = None,
     ) -> Trace:
         """Carry runs to their ends.
 
-        Args: `random`: numbers of each run's sensor; empty for an exact one. `traced`: whether the trace of
-            the first run is kept. `watch`: called before each sample, as it may write into the run.
+        Args:
+            plants: of the devices, type `PLANT`.
+            noise: of every device, at least so many samples, as `continue_runs` takes it.
+            traced: whether the trace of the run, which is the only one, is kept.
+            watch: called before each sample, as it may write into the run.
         Returns: that trace; an empty one where none is asked for.
         """
-        shape = (runs.size, CHUNK if watch is None else 1, 2)
-        motions = np.zeros((runs.size, 2 * self.pairs + SPARE), dtype=MOTION)
+        pairs, most = int(self.loops["chambers"][0]) // 2, int(self.loops["most_samples"][0]) if traced else 0
+        motions = np.zeros((runs.size, 2 * pairs + SPARE), dtype=MOTION)
         liquid = np.tile(self.liquid, (runs.size, 1))
-        room = np.zeros(NOTES), np.zeros(WORKSPACE)
-        noise, parts = np.zeros(shape), []
-        parts.append(self._continued(runs, motions, liquid, noise[:, :0], *room, traced=traced))
-        while np.any(running := runs["cause"] == NONE):
+        trace = Trace(
+            instants=np.empty(((GAS_POINTS + TAIL_POINTS + pairs) * most + (1 if traced else 0), 1 + pairs)),
+            injections=np.zeros(pairs * most, dtype=INJECTION),
+            samples=np.zeros(most, dtype=SAMPLE),
+        )
+        assumed, room = (
+            plants if self.assumed is None else self.assumed,
+            (np.zeros(NOTES), np.zeros(WORKSPACE)),
+        )
+
+        def go_on(until: int) -> None:
+            continue_runs(
+                self.loops,
+                plants,
+                assumed[0],
+                runs,
+                motions,
+                liquid,
+                noise(until),
+                until,
+                trace.instants,
+                trace.injections,
+                trace.samples,
+                *room,
+            )
+
+        until = 0
+        go_on(until)
+        while np.any(runs["cause"] == NONE):
             if watch is not None:
                 watch()
-            for i in np.flatnonzero(running).tolist() if random else ():
-                noise[i] = random[i].standard_normal(shape[1:])
-            parts.append(self._continued(runs, motions, liquid, noise, *room, traced=traced))
-        return Trace.joined(parts)
-
-    def _continued(
-        self,
-        runs: Records,
-        motions: Records,
-        liquid: Records,
-        noise: FloatArray,
-        notes: FloatArray,
-        workspace: FloatArray,
-        *,
-        traced: bool,
-    ) -> Trace:
-        """By as many samples as there is noise for; without any the runs begin. Returns: what happened in the
-        first run."""
-        run, trace = runs[0], Trace.room(noise.shape[1] + 1 if traced else 0, self.pairs)
-        run["instants"], run["injections"], run["samples_before"] = 0, 0, run["samples"]
-        continue_runs(
-            self.loop[0],
-            self.plant[0],
-            self.assumed[0],
-            runs,
-            motions,
-            liquid,
-            noise,
-            trace.instants,
-            trace.injections,
-            trace.samples,
-            notes,
-            workspace,
-        )
+            until = max(2 * until, SAMPLES_AT_FIRST) if watch is None else until + 1
+            go_on(until)
+        run = runs[0]
         return Trace(
-            instants=trace.instants[: run["instants"]],
-            injections=trace.injections[: run["injections"]],
-            samples=trace.samples[: run["samples"] - run["samples_before"]],
+            instants=trace.instants[: run["instants"]].copy(),
+            injections=trace.injections[: run["injections"]].copy(),
+            samples=trace.samples[: run["samples"]].copy(),
         )
 
 
 def _settings(scene: Scene, further: float) -> dict[str, Any]:
-    """Rotor, sensor, clock and bounds."""
+    """Sensor, clock and bounds."""
     settings, sensor = scene.controller, scene.sensor
     return {
         "chambers": scene.disc.chambers,
-        "total": 2 * scene.disc.initial_fill,
-        "initial_fill": scene.disc.initial_fill,
-        "start": scene.rotor.initial_vibration,
         "limit": settings.limit,
         "period": settings.period,
         "hold_time": settings.hold_time,
@@ -220,6 +190,6 @@ def _settings(scene: Scene, further: float) -> dict[str, Any]:
         "allowed": ALLOWED * further / settings.period,
         "amplitude_noise": sensor.amplitude_noise,
         "phase_noise": sensor.phase_noise,
-        "noise_floor": noise_floor(scene),
+        "exact": sensor.amplitude_noise == sensor.phase_noise == 0,
         "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
     }

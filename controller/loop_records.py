@@ -1,4 +1,4 @@
-"""What the closed loop works on: a record of what all runs share, one for each run, rows of a trace, moments.
+"""What the closed loop works on: a record of settings, one for each run, rows of a trace.
 
 Compiled functions take a record as a single pointer, where arrays and tuples of arrays are taken apart and
 counted at every call, which costs more than the work itself.
@@ -6,7 +6,7 @@ counted at every call, which costs more than the work itself.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -14,16 +14,11 @@ from ringbalance.controller.algorithms.law_steps import FIRST_CHANGE, PER_CHANGE
 from ringbalance.controller.algorithms.target_steps import DIRECTIONS, FIRST_CHAMBER
 from ringbalance.controller.algorithms.valve_steps import PER_CHAMBER
 from ringbalance.controller.rotor import MAX_CHAMBERS
-from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.platform.compiled import in_place
 
 GAS_POINTS: Final = 8
 """Instants recorded within one command's valve-open time, beside the closing of each valve."""
 TAIL_POINTS: Final = 12
 """Instants recorded within a wait, in which an operation continues after its valve has closed."""
-MOMENT_NODES: Final = 513
-"""Of the table of a pair's moment."""
 PAIRS: Final = MAX_CHAMBERS // 2
 MEMORY: Final = max(FIRST_CHANGE + PER_CHANGE * PAIRS, FIRST_CHAMBER + PER_CHAMBER * MAX_CHAMBERS)
 """Numbers that an algorithm remembers."""
@@ -52,10 +47,6 @@ NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
 """
 
 _REAL: Final = (
-    "total",  # x_A + x_C
-    "initial_fill",
-    "lowest",  # smallest x
-    "moment_step",  # between the nodes of the moment's table, in x
     "limit",  # m
     "period",  # s
     "hold_time",  # s
@@ -64,7 +55,6 @@ _REAL: Final = (
     "allowed",  # samples above the limit in that time
     "amplitude_noise",  # standard deviation, m
     "phase_noise",  # standard deviation, rad
-    "noise_floor",  # m
     "rest_limit",  # algorithm: amplitude at which it is content, m
     "minimum_gas_time",  # s
     "maximum_gas_time",  # s
@@ -77,8 +67,6 @@ _REAL: Final = (
     "assumed_amplitude_noise",  # standard deviation, m
     "assumed_phase_noise",  # standard deviation, rad
     "law_deviation",  # standard deviation of the law's velocity, relative
-    "assumed_lowest",  # as above, of the disc that is assumed
-    "assumed_step",
 )
 _WHOLE: Final = (
     "algorithm",
@@ -95,19 +83,17 @@ LOOP: Final = np.dtype(
     [(name, np.float64) for name in _REAL]
     + [(name, np.int64) for name in _WHOLE]
     + [
-        ("start", np.complex128),  # vibration with level chambers, m
         ("influence", np.complex128),  # that is assumed, m/(kg m)
         ("target", np.float64, (DIRECTIONS + 3 * MAX_CHAMBERS,)),  # of `target_steps`
         ("sequence", np.int64, (MAX_CHAMBERS,)),
         ("offset", np.float64, (MAX_CHAMBERS,)),  # that the algorithm adds to a valve's share, s
         ("axis", np.complex128, (PAIRS,)),  # directions of the pairs
-        ("moment", np.complex128, (MOMENT_NODES, 2)),  # of a pair, along and across: value, slope per step
-        ("assumed_moment", np.complex128, (MOMENT_NODES, 2)),
     ]
 )
-"""What all runs of a scene share."""
+"""Settings of a scene's loop, which its devices share."""
 
 _RUN_REAL: Final = (
+    "noise_floor",  # rise of the amplitude that noise alone does not explain, m
     "speed",  # factor of the flow's velocity
     "residual_fill",  # of a driven chamber, that no command goes below
     "proportional",  # Kc, s/m
@@ -133,6 +119,8 @@ _RUN_REAL: Final = (
     "gas",  # what vented chambers have released, above ambient pressure, Pa m^3
 )
 _RUN_WHOLE: Final = (
+    "loop",  # number of its settings
+    "plant",  # and of its device
     "settled",  # whether a hold was followed by the further time
     "lost",  # holds that were not
     "usable",
@@ -149,7 +137,6 @@ _RUN_WHOLE: Final = (
     "misadjustments",
     "shortened",  # injections that gas in the port has ended before their valves
     "samples",
-    "samples_before",  # those before the first row of the trace
     "cause",
     "drains",  # whether what still runs back would take the vibration above the limit
     "on_points",  # instants noted within each of these
@@ -172,7 +159,7 @@ _RUN_FLAGS: Final = (
 RUN: Final = np.dtype(
     [(name, np.float64) for name in _RUN_REAL]
     + [(name, np.int64) for name in _RUN_WHOLE]
-    + [(name, np.complex128) for name in ("gain", "vibration")]
+    + [(name, np.complex128) for name in ("start", "gain", "vibration")]
     + [(name, np.float64, (PAIRS,)) for name in _RUN_PAIRS]
     + [(name, np.int64, (PAIRS,)) for name in _RUN_FLAGS]
     + [(name, np.int64, (MAX_CHAMBERS,)) for name in ("at_residual", "refused")]
@@ -180,9 +167,9 @@ RUN: Final = np.dtype(
 )
 """One run: what differs between runs, its state and what its algorithm remembers.
 
-`gain`: vibration per balancing moment, m/(kg m). `at_residual`: of every chamber, whether a sensor of the
-caller's says that it has no more liquid to give; `refused`: whether gas has entered its port in the last
-command. `memory`: of `target_steps` or `law_steps`.
+`start`: vibration with level chambers, m; `gain`: vibration per balancing moment, m/(kg m).
+`at_residual`: of every chamber, whether a sensor of the caller's says that it has no more liquid to give;
+`refused`: whether gas has entered its port in the last command. `memory`: of `target_steps` or `law_steps`.
 """
 INJECTION: Final = np.dtype(
     [
@@ -207,41 +194,3 @@ SAMPLE: Final = np.dtype(
 """Rows of a trace; those of its instants are the time and every pair's fill."""
 NOTES: Final = 2, 1 + PAIRS, PAIRS + GAS_POINTS + TAIL_POINTS
 """Shape of the room for what is noted between two samples, with the gas on and off."""
-
-
-class MomentTable(NamedTuple):
-    """Moment of a pair over the fill of its positive chamber, cubic between equally spaced nodes."""
-
-    lowest: float
-    """Smallest x."""
-    step: float
-    """Distance of the nodes."""
-    nodes: ComplexArray
-    """Moment along the pair's axis and across it, kg m, and its slope, kg m per step, shape (n, 2)."""
-
-    @classmethod
-    def of(cls, *, model: BalancerModel, total: float) -> MomentTable:
-        """Tabulate a balancer's moment of a pair whose two fill ratios sum to `total`."""
-        largest = model.flow.max_fill_ratio
-        lowest, highest = max(0.0, total - largest), min(total, largest)
-        step = (highest - lowest) / (MOMENT_NODES - 1)
-
-        # Nodes and their middles: a slope is that between the middles on both sides.
-        x = np.linspace(lowest, highest, 2 * MOMENT_NODES - 1)
-        moment = model.moment.pair_vector(fill_ratio=x, opposite_fill_ratio=np.maximum(total - x, 0.0))
-        middle = np.concatenate([moment[:1], moment[1::2], moment[-1:]])
-        slope = np.diff(middle)
-        slope[0] = 4.0 * moment[1] - 3.0 * moment[0] - moment[2]
-        slope[-1] = 3.0 * moment[-1] - 4.0 * moment[-2] + moment[-3]
-        return cls(lowest=float(lowest), step=float(step), nodes=np.stack([moment[::2], slope], axis=1))
-
-
-@in_place
-def pair_moment(nodes: ComplexArray, lowest: float, step: float, fill: float) -> complex:
-    """Of one pair along its axis and across it, kg m."""
-    last = nodes.shape[0] - 1
-    place = min(max((fill - lowest) / step, 0.0), float(last))
-    cell = min(int(place), last - 1)
-    part, rise, d0, d1 = place - cell, nodes[cell + 1, 0] - nodes[cell, 0], nodes[cell, 1], nodes[cell + 1, 1]
-    change = part * (d0 + part * (3.0 * rise - 2.0 * d0 - d1 + part * (d0 + d1 - 2.0 * rise)))
-    return complex(nodes[cell, 0] + change)

@@ -51,6 +51,20 @@ def run_noise(seed: int, number: int) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(key))
 
 
+@lru_cache(32)
+def noise_table(seed: int, numbers: tuple[int, ...], samples: int, *, devices: bool = True) -> FloatArray:
+    """First numbers of these in the runs of devices, shape (devices, samples, 2); not to be written to.
+
+    Args: `devices`: whether they are drawn; else each has the noise of a single run of the scene as it is,
+        from the next seed.
+    """
+    table = np.empty((len(numbers), samples, 2))
+    for number, row in zip(numbers, table, strict=True):
+        random = run_noise(seed, number) if devices else np.random.default_rng(seed + number)
+        random.standard_normal(out=row)
+    return table
+
+
 @lru_cache(_KEPT)
 def _column(name: str, block: int, seed: int) -> FloatArray:
     key = np.random.SeedSequence(entropy=seed, spawn_key=(block, crc32(name.encode())))

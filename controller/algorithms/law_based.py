@@ -35,7 +35,7 @@ from ringbalance.controller.algorithms.law_steps import (
     split,
 )
 from ringbalance.controller.liquid_ring.plant import LiquidRing
-from ringbalance.controller.loop_records import LAW_BASED, MEMORY, MomentTable, pair_moment
+from ringbalance.controller.loop_records import LAW_BASED, MEMORY
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.injection.column import steady
@@ -43,6 +43,7 @@ from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR,
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
+from ringbalance.reduced_model.injection.moment import fill_for_moment, pair_moment, tabulate_moment
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
@@ -57,8 +58,6 @@ LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 FILL_ERROR: Final = 1e-3
 """Error in fill ratio, over that allowed to a step, at which a valve-open time is good enough."""
 _HALVINGS: Final = 60
-END_STEP: Final = 1e-3
-"""Share of the range of x over which a slope at its end is taken."""
 _BLOCKED: Final = EVENTS.index(Event.BLOCKED)
 _EMPTY: Final = EVENTS.index(Event.EMPTY)
 _FULL: Final = EVENTS.index(Event.FULL)
@@ -100,14 +99,12 @@ class LawBased(BuiltIn):
             dynamics=replace(dynamics, relative_error=self.relative_error),
         )
 
-    @property
+    @cached_property
     def plant(self) -> Records:
         """The assumed disc, type `PLANT`, shape (1,)."""
-        return self.ring.dynamics.kept_plant(total=self.ring.total)
-
-    @cached_property
-    def _moments(self) -> MomentTable:
-        return MomentTable.of(model=self.ring.model, total=self.ring.total)
+        plant = self.ring.dynamics.plant(total=self.ring.total)
+        tabulate_moment(plant[0], self.ring.model, total=self.ring.total)
+        return plant
 
     @cached_property
     def law_standard_deviation(self) -> float:
@@ -125,14 +122,13 @@ class LawBased(BuiltIn):
         super().fill(loop, run)
         scene, chambers, total = self.scene, self.ring.chambers, self.ring.total
         influence, sensor = scene.controller.assumed_influence, scene.sensor
-        loop["algorithm"], loop["total"], loop["influence"] = LAW_BASED, total, influence
+        loop["algorithm"], loop["influence"] = LAW_BASED, influence
         loop["assumed_amplitude_noise"], loop["assumed_phase_noise"] = (
             sensor.amplitude_noise,
             sensor.phase_noise,
         )
         loop["probe"], loop["law_deviation"] = scene.controller.period, self.law_standard_deviation
         loop["axis"][: chambers // 2] = chamber_directions(chambers)[: chambers // 2]
-        loop["assumed_lowest"], loop["assumed_step"], loop["assumed_moment"] = self._moments
         lowest = total - self.ring.model.flow.max_fill_ratio
         loop["least_fill"] = max(min(self.ring.residual_fill, total / 2), lowest)
         run["before_time"] = math.inf
@@ -193,8 +189,7 @@ def _vector(amplitude: float, phase: float) -> complex:
 def _disc_moment(loop: Record, plant: Record, liquid: Record) -> complex:
     found = 0j
     for i in range(loop.chambers // 2):
-        fill = shown(plant, liquid[i], liquid[i].state[X])
-        found += loop.axis[i] * pair_moment(loop.assumed_moment, loop.assumed_lowest, loop.assumed_step, fill)
+        found += loop.axis[i] * pair_moment(plant, shown(plant, liquid[i], liquid[i].state[X]))
     return found
 
 
@@ -209,7 +204,7 @@ def _follow(
     half, opened, before = loop.chambers // 2, False, _disc_moment(loop, plant, liquid)
     m = run.memory
     for i in range(half):
-        m[change_of(0, i) + MOMENT_NOW] = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
+        m[change_of(0, i) + MOMENT_NOW] = _along(plant, shown(plant, liquid[i], liquid[i].state[X]))
         if run.given[i] > 0.0:
             opened = True
             offset = loop.offset[i + half * run.given_side[i]]
@@ -218,7 +213,7 @@ def _follow(
                 command(plant, liquid[i], run.given_side[i], acting)
         liquid[i].steps = 0
         advance(plant, liquid[i], interval, notes, 1, 0, w)
-        moment = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
+        moment = _along(plant, shown(plant, liquid[i], liquid[i].state[X]))
         set_should(m, 0, i, moment, run.given[i] > 0.0)
     if opened:
         seen, last = (
@@ -238,10 +233,10 @@ def _follow(
 def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray) -> None:
     """Command the valve-open times that take the residual away."""
     half, lowest, m = loop.chambers // 2, loop.least_fill, run.memory
-    highest = loop.total - lowest
-    least, most = _along(loop, lowest), _along(loop, highest)
+    highest = plant.total - lowest
+    least, most = _along(plant, lowest), _along(plant, highest)
     for i in range(half):
-        now = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
+        now = _along(plant, shown(plant, liquid[i], liquid[i].state[X]))
         set_bounds(m, 0, i, now, least, most)
     wanted_moment = -_vector(run.seen_amplitude, run.seen_phase) / complex(m[LEARNT_X], m[LEARNT_Y])
     split(m, 0, half, wanted_moment.real, wanted_moment.imag)
@@ -249,14 +244,7 @@ def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatA
         change = m[change_of(0, i) + CHANGE]
         if change != 0.0:
             fill = shown(plant, liquid[i], liquid[i].state[X])
-            wanted = fill_for_moment(
-                loop.assumed_moment,
-                loop.assumed_lowest,
-                loop.assumed_step,
-                _along(loop, fill) + change,
-                lowest,
-                highest,
-            )
+            wanted = fill_for_moment(plant, _along(plant, fill) + change, lowest, highest)
             side = 0 if wanted < fill else 1
             if is_try(m, 0, i, side):
                 time = _try_time(loop, plant, abs(wanted - fill))
@@ -267,8 +255,8 @@ def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatA
 
 
 @in_place
-def _along(loop: Record, fill: float) -> float:
-    return pair_moment(loop.assumed_moment, loop.assumed_lowest, loop.assumed_step, fill).real
+def _along(plant: Record, fill: float) -> float:
+    return pair_moment(plant, fill).real
 
 
 @in_place
@@ -366,35 +354,3 @@ def _time_to(
         else:
             high, below, above, stays = time, found, above * (0.5 if stays < 0 else 1.0), -1
     return time
-
-
-@in_place
-def fill_for_moment(
-    nodes: ComplexArray,
-    first: float,
-    step: float,
-    wanted: float,
-    lowest: float,
-    highest: float,
-) -> float:
-    """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
-
-    Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
-    """
-    if highest <= lowest:
-        return lowest
-    short = END_STEP * (highest - lowest)
-    low, high = pair_moment(nodes, first, step, lowest).real, pair_moment(nodes, first, step, highest).real
-    if wanted <= low:
-        rise = pair_moment(nodes, first, step, lowest + short).real - low
-        return lowest + (wanted - low) / rise * short
-    if wanted >= high:
-        rise = high - pair_moment(nodes, first, step, highest - short).real
-        return highest + (wanted - high) / rise * short
-    for _ in range(_HALVINGS):
-        middle = (lowest + highest) / 2.0
-        if pair_moment(nodes, first, step, middle).real >= wanted:
-            highest = middle
-        else:
-            lowest = middle
-    return highest

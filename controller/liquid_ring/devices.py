@@ -6,12 +6,10 @@ import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.loop_records import MomentTable
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
@@ -105,11 +103,6 @@ class Device:
     """Quantile of everything that was drawn, in (0, 1)."""
     clipped: tuple[str, ...]
     """Inputs that lie nearer to the scene's value than drawn, since no device has the drawn one."""
-
-    @cached_property
-    def moments(self) -> MomentTable:
-        """Of a pair, as runs have them."""
-        return MomentTable.of(model=self.model, total=2 * self.scene.disc.initial_fill)
 
     def under(self, settings: Scene, *, of: Scene) -> Scene:
         """The device with a scene's controller and gas pressure; its gauge is as wrong as it was.

@@ -3,34 +3,40 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache
-from itertools import groupby
+from functools import cached_property, lru_cache, partial
+from itertools import groupby, pairwise
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.law_based import controller_of
-from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, RunResult, Settings
+from ringbalance.controller.balancer import ARRAYS, FURTHER, Draws, Outcomes, Settings
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
-from ringbalance.controller.liquid_ring.plant import LiquidRing
+from ringbalance.controller.liquid_ring.plant import (
+    corners_of,
+    largest_pair_moments,
+    moment_towards,
+    unreachable_moment,
+)
 from ringbalance.controller.loop_plan import LoopPlan
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING
 from ringbalance.controller.rotor import Rotors
-from ringbalance.controller.simulation import Outcome
+from ringbalance.controller.simulation import Outcome, noise_floor
 from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import compression_work
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
-from ringbalance.reduced_model.injection.dynamics import Dynamics, empty_plants
+from ringbalance.reduced_model.injection.dynamics import empty_plants, gives_forces
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
+from ringbalance.reduced_model.injection.moment import tabulate_moment
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import HELD
-from ringbalance.scene.arrays import Records
+from ringbalance.scene.arrays import FloatArray, IntArray, Records
 from ringbalance.scene.designs import Designs, alike
-from ringbalance.scene.draws import run_noise
+from ringbalance.scene.draws import noise_table
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import with_values_at
 
@@ -51,14 +57,17 @@ be carried out: none settles, and each would take its whole time limit.  Beyond 
 a long injection still takes some liquid."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Setting:
-    """One of the settings that are tried."""
-
-    place: int
-    scene: Scene
-    """The scene's own device with it."""
-    controller: BuiltIn
+_ENDS: Final = (
+    Outcome.SETTLED,
+    Outcome.CAPACITY_EXCEEDED,
+    Outcome.STALLED,
+    Outcome.DRIFTING,
+    Outcome.DIVERGING,
+    Outcome.HOVERING,
+    Outcome.GAS_TIME_TOO_SHORT,
+    Outcome.TIME_LIMIT,
+)
+"""Of a run: the first that it shows, else the last."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,72 +103,53 @@ class DrawnRuns:
         Raises: SceneError: a rotor too slow to form a ring.
         """
         check_ring(self.scene)
-        asked = [self._setting(place, each) for place, each in enumerate(settings)]
-        ended: list[list[RunResult]] = [[] for _ in asked]
-        drawn: list[Device] = []
-        for group, numbers in groupby(draws.numbers, _group):
-            some = list(numbers)
-            made = self._devices(group) if draws.devices else self._as_given(group)
-            drawn += [made[group.index(number)] for number in some]
-            for pressure, tried in _grouped(asked, lambda each: each.scene.gas.pressure):
-                under = self._under(made, pressure)
-                for number in some:
-                    for at, done in self._runs(under[group.index(number)], tried, draws, further):
-                        ended[at].append(done)
-        devices_drawn: dict[str, Any] = {
-            "numbers": tuple(device.number for device in drawn),
-            "inputs": [device.inputs for device in drawn],
-            "clipped": [name for device in drawn for name in device.clipped],
+        scenes = [with_values_at(self.scene, each) for each in settings]
+        alike: dict[tuple[float, str], list[int]] = {}
+        for place, each in enumerate(scenes):
+            alike.setdefault((each.gas.pressure, each.controller.kind), []).append(place)
+        plans = {
+            key: self._plan([scenes[i] for i in places], draws, further) for key, places in alike.items()
         }
-        return tuple(Outcomes.of(results, **devices_drawn) for results in ended)
-
-    def _setting(self, place: int, setting: Settings) -> _Setting:
-        scene = with_values_at(self.scene, setting)
-        model = self.informed if scene.controller.kind == "law_based" else self.model
-        controller = controller_of(scene, model, relative_error=RELATIVE_ERROR)
-        return _Setting(place=place, scene=scene, controller=controller)
-
-    def _runs(
-        self, under: _Under, asked: Sequence[_Setting], draws: Draws, further: float
-    ) -> Iterator[tuple[int, RunResult]]:
-        """Place of a setting and how the device's run under it ended."""
-        if not draws.whole and under.beyond_disc > _OUT_OF_REACH * self.limit:
-            yield from ((each.place, _at_best(under)) for each in asked)
-            return
-        for settings, tried in _grouped(asked, lambda each: replace(each.scene.controller, proportional=1)):
-            plan = LoopPlan.of(
-                scene=replace(under.scene, controller=settings),
-                model=under.device.model,
-                plant=under.plant,
-                controller=tried[0].controller,
-                most_samples=MOST_SAMPLES,
-                further=further,
-                moments=under.device.moments,
+        shape = len(settings), len(draws.numbers)
+        numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
+        drawn: list[Device] = []
+        for block, some in groupby(draws.numbers, _group):
+            asked = list(some)
+            columns = slice(len(drawn), len(drawn) + len(asked))
+            for (pressure, kind), places in alike.items():
+                under = self._under(block, draws.devices, pressure)
+                place_of = {each.number: place for place, each in enumerate(under.group.devices)}
+                rows = np.array([place_of[number] for number in asked])
+                numbers[:, places, columns], ends[places, columns] = under.ran(
+                    plans[pressure, kind], rows, whole=draws.whole, limit=self.limit
+                )
+            drawn += [under.group.devices[row] for row in rows]
+        inputs = {name: np.array([each.inputs[name] for each in drawn]) for name in drawn[0].inputs}
+        clipped = Counter(name for each in drawn for name in each.clipped)
+        return tuple(
+            Outcomes(
+                **dict(zip(ARRAYS, numbers[:, place], strict=True)),
+                ended=tuple(str(_ENDS[end]) for end in ends[place]),
+                numbers=draws.numbers,
+                inputs=inputs,
+                clipped=clipped,
             )
-            plan.loop["limit"] = self.limit
-            plan.loop["time_limit"] = min(self.scene.run.time_limit, draws.until)
-            gains = [each.scene.controller.proportional for each in tried]
-            seed, number = self.scene.run.seed, under.device.number
-            # The scene as it is has the noise of a single run of it, from the next seed for each number.
-            noise = [
-                run_noise(seed, number) if draws.devices else np.random.default_rng(seed + number)
-                for _ in (() if plan.loop["exact"][0] else gains)
-            ]
-            runs = under.carried(plan, gains, noise=noise)
-            for each, run in zip(tried, runs, strict=True):
-                yield each.place, _result(under, run, limit=self.limit)
+            for place in range(len(settings))
+        )
+
+    def _plan(self, scenes: Sequence[Scene], draws: Draws, further: float) -> LoopPlan:
+        """Settings of one gas pressure and kind of controller."""
+        model = self.informed if scenes[0].controller.kind == "law_based" else self.model
+        controllers = [controller_of(each, model, relative_error=RELATIVE_ERROR) for each in scenes]
+        plan = LoopPlan.of(scenes, controllers, most_samples=MOST_SAMPLES, further=further)
+        plan.loops["limit"] = self.limit
+        plan.loops["time_limit"] = min(self.scene.run.time_limit, draws.until)
+        return plan
 
     def device(self, number: int) -> Device:
         """One of the devices."""
-        group = _group(number)
-        return self._devices(group)[group.index(number)]
-
-    def _as_given(self, group: range) -> tuple[Device, ...]:
-        """The scene's own device, over and over."""
-        own = Device(
-            number=0, scene=self.scene, model=self.model, speed=1.0, moment=1.0, inputs={}, clipped=()
-        )
-        return tuple(replace(own, number=number) for number in group)
+        block = _group(number)
+        return self._devices(block)[block.index(number)]
 
     def __getstate__(self) -> dict[str, Any]:
         """What is kept stays behind."""
@@ -167,146 +157,200 @@ class DrawnRuns:
 
     @cached_property
     def _devices(self) -> Callable[[range], tuple[Device, ...]]:
-        """Of a group; the last ones are kept, as a search runs the same again and again."""
+        """Of some numbers; the last ones are kept, as a search runs the same again and again."""
 
-        def made(group: range) -> tuple[Device, ...]:
+        def made(block: range) -> tuple[Device, ...]:
             seed, rotors = self.scene.run.seed, self.rotors
-            return devices(self.scene, self.model, self.spread, group, seed=seed, rotors=rotors)
+            return devices(self.scene, self.model, self.spread, block, seed=seed, rotors=rotors)
 
         return lru_cache(_KEPT)(made)
 
     @cached_property
-    def _under(self) -> Callable[[tuple[Device, ...], float], tuple[_Under, ...]]:
-        """By devices and gas pressure of the settings; kept likewise."""
+    def _groups(self) -> Callable[[range, bool, float], _Group]:
+        """By numbers, whether devices are drawn, and gas pressure; kept likewise."""
 
-        def made(drawn: tuple[Device, ...], pressure: float) -> tuple[_Under, ...]:
+        def made(block: range, drawn: bool, pressure: float) -> _Group:
+            own = Device(
+                number=0, scene=self.scene, model=self.model, speed=1.0, moment=1.0, inputs={}, clipped=()
+            )
+            some = self._devices(block) if drawn else [replace(own, number=number) for number in block]
             settings = replace(self.scene, gas=replace(self.scene.gas, pressure=pressure))
-            scenes = [each.under(settings, of=self.scene) for each in drawn]
-            found: dict[int, _Under] = {}
-            for places in alike(scenes):
-                some = [(drawn[place], scenes[place]) for place in places]
-                found |= zip(places, _under(*zip(*some, strict=True), modelled=self.terms), strict=True)
-            return tuple(found[place] for place in range(len(drawn)))
+            scenes = [each.under(settings, of=self.scene) for each in some]
+            noise = partial(noise_table, self.scene.run.seed, devices=drawn)
+            return _Group.of(some, scenes, modelled=self.terms, noise=noise)
+
+        return lru_cache(_KEPT)(made)
+
+    @cached_property
+    def _under(self) -> Callable[[range, bool, float], _Under]:
+        """By numbers, whether devices are drawn, and gas pressure of the settings; kept likewise."""
+
+        def made(block: range, drawn: bool, pressure: float) -> _Under:
+            stated = self.scene.gas.pressure
+            # A law of velocities alone is tabulated for one pressure.
+            group = self._groups(block, drawn, stated if gives_forces(self.model.flow) else pressure)
+            own = np.array([each.scene.gas.pressure for each in group.devices])
+            return group.under(np.maximum(own + pressure - stated, 0.0))
 
         return lru_cache(_KEPT)(made)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Under:
-    """A device under one gas pressure."""
+class _Group:
+    """Devices that are made at once, and what no gas pressure changes in them."""
 
-    device: Device
-    scene: Scene
-    plant: Records
-    """Type `PLANT`, shape (1,)."""
-    residual: float
-    """Fill of a driven chamber at which gas enters its port."""
-    unreachable: float
-    """Vibration that remains with the liquid where the gas can bring it, m."""
-    beyond_disc: float
-    """The same with gas that empties a chamber to its residual fill, m."""
-    usable_moment: float
-    """Towards its own unbalance, kg m."""
-    unbalance: float
-    """kg m."""
+    devices: tuple[Device, ...]
+    """Those that differ in numbers alone stand beside each other."""
+    scenes: tuple[Scene, ...]
+    """What they run as."""
+    kinds: tuple[tuple[slice, Scene], ...]
+    """Places of those that differ in numbers alone, and these as one scene."""
+    plants: Records
+    """Type `PLANT`."""
+    fields: Mapping[str, Any]
+    """Of their runs, shape (n,)."""
+    held: bool
+    """Whether an empty tube fills up to its crest before liquid passes."""
+    noise: Callable[[int], FloatArray]
 
     @classmethod
     def of(
-        cls, device: Device, scene: Scene, plant: Records, dynamics: Dynamics, residual: float, stalled: float
-    ) -> _Under:
-        total = 2 * scene.disc.initial_fill
-        least = min(max(residual, stalled), total / 2)
-        ring = LiquidRing(model=device.model, chambers=scene.disc.chambers, dynamics=dynamics, total=total)
+        cls, drawn: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str], noise: Any
+    ) -> _Group:
+        """Args: `scenes`: of the devices, with what they run under. `noise`: as `noise_table`, by number."""
+        order = alike(scenes)
+        places = [place for kind in order for place in kind]
+        some, scenes = tuple(drawn[place] for place in places), [scenes[place] for place in places]
+        plants, edges = empty_plants(len(some)), np.cumsum([0, *map(len, order)]).tolist()
+        # What is held in the tube follows from the other terms, of all devices at once.
+        before = [term for term in modelled if term != HELD]
+        for place, (device, scene) in enumerate(zip(some, scenes, strict=True)):
+            total = 2 * scene.disc.initial_fill
+            dynamics = dynamics_of(scene=scene, model=device.model, modelled=before, checked=True)
+            dynamics.fill(plants[place : place + 1], total=total, relative_error=RELATIVE_ERROR)
+            tabulate_moment(plants[place], device.model, total=total)
         return cls(
-            device=device,
-            scene=scene,
-            plant=plant,
-            residual=residual,
-            unreachable=ring.unreachable_vibration(rotor=scene.rotor, least_fill=least),
-            beyond_disc=ring.unreachable_vibration(rotor=scene.rotor, least_fill=residual),
-            usable_moment=device.moment
-            * ring.moment_towards(-scene.rotor.initial_unbalance, least_fill=least),
-            unbalance=device.moment * abs(scene.rotor.initial_unbalance),
+            devices=some,
+            scenes=tuple(scenes),
+            kinds=tuple(
+                (slice(*ends), Designs.stacked(scenes[slice(*ends)]).scene) for ends in pairwise(edges)
+            ),
+            plants=plants,
+            fields={
+                "plant": np.arange(len(some)),
+                "speed": np.array([each.speed for each in some]),
+                "start": np.array([each.rotor.initial_vibration for each in scenes]),
+                "gain": np.array([each.rotor.influence for each in scenes]),
+                "noise_floor": np.array([noise_floor(each) for each in scenes]),
+            },
+            held=HELD in modelled,
+            noise=partial(noise, tuple(each.number for each in some)),
         )
 
-    def carried(
-        self, plan: LoopPlan, gains: Sequence[float], *, noise: Sequence[np.random.Generator]
-    ) -> Records:
-        """Runs to their ends, one for each gain. Args: `noise`: of each sensor; none where it is exact."""
-        runs = plan.runs(len(gains))
-        runs["speed"], runs["proportional"] = self.device.speed, gains
-        runs["gain"] = self.scene.rotor.influence
-        runs["residual_fill"] = self.residual
-        plan.carry(runs, noise)
-        return runs
+    def under(self, pressures: FloatArray) -> _Under:
+        """The devices under gas pressures, Pa."""
+        plants, residual, stalled = self.plants, np.zeros(pressures.size), np.zeros(pressures.size)
+        plants["gas_pressure"] = pressures
+        for rows, kind in self.kinds:
+            designs = Designs.of(kind, {"gas.pressure": pressures[rows]})
+            if self.held:
+                hold_liquid(plants[rows], designs)
+            residual[rows] = residual_fills(plants[rows], designs)
+        stalled_fills(plants, stalled)
+        unbalance = [each.rotor.initial_unbalance for each in self.scenes]
+        sizes = np.array([abs(each) for each in unbalance])
+        towards = np.array([-each / abs(each) if each else 1.0 for each in unbalance])
+        factors = np.array([each.moment for each in self.devices])
+        influence = np.array([each.rotor.influence_coefficient for each in self.scenes])
+        disc = self.scenes[0].disc
+        total = 2 * disc.initial_fill
+        emptied = np.stack([np.minimum(np.maximum(residual, stalled), total / 2), residual], axis=1)
+        moments = [
+            largest_pair_moments(each.model, total=total, least_fill=least)
+            for each, least in zip(self.devices, emptied, strict=True)
+        ]
+        usable, beyond = corners_of(np.stack(moments, axis=1), disc.chambers)
+        return _Under(
+            group=self,
+            changed={name: plants[name].copy() for name in _CHANGED},
+            residual=residual,
+            unreachable=unreachable_moment(usable, -np.array(unbalance)) * influence,
+            beyond_disc=unreachable_moment(beyond, -np.array(unbalance)) * influence,
+            usable_moment=factors * moment_towards(usable, towards),
+            unbalance=factors * sizes,
+            work=np.array(
+                [
+                    compression_work(
+                        pressure_volume=1.0,
+                        pressure=pressure + each.gas.ambient_pressure,
+                        ambient_pressure=each.gas.ambient_pressure,
+                    )
+                    for pressure, each in zip(pressures.tolist(), self.scenes, strict=True)
+                ]
+            ),
+        )
 
 
-def _under(drawn: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str]) -> Iterator[_Under]:
-    """Devices under one gas pressure whose scenes are alike; with each its scene there."""
-    plants, stack = empty_plants(len(drawn)), Designs.stacked(scenes)
-    # What is held in the tube follows from the other terms, of all devices at once.
-    before = [term for term in modelled if term != HELD]
-    dynamics = [
-        dynamics_of(scene=scene, model=device.model, modelled=before, checked=True)
-        for device, scene in zip(drawn, scenes, strict=True)
-    ]
-    for place, (each, scene) in enumerate(zip(dynamics, scenes, strict=True)):
-        each.fill(plants[place : place + 1], total=2 * scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
-    if HELD in modelled:
-        hold_liquid(plants, stack)
-    stalled, residual = np.zeros(len(drawn)), residual_fills(plants, stack)
-    stalled_fills(plants, stalled)
-    rows = zip(drawn, scenes, dynamics, residual.tolist(), stalled.tolist(), strict=True)
-    for place, (device, scene, each, drawn_to, stalls_at) in enumerate(rows):
-        yield _Under.of(device, scene, plants[place : place + 1], each, drawn_to, stalls_at)
+_CHANGED: Final = ("gas_pressure", "lift_straight", "lift_entrance")
+"""Fields of a plant that the gas pressure changes."""
 
 
-def _result(under: _Under, run: np.void, *, limit: float) -> RunResult:
-    """What a run comes to."""
-    gas = under.scene.gas
-    rests = run["cause"] == AT_REST and run["since"] < math.inf
-    settled = run["settled"] > 0 or rests
-    since = run["held_since"] if run["settled"] > 0 else run["since"]
-    work = compression_work(
-        pressure_volume=float(run["gas"]),
-        pressure=gas.pressure + gas.ambient_pressure,
-        ambient_pressure=gas.ambient_pressure,
-    )
-    return RunResult(
-        settling_time=float(since) if settled else math.inf,
-        final_amplitude=float(run["amplitude"]),
-        energy=work,
-        usable_moment=under.usable_moment,
-        unbalance=under.unbalance,
-        ended=str(Outcome.SETTLED if settled else _why(under, run, limit)),
-    )
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Under:
+    """A group under gas pressures of its devices; arrays of shape (n,)."""
 
+    group: _Group
+    changed: Mapping[str, FloatArray]
+    residual: FloatArray
+    """Fill of a driven chamber at which gas enters its port."""
+    unreachable: FloatArray
+    """Vibration that remains with the liquid where the gas can bring it, m."""
+    beyond_disc: FloatArray
+    """The same with gas that empties a chamber to its residual fill, m."""
+    usable_moment: FloatArray
+    """Towards its own unbalance, kg m."""
+    unbalance: FloatArray
+    """kg m."""
+    work: FloatArray
+    """Least that compresses the gas, over its p V."""
 
-def _at_best(under: _Under) -> RunResult:
-    """With the liquid at its best, of a device whose chambers cannot bring it to the limit."""
-    return RunResult(
-        settling_time=math.inf,
-        final_amplitude=under.unreachable,
-        energy=math.nan,
-        usable_moment=under.usable_moment,
-        unbalance=under.unbalance,
-        ended=str(Outcome.CAPACITY_EXCEEDED),
-    )
-
-
-def _why(under: _Under, run: np.void, limit: float) -> Outcome:
-    """What kept a run from settling."""
-    if under.beyond_disc > limit:
-        return Outcome.CAPACITY_EXCEEDED
-    if under.unreachable > limit:
-        return Outcome.STALLED
-    if run["drains"] or run["drift"] > NOTICEABLE:
-        return Outcome.DRIFTING
-    if run["cause"] == RISING:
-        return Outcome.DIVERGING
-    if run["lost"] > 0:
-        return Outcome.HOVERING
-    return Outcome.GAS_TIME_TOO_SHORT if run["cause"] == IDLE else Outcome.TIME_LIMIT
+    def ran(
+        self, plan: LoopPlan, rows: IntArray, *, whole: bool, limit: float
+    ) -> tuple[FloatArray, IntArray]:
+        """What runs of some devices come to, shape (`ARRAYS`, settings, rows), and places in `_ENDS`."""
+        shape, group = (plan.loops.size, rows.size), self.group
+        numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
+        # With the liquid at its best, of devices whose chambers cannot bring it to the limit.
+        numbers[0], numbers[1], numbers[2] = math.inf, self.unreachable[rows], math.nan
+        numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
+        carried = whole | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
+        if not carried.any():
+            return numbers, ends
+        rows = rows[carried]
+        for name, values in self.changed.items():
+            group.plants[name] = values
+        fields = {**group.fields, "residual_fill": self.residual}
+        runs = plan.runs(rows.size, **{name: values[rows] for name, values in fields.items()})
+        plan.carry(runs, group.plants, group.noise)
+        runs = runs.reshape(plan.loops.size, rows.size)
+        held = runs["settled"] > 0
+        settled = held | ((runs["cause"] == AT_REST) & (runs["since"] < math.inf))
+        since = np.where(held, runs["held_since"], runs["since"])
+        numbers[0][:, carried] = np.where(settled, since, math.inf)
+        numbers[1][:, carried] = runs["amplitude"]
+        numbers[2][:, carried] = runs["gas"] * self.work[rows]
+        shown = (
+            settled,
+            self.beyond_disc[rows] > limit,
+            self.unreachable[rows] > limit,
+            (runs["drains"] > 0) | (runs["drift"] > NOTICEABLE),
+            runs["cause"] == RISING,
+            runs["lost"] > 0,
+            runs["cause"] == IDLE,
+            True,
+        )
+        ends[:, carried] = np.argmax([np.broadcast_to(each, settled.shape) for each in shown], axis=0)
+        return numbers, ends
 
 
 def _group(number: int) -> range:
@@ -314,11 +358,3 @@ def _group(number: int) -> range:
     start, place = number - number % _GROUPS[-1], number % _GROUPS[-1]
     after = next(each for each in range(len(_GROUPS)) if _GROUPS[each] > place)
     return range(start + _GROUPS[after - 1], start + _GROUPS[after])
-
-
-def _grouped(settings: Sequence[_Setting], key: Any) -> Iterator[tuple[Any, list[_Setting]]]:
-    """Settings that are alike in a key, in the order of the first of each."""
-    groups: dict[Any, list[_Setting]] = {}
-    for each in settings:
-        groups.setdefault(key(each), []).append(each)
-    yield from groups.items()

@@ -23,12 +23,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector
-from ringbalance.controller.algorithms.law_based import (
-    LawBased,
-    controller_of,
-    fill_for_moment,
-    first_memory,
-)
+from ringbalance.controller.algorithms.law_based import LawBased, controller_of, first_memory
 from ringbalance.controller.algorithms.law_steps import (
     CHANGE,
     HIGHEST_CHANGE,
@@ -36,12 +31,13 @@ from ringbalance.controller.algorithms.law_steps import (
     change_of,
     split,
 )
-from ringbalance.controller.loop_records import MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import Information
 from ringbalance.reduced_model.gas_line import line_document, line_text
+from ringbalance.reduced_model.injection.dynamics import empty_plants
 from ringbalance.reduced_model.injection.line_answers import line_answers
+from ringbalance.reduced_model.injection.moment import fill_for_moment, tabulate_moment
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.reduced_model.terms import neglected_in_injections
@@ -153,11 +149,9 @@ def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
         row[at + LOWEST_CHANGE], row[at + HIGHEST_CHANGE] = float(low - now), float(high - now)
     unbalance = scene.rotor.initial_unbalance
     split(row, 0, pairs, -unbalance.real, -unbalance.imag)
-    table = MomentTable.of(model=model, total=total)
-    fills = [
-        fill_for_moment(table.nodes, table.lowest, table.step, float(now) + row[at + CHANGE], lowest, highest)
-        for at in places
-    ]
+    plant = empty_plants(1)[0]
+    tabulate_moment(plant, model, total=total)
+    fills = [fill_for_moment(plant, float(now) + row[at + CHANGE], lowest, highest) for at in places]
     return np.asarray(np.clip(np.array(fills), lowest, highest), dtype=np.float64)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.injection.dynamics import Dynamics
@@ -61,51 +62,60 @@ class LiquidRing:
         """Moment of a pair with its usable liquid moved to one side, along and across, kg m.
 
         Args: `least_fill`: to which a chamber is emptied; default `LiquidRing.least_fill`.
-        Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
         """
-        least = self.least_fill if least_fill is None else min(least_fill, self.total / 2)
-        highest = min(self.total - least, self.model.flow.max_fill_ratio)
-        moment = self.model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=self.total - highest)
-        return complex(moment)
+        least = np.asarray(self.least_fill if least_fill is None else least_fill)
+        return complex(largest_pair_moments(self.model, total=self.total, least_fill=least))
 
     def unreachable_vibration(self, *, rotor: Rotor, least_fill: float | None = None) -> float:
         """Vibration that remains with the liquid at its best, m; zero within capacity.
 
-        It follows from the distance between the moment that is wanted and the nearest that the disc can form.
         Args: `least_fill`: as `largest_pair_moment`.
-        Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
         """
-        corners = self._corners(least_fill)
-        edges = np.roll(corners, -1) - corners
-        offset = -rotor.initial_unbalance - corners
-        if np.all((edges.conj() * offset).imag > 0):
-            return 0.0
-        along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
-        return float(np.min(np.abs(offset - along * edges))) * rotor.influence_coefficient
+        corners = corners_of(self.largest_pair_moment(least_fill=least_fill), self.chambers)
+        left = unreachable_moment(corners, np.asarray(-rotor.initial_unbalance))
+        return float(left) * rotor.influence_coefficient
 
     def moment_towards(self, direction: complex, *, least_fill: float | None = None) -> float:
         """Largest moment that the disc forms in a direction, kg m. Args: `least_fill`: as above."""
-        corners = self._corners(least_fill)
-        edges = np.roll(corners, -1) - corners
-        towards = direction / abs(direction) if direction else 1.0
-        # On the line of an edge: Im(edge* (t direction - corner)) = 0.
-        crossed = (edges.conj() * towards).imag
-        if not np.any(crossed < 0):
-            # Nothing moves, or two chambers lie along the direction.
-            return float(np.max(np.abs(corners)))
-        reached = (edges.conj() * corners).imag / np.where(crossed < 0, crossed, -np.inf)
-        return float(np.min(np.where(crossed < 0, reached, np.inf)))
+        corners = corners_of(self.largest_pair_moment(least_fill=least_fill), self.chambers)
+        return float(moment_towards(corners, np.asarray(direction / abs(direction) if direction else 1.0)))
 
-    def _corners(self, least_fill: float | None) -> ComplexArray:
-        """Of the moments that the disc can form: every pair fully to one side or the other, kg m."""
-        if least_fill not in self._corners_found:
-            moment = self.largest_pair_moment(least_fill=least_fill)
-            self._corners_found[least_fill] = moment * _corner_directions(self.chambers)
-        return self._corners_found[least_fill]
 
-    @cached_property
-    def _corners_found(self) -> dict[float | None, ComplexArray]:
-        return {}
+def largest_pair_moments(model: BalancerModel, *, total: float, least_fill: FloatArray) -> ComplexArray:
+    """Moments of a pair whose usable liquid is moved to one side, along and across, kg m.
+
+    Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
+    """
+    highest = np.minimum(total - np.minimum(least_fill, total / 2), model.flow.max_fill_ratio)
+    return model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=total - highest)
+
+
+def corners_of(pair_moment: npt.ArrayLike, chambers: int) -> ComplexArray:
+    """Corners of the moments that discs form: every pair fully to one side or the other, shape (..., n)."""
+    return np.asarray(np.asarray(pair_moment)[..., None] * _corner_directions(chambers))
+
+
+def unreachable_moment(corners: ComplexArray, wanted: ComplexArray) -> FloatArray:
+    """Distance between the moment that is wanted of each disc and the nearest that it can form, kg m.
+
+    Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
+    """
+    edges = np.roll(corners, -1, axis=-1) - corners
+    offset = wanted[..., None] - corners
+    along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
+    inside = np.all((edges.conj() * offset).imag > 0, axis=-1)
+    return np.where(inside, 0.0, np.min(np.abs(offset - along * edges), axis=-1))
+
+
+def moment_towards(corners: ComplexArray, towards: ComplexArray) -> FloatArray:
+    """Largest moment that each disc forms in a direction of length one, kg m."""
+    edges = np.roll(corners, -1, axis=-1) - corners
+    # On the line of an edge: Im(edge* (t direction - corner)) = 0.
+    crossed = (edges.conj() * towards[..., None]).imag
+    reached = (edges.conj() * corners).imag / np.where(crossed < 0, crossed, -np.inf)
+    nearest = np.min(np.where(crossed < 0, reached, np.inf), axis=-1)
+    # Without any: nothing moves, or two chambers lie along the direction.
+    return np.asarray(np.where(np.any(crossed < 0, axis=-1), nearest, np.max(np.abs(corners), axis=-1)))
 
 
 @cache

@@ -20,6 +20,7 @@ from ringbalance.physics.gas import (
     VENTED,
     GasLine,
 )
+from ringbalance.reduced_model.injection.moment import MOMENT_NODES
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -93,8 +94,9 @@ _PLANT_REAL: Final = (
     "residual",  # of a single run, as below
     "relative_error",  # allowed to one step
     "first_step",  # s, after a jump of the rates
-    "lowest_fill",  # at which `rows` begin
+    "lowest_fill",  # at which `rows` and `moment` begin
     "cells_per_fill",
+    "moment_step",  # between the nodes of the moment, in x
 )
 _PLANT_WHOLE: Final = (
     "crest",  # whether there is one
@@ -110,13 +112,14 @@ PLANT: Final = np.dtype(
     [(name, np.float64) for name in _PLANT_REAL]
     + [(name, np.int64) for name in _PLANT_WHOLE]
     + [
+        ("moment", np.complex128, (MOMENT_NODES, 2)),  # of a pair, along and across: value, slope per step
         ("numbers", np.float64, (NUMBERS,)),  # of the law, as `point` reads it
         ("root_cells", np.float64, (WAYS, ROOT_PLACES)),  # where to look for the root of a velocity
         ("roots", np.float64, (ROWS, WIDTH_OF_ROOT)),  # beside `rows`, next to such roots
         ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # its pieces, or those of a law that is tabled
     ]
 )
-"""Constants of a plant with moving liquid, filling gas and late valves."""
+"""Constants of a plant with moving liquid, filling gas, late valves and moments of its pairs."""
 
 
 def empty_plants(count: int) -> Records:

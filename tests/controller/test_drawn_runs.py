@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from ringbalance.controller.balancer import Draws, Outcomes, balancer_of
+from ringbalance.controller.balancer import ARRAYS, Draws, Outcomes, balancer_of
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.devices import Spread, devices
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
-from ringbalance.controller.loop_plan import LoopPlan
-from ringbalance.controller.loop_records import NOTES
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import SPARE, advance, least_later, opening_within
+from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid, residual_fill_ratio
@@ -141,6 +141,24 @@ def test_static_intervals_are_those_of_the_draws(paper_scene: Scene, calibrated:
     assert 1.96 * np.std(fills) == pytest.approx(static.fill_ratio_uncertainty, rel=0.2)
 
 
+def test_runs_of_many_settings_and_devices_are_those_of_each_alone(balancer: LiquidRingBalancer) -> None:
+    pressures: list[dict[str, Any]] = [{}, {"gas.pressure": 0.6e6}]
+    settings = [
+        {**gain, **kind, **pressure}
+        for pressure in pressures
+        for kind in ({}, {"controller.kind": "law_based"})
+        for gain in GAINS
+    ]
+    numbers = (1, 2, 5, 17)
+    together = balancer.run_all(settings, Draws(numbers=numbers, whole=False))
+    for each, outcomes in zip(settings, together, strict=True):
+        for place, number in enumerate(numbers):
+            (alone,) = balancer.run_all([each], Draws(numbers=(number,), whole=False))
+            assert alone.ended == outcomes.ended[place : place + 1]
+            for name in ARRAYS:
+                assert getattr(alone, name)[0].tobytes() == getattr(outcomes, name)[place].tobytes()
+
+
 def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
     balancer: LiquidRingBalancer, paper_scene: Scene
 ) -> None:
@@ -151,21 +169,11 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
         spread=Spread.of(paper_scene, balancer.model),
         limit=balancer.limit,
     )
-    made = tuple(chosen.device(number) for number in range(4))
-    for under in chosen._under(made, paper_scene.gas.pressure):
-        plant, motions, w = under.plant[0], np.zeros(1 + SPARE, dtype=MOTION), np.zeros(WORKSPACE)
-        rest = LoopPlan.of(
-            scene=under.scene,
-            model=under.device.model,
-            plant=under.plant,
-            controller=chosen._setting(0, {}).controller,
-            most_samples=1,
-        )
-        runs = rest.runs(1)
-        runs["speed"], runs["residual_fill"] = 1.0, under.residual
-        begun = np.zeros((1, 2 * rest.pairs + SPARE), dtype=MOTION)
-        rest._continued(runs, begun, rest.liquid[None], np.zeros((1, 0, 2)), np.zeros(NOTES), w, traced=False)
-        motions[0] = begun[0, 0]
+    under = chosen._under(range(4), True, paper_scene.gas.pressure)
+    for plant, residual in zip(under.group.plants, under.residual, strict=True):
+        motions, w = np.zeros(1 + SPARE, dtype=MOTION), np.zeros(WORKSPACE)
+        motions[0] = at_rest(plant[None], fill=paper_scene.disc.initial_fill)[0]
+        motions[0]["residual"] = residual
 
         def lowest(
             time: float, plant: np.void = plant, motions: Records = motions, w: FloatArray = w
@@ -177,7 +185,7 @@ def test_a_shortened_opening_is_the_longest_that_keeps_the_residual_fill(
 
         longest = opening_within(plant, motions, 0, 1, 0, 5.0, lowest(5.0), w)
         assert 0.0 < longest < 5.0
-        assert lowest(longest) >= under.residual > lowest(1.000001 * longest)
+        assert lowest(longest) >= residual > lowest(1.000001 * longest)
         half = longest / 2
         assert opening_within(plant, motions, 0, 1, 0, half, lowest(half), w) == half
 

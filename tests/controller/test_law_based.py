@@ -21,16 +21,16 @@ from ringbalance.controller.algorithms.law_based import (
     LawBased,
     _gas_time,
     controller_of,
-    fill_for_moment,
     first_memory,
 )
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.loop_records import LOOP, MOMENT_NODES
+from ringbalance.controller.loop_records import LOOP
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.stepped import Stepped
-from ringbalance.reduced_model.injection.dynamics import WORKSPACE
+from ringbalance.reduced_model.injection.dynamics import PLANT, WORKSPACE
+from ringbalance.reduced_model.injection.moment import MOMENT_NODES, fill_for_moment
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
@@ -150,10 +150,12 @@ def test_the_fill_for_a_moment_goes_on_straight_beyond_the_ends() -> None:
     per_fill = 0.072 * 1000.0 * 6e-5
     fills = np.linspace(0.0, 0.5, MOMENT_NODES)
     values = moment.pair_vector(fill_ratio=fills, opposite_fill_ratio=0.5 - fills)
-    nodes = np.stack([values, np.gradient(values)], axis=1)
+    plant = np.zeros(1, dtype=PLANT)[0]
+    plant["moment_step"] = 0.5 / (MOMENT_NODES - 1)
+    plant["moment"][:, 0], plant["moment"][:, 1] = values, np.gradient(values)
     for x in (-0.2, 0.0, 0.1, 0.25, 0.5, 0.6):
         wanted = per_fill * (x - 0.25)
-        found = fill_for_moment(nodes, 0.0, 0.5 / (MOMENT_NODES - 1), wanted, 0.0, 0.5)
+        found = fill_for_moment(plant, wanted, 0.0, 0.5)
         assert found == pytest.approx(x, abs=1e-10)
 
 

@@ -22,13 +22,13 @@ QUANTITIES: Final = ("lambda", "moment", "velocity", "drag_coefficient", "stall_
 def calibrated_row(scene: SceneFile, point: Point) -> Record:
     """Value and expanded uncertainty (95 %) by numerics and models of what `calibrate` finds, by name."""
     try:
-        budgets = calibrate(point_scene(scene, point)).budgets
+        known = calibrate(point_scene(scene, point)).quantities
     except (SceneError, *FAULTS):
         return {}
     return {
-        name: [budgets[name].value, math.hypot(budgets[name].numerical, budgets[name].model)]
+        name: [known[name].value, math.hypot(parts.numerical, parts.model)]
         for name in QUANTITIES
-        if name in budgets
+        if name in known and (parts := known[name].parts)
     }
 
 

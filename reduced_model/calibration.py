@@ -8,11 +8,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics.tube.loss import VELOCITIES, tube_loss
-from ringbalance.reduced_model.calibration_record import Calibration, OperatingPoint
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.calibration_rows import calibration_rows
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
@@ -20,10 +21,11 @@ from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, Balanc
 from ringbalance.reduced_model.law.making import calibrated_law
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.reduced_model.pressure_profile import TubeLiquid
-from ringbalance.reduced_model.residual_liquid import ResidualLiquid
 from ringbalance.reduced_model.terms import models_used
+from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.results.result import Presentation
+from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
@@ -40,7 +42,7 @@ def calibrate(scene: AnyScene) -> Calibration:
     """
     scene = liquid_ring_scene(scene)
     chamber, law = chamber_and_law(scene)
-    heads, point = law.heads, OperatingPoint.of(scene=scene, law=law)
+    heads = law.heads
     return Calibration(
         presentation=Presentation(document=calibration_document, rows=calibration_rows),
         scene=scene,
@@ -48,8 +50,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         tube=tube_loss(scene, np.geomspace(*VELOCITIES, VELOCITY_POINTS)),
         flow_law=law,
         paper_law=paper_law(scene),
-        operating_point=point,
-        residual=ResidualLiquid.of(scene, law=law),
+        answers=_answers(scene, chamber),
         tube_liquid=TubeLiquid.of(scene, law=law),
         instability=AsynchronousInstability.of(scene),
         models_used=models_used(scene),
@@ -65,6 +66,16 @@ def calibrate(scene: AnyScene) -> Calibration:
             "moment_table_error_kg_m": float(np.max(chamber.moment.interpolation)),
         },
     )
+
+
+def _answers(scene: Scene, chamber: ChamberCalibration) -> Answers:
+    """The answers of one scene as numbers, by the curves of its chamber, which hold gravity."""
+    tube = TubeFlow.of(Designs.stacked([scene]), curve=chamber.hydrostatic_pressure.table.quintic)
+    found = Answers.of_tubes(tube, moments=chamber.moment.table.quintic)
+    row = {name: values[0] for name, values in vars(found).items()}
+    row["wall_pressure"] = chamber.wall_pressure.value[chamber.reported[-1]]
+    row["moment_per_mass"] = chamber.moment_per_mass.value[()]
+    return Answers(**row)
 
 
 def calibrated_model(scene: Scene, *, checked: bool = True, varied: bool = True) -> BalancerModel:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
-from ringbalance.reduced_model.calibration_record import Budget, Calibration
+from ringbalance.reduced_model.calibration_record import MAIN, Calibration
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
@@ -20,31 +20,12 @@ from ringbalance.reduced_model.documents import (
 )
 from ringbalance.reduced_model.gas_line import line_text
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.regime import cavity_pressure
 from ringbalance.results.numbers import believed, given, rounded
 from ringbalance.results.result import Rows, Table, models_table
-from ringbalance.results.rows import Finding, Parts, Quantity, around, sentences
+from ringbalance.results.rows import Finding, sentences
 from ringbalance.scene.models import Scene
 
-_NAMES: Final = MappingProxyType(
-    {
-        "lambda": ("lambda per transferred mass", "λ"),
-        "usable_moment": ("usable moment of a pair", "U"),
-        "velocity": ("velocity at the operating point", "u"),
-        "drag_coefficient": ("k there", "k"),
-        "chamber_volume": ("volume of a chamber", "V"),
-        "wall_pressure": ("wall pressure, largest fill", "p"),
-        "moment": ("moment of a chamber, largest fill", "U"),
-        "least_fill_ratio": ("smallest usable fill ratio", "x"),
-        "stall_pressure": ("full siphon stalls, chamber empty", "p"),
-        "priming_pressure_vented": ("priming pressure, vented", "p"),
-        "priming_pressure_trapped": ("priming pressure, trapped", "p"),
-        "crest_pressure": ("gauge pressure over the crest", "p"),
-        "cavitation_margin": ("cavitation margin over the crest", "Δp"),
-    }
-)
-"""Of the budgets' quantities: name and symbol, in the order in which they are shown."""
-_MAIN: Final = ("lambda", "usable_moment", "reach", "velocity")
-"""Come first, and alone in a short text."""
 _ASIDE: Final = 0.01
 """Angle below which a chamber counts as symmetric, deg."""
 _NEXT_TO_NOTHING: Final = 1e-3
@@ -56,12 +37,15 @@ _MARKS: Final = MappingProxyType(
 
 def calibration_rows(calibration: Calibration) -> Rows:
     """Quantities with their expanded uncertainties (95 %), findings, and tables over fill and velocity."""
-    scene, point = calibration.scene, calibration.operating_point
-    where = f"{given(point.gas_pressure, 'Pa')}, equal fills of {point.fill_ratio:g}: {point.regime.label}"
+    scene = calibration.scene
+    where = (
+        f"{given(scene.gas.pressure, 'Pa')}, equal fills of {scene.disc.max_fill_ratio / 2:g}: "
+        f"{calibration.regime.label}"
+    )
     return Rows(
         title=f"Calibration of {scene.name} ({scene.source})",
-        quantities=tuple(sorted(_quantities(calibration), key=lambda each: each.key not in _MAIN)),
-        main=len(_MAIN),
+        quantities=tuple(calibration.quantities.values()),
+        main=MAIN,
         findings=tuple(_findings(calibration)),
         facts=(("operating point", where), ("gas line", line_text(calibration.gas_line))),
         tables=(
@@ -76,50 +60,6 @@ def calibration_rows(calibration: Calibration) -> Rows:
 def _known(calibration: Calibration, value: float, total: float | None) -> float | None:
     """An uncertainty, as far as the scene's inputs can be believed."""
     return believed(value, total, stated=bool(calibration.scene.uncertainty))
-
-
-def _quantities(calibration: Calibration) -> Iterator[Quantity]:
-    budgets, rest, tube = calibration.budgets, calibration.residual, calibration.tube_liquid
-    moment, fill = budgets["usable_moment"].total, budgets["least_fill_ratio"].total
-    yield from (_of_budget(calibration, name, budgets[name]) for name in _NAMES if name in budgets)
-    volume = 2 * fill * calibration.chamber.volume
-    rows = (
-        ("reach", "usable moment in any direction", "kg m", rest.reach, rest.reach_share * moment),
-        ("usable_volume", "usable volume of a pair", "m^3", rest.usable_volume, volume),
-        ("residual_depth", "liquid over the port as gas enters", "m", rest.depth, rest.depth_uncertainty),
-        ("largest_fill_ratio", "largest usable fill ratio", "1", rest.largest_fill_ratio, fill),
-        ("lambda_variation", "variation of lambda over fills", "1", calibration.lambda_variation, None),
-        (
-            "stall_pressure_paper",
-            "stall pressure by Eq. 19",
-            "Pa",
-            calibration.operating_point.stall_paper,
-            None,
-        ),
-        ("flowing_vibration", "vibration by tube liquid, flowing", "m", tube.flowing_vibration, None),
-        ("lasting_vibration", "vibration by tube liquid, lasting", "m", tube.lasting_vibration, None),
-        ("returned_volume", "liquid that falls back", "m^3", tube.returned_volume, None),
-    )
-    for key, name, unit, value, total in rows:
-        low, high = around(value, total, stated=bool(calibration.scene.uncertainty))
-        yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, digits=3)
-
-
-def _of_budget(calibration: Calibration, key: str, budget: Budget) -> Quantity:
-    name, symbol = _NAMES[key]
-    low, high = around(budget.value, budget.total, stated=bool(calibration.scene.uncertainty))
-    if low is not None:
-        low, high = budget.lower, budget.upper
-    return Quantity(
-        key=key,
-        name=name,
-        symbol=symbol,
-        unit=budget.unit,
-        value=budget.value,
-        lower=low,
-        upper=high,
-        parts=Parts(numerical=budget.numerical, input=budget.input, model=budget.model),
-    )
 
 
 def _findings(calibration: Calibration) -> Iterator[Finding]:
@@ -153,23 +93,27 @@ def _mesh_findings(scene: Scene) -> Iterator[Finding]:
 
 
 def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
-    point, rest, budgets = calibration.operating_point, calibration.residual, calibration.budgets
-    known = {each.key: each for each in _quantities(calibration)}
-    if point.regime is Regime.BLOCKED:
+    scene, known, answers = calibration.scene, calibration.quantities, calibration.answers
+    if calibration.regime is Regime.BLOCKED:
         names = ("priming_pressure_vented", "stall_pressure")
-        needed = max(budgets[name].upper for name in names if name in budgets)
-        yield Finding(code="blocked", values={"gas_pressure": point.gas_pressure, "pressure": needed})
-    if rest.least_fill_ratio > 0:
-        code = "draw_down" if rest.limited_by == "draw_down" else "gas_stalls"
+        needed = max(known[name].upper or known[name].value or 0.0 for name in names if name in known)
+        yield Finding(code="blocked", values={"gas_pressure": scene.gas.pressure, "pressure": needed})
+    if answers.least_fill_ratio > 0:
+        code = "draw_down" if answers.residual_fill_ratio >= answers.stalled_fill_ratio else "gas_stalls"
         values = {"fill_ratio": known["least_fill_ratio"], "depth": known["residual_depth"]}
         yield Finding(code=code, values=values)
-    if point.cavitation_margin is not None:
-        margin, budget = point.cavitation_margin, budgets.get("cavitation_margin")
-        width = (point.cavitation_margin_uncertainty or 0.0) if budget is None else budget.total
+    if "cavitation_margin" in known:
+        margin, parts, law = (
+            float(answers.cavitation_margin),
+            known["cavitation_margin"].parts,
+            calibration.flow_law,
+        )
+        half = law.max_fill_ratio / 2
+        ends = law.ends(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=scene.gas.pressure)
         held = "crest_column_holds" if margin > 0 else "crest_column_separates"
         yield Finding(
-            code="crest_column_undecided" if abs(margin) < width else held,
-            values={"margin": abs(margin), "cavity_pressure": point.cavity_pressure},
+            code="crest_column_undecided" if parts is not None and abs(margin) < parts.total else held,
+            values={"margin": abs(margin), "cavity_pressure": float(cavity_pressure(law.path, ends))},
         )
 
 

@@ -1,10 +1,11 @@
-"""The calibration of many designs at once: arrays in, arrays out, without gravity, tables and meshes.
+"""The calibration of many designs at once: arrays in, arrays out, without meshes.
 
 Chamber by closed forms, tube by its loss, regimes by `column_flow`; velocities are found on the loss itself.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -12,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -21,6 +23,7 @@ from ringbalance.reduced_model.tube.regime import (
     TubeEnds,
     can_flow,
     cavity_pressure,
+    driving_pressure,
     priming_pressure,
     resting_pressure,
     stall_pressure,
@@ -36,8 +39,9 @@ _TOGETHER: Final = 8192
 class Answers:
     """What a calibration answers of n designs: arrays of shape (n,), SI, NaN where one has no such thing.
 
-    Gravity is left out.  Where an input differs between designs all that depends on it does: the coefficient
-    of loss k is that at the velocity of each design, not at one velocity for all.
+    Gravity is left out, but of a single scene with its chamber's curves.  Where an input differs between
+    designs all that depends on it does: the coefficient of loss k is that at the velocity of each design, not
+    at one velocity for all.
     """
 
     chamber_volume: FloatArray
@@ -57,7 +61,7 @@ class Answers:
     crest_pressure: FloatArray
     """At the end of the crest's arc in that flow, gauge, Pa."""
     cavitation_margin: FloatArray
-    """Lowest pressure of a full siphon less the cavity's, Pa."""
+    """Lowest pressure of a full siphon, of a primed tube that is blocked, less the cavity's, Pa."""
     stall_pressure: FloatArray
     """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
     priming_pressure_vented: FloatArray
@@ -70,10 +74,22 @@ class Answers:
     """Of the driven chamber, at which an injection moves no liquid any more."""
     least_fill_ratio: FloatArray
     """To which injections can bring a chamber."""
+    largest_fill_ratio: FloatArray
+    """That the opposite chamber reaches then."""
+    residual_depth: FloatArray
+    """Of the liquid over the port as gas enters it, m."""
+    usable_volume: FloatArray
+    """That a pair can move from one chamber to the other, m^3."""
     usable_moment: FloatArray
     """Largest moment of a pair to which injections can bring it, kg m."""
     reach: FloatArray
-    """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m."""
+    """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m.
+
+    Each of n pairs, pi/n apart, gives a moment between -U and U along its axis: together a regular polygon of
+    2 n sides, U/sin(pi/(2 n)) to its corners and U cot(pi/(2 n)) to its sides: U with four chambers, 1.73 U
+    with six, as a chamber that has nothing to give leaves its share to other pairs.
+    Source: elementary geometry (a sum of segments is a zonotope).
+    """
     holds: BoolArray
     """Whether the fullest chamber keeps its liquid with the gas off."""
     loop_factor: FloatArray
@@ -95,7 +111,7 @@ class Answers:
             tube = (
                 near.of_neighbours(part, rows % near.designs.size) if near else TubeFlow.of(part, waves=moved)
             )
-            parts.append(cls._of(tube))
+            parts.append(cls.of_tubes(tube))
         if len(parts) == 1:
             return parts[0]
         return cls(
@@ -103,10 +119,16 @@ class Answers:
         )
 
     @classmethod
-    def _of(cls, tube: TubeFlow) -> Answers:
+    def of_tubes(
+        cls, tube: TubeFlow, *, moments: Callable[[FloatArray], FloatArray] | None = None
+    ) -> Answers:
+        """Those of the designs of tubes.
+
+        Args: `moments`: of a chamber over the fill ratio, kg m; default the closed form.
+        """
         designs, scene = tube.designs, tube.designs.scene
         top, rho = scene.disc.max_fill_ratio * np.ones(designs.size), scene.liquid.density
-        wall, moment, ratio = measured_closed_forms(scene=scene, fill_ratio=np.array([top / 2, top]))
+        wall, _, ratio = measured_closed_forms(scene=scene, fill_ratio=np.array([top / 2, top]))
         half, full = tube.level(np.array([top / 2, top]))
         equal, uneven = tube.ends(half, half), tube.ends(0 * full, full)
         flow = tube.flow(equal, primed=np.zeros(designs.size, dtype=np.bool_))
@@ -116,24 +138,28 @@ class Answers:
         residual = _residual_fill(tube, top)
         stalled = _stalled_fill(tube, top)
         least = np.minimum(np.maximum(residual, stalled), top / 2)
-        _, ends, _ = measured_closed_forms(scene=scene, fill_ratio=np.array([least, top - least]))
-        usable = ends[1] - ends[0]
+        fills = np.array([least, top - least, top])
+        if moments is None:
+            _, moment, _ = measured_closed_forms(scene=scene, fill_ratio=fills)
+        else:
+            moment = moments(fills)
+        usable, volume = moment[1] - moment[0], chamber_volume(disc=scene.disc) * np.ones(designs.size)
+        gas = _draining_flow(tube, residual, top - residual)
         holds = np.zeros(designs.size, dtype=np.bool_)
         if tube.path.crest:
             holds = tube.level(top - least) <= tube.path.return_pressure
         rate = scene.rotor.influence_coefficient * ratio[0] * rho * scene.tube.area * running
         crest, nothing = tube.path.crest, np.full(designs.size, np.nan)
         separated = np.where(flow.separated, Regime.SEPARATED, Regime.SIPHON)
-        share = 1 / np.tan(np.pi / np.asarray(scene.disc.chambers))
         lowest = _lowest(tube, flow, equal) if crest else (nothing, nothing)
         priming = (nothing, nothing)
         if crest:
             vented, trapped = (replace(tube.path, trapped=kept) for kept in (False, True))
             priming = priming_pressure(vented, uneven), priming_pressure(trapped, equal)
         return cls(
-            chamber_volume=chamber_volume(disc=scene.disc) * np.ones(designs.size),
+            chamber_volume=volume,
             wall_pressure=wall[1],
-            moment=moment[1],
+            moment=moment[2],
             moment_per_mass=ratio[0],
             regime=np.where(flow.velocity > 0, separated, Regime.BLOCKED).astype(np.int64),
             velocity=flow.velocity,
@@ -146,23 +172,38 @@ class Answers:
             residual_fill_ratio=residual,
             stalled_fill_ratio=stalled,
             least_fill_ratio=least,
+            largest_fill_ratio=top - least,
+            residual_depth=port_depth(scene, flow_rate=gas),
+            usable_volume=(top - 2 * least) * volume,
             usable_moment=usable,
-            reach=np.where(residual >= stalled, share, 1.0) * usable,
+            reach=usable / np.tan(np.pi / np.asarray(scene.disc.chambers)),
             holds=holds,
             loop_factor=scene.controller.proportional * rate,
         )
 
 
 def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tuple[FloatArray, FloatArray]:
-    """Pressure at the end of the crest's arc, and the margin of a full siphon, where something flows, Pa."""
+    """Pressure at the end of the crest's arc where something flows, and the margin of a full siphon, Pa."""
     path, rows = tube.path, np.arange(tube.designs.size)
-    flows = flow.velocity > 0
-    heads = (
-        np.exp(tube.log_head(rows, to_crest=True, lowest=lowest)(np.log(np.where(flows, u, 1.0))))
-        for u, lowest in ((flow.velocity, False), (flow.siphon_velocity, True))
-    )
-    at_end, full = (resting_pressure(path, ends) - path.density * head for head in heads)
-    return np.where(flows, at_end, np.nan), np.where(flows, full - cavity_pressure(path, ends), np.nan)
+    flows, driving = flow.velocity > 0, driving_pressure(path, ends)
+    siphon = flow.siphon_velocity
+    if np.any(~flows & (driving > 0)):
+        siphon = np.where(flows, siphon, tube.velocity(driving, ~flows, to_crest=False))
+    pressures = []
+    for u, lowest in ((flow.velocity, False), (siphon, True)):
+        head = tube.log_head(rows, to_crest=True, lowest=lowest)(np.log(np.where(u > 0, u, 1.0)))
+        pressures.append(resting_pressure(path, ends) - path.density * np.where(u > 0, np.exp(head), 0.0))
+    at_end, full = pressures
+    return np.where(flows, at_end, np.nan), full - cavity_pressure(path, ends)
+
+
+def _draining_flow(
+    tube: TubeFlow, fills: FloatArray, opposite: FloatArray, *, exactly: bool = True
+) -> FloatArray:
+    """Flow rate of a running tube at the fills of both chambers, m^3/s."""
+    own, other = tube.level(np.array([fills, opposite]))
+    flow = tube.flow(tube.ends(own, other), primed=True, exactly=exactly)
+    return np.asarray(tube.designs.scene.tube.area * flow.velocity)
 
 
 def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
@@ -170,10 +211,8 @@ def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
 
     def drawn(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
         part = tube.take(rows)
-        scene = part.designs.scene
-        own, other = part.level(np.array([fills, top[rows] - fills]))
-        flow = part.flow(part.ends(own, other), primed=True, exactly=exactly)
-        return drawn_fill(scene, flow_rate=scene.tube.area * flow.velocity)
+        rate = _draining_flow(part, fills, top[rows] - fills, exactly=exactly)
+        return drawn_fill(part.designs.scene, flow_rate=rate)
 
     return first_gas(tube.designs.scene, drawn, top=top, about=partial(drawn, exactly=False))
 

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration_record import Budget, Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.contributions import compression
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
@@ -20,7 +19,6 @@ from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
 from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.working import LARGEST_COMPRESSION
@@ -32,11 +30,12 @@ PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
     """Lay a calibration out as plain lists, numbers and texts.
 
-    `*_uncertainty` are expanded uncertainties (95 %).  Those of wall pressure, moment and lambda hold for the
-    scene's inputs as they stand (rounding, quadrature, what the check by finite elements contradicts,
-    left-out gravity and terms without a model); what uncertain inputs add stands beside them
-    (`*_input_uncertainty`), and the two combine as the root of the sum of squares.  Those of k and of
-    velocities hold everything.  `budgets` divides the uncertainty of each main quantity into its causes.
+    `quantities` have the main numbers with their uncertainty budgets, each once; the rest are curves over
+    fill, velocity and pressure, and what is no number. `*_uncertainty` are expanded uncertainties (95 %).
+    Those of wall pressure and moment hold for the scene's inputs as they stand (rounding, quadrature, what
+    the check by finite elements contradicts, left-out gravity and terms without a model); what uncertain
+    inputs add stands beside them (`*_input_uncertainty`), and the two combine as the root of the sum of
+    squares.  Those of k and of velocities hold everything.
     The law's rows run along
     `gas_pressure_Pa`, its columns along `fill_ratio`, for a tube that is empty beforehand.
     Returns: The document, in SI units and gauge pressures; no value is NaN or infinite.
@@ -47,15 +46,11 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "chamber": _chamber(calibration),
         "check": _check(calibration.chamber.check),
-        "lambda": _lambda(calibration),
         "tube": _tube(calibration),
         "law": _law(calibration),
-        "budgets": {name: _budget(budget) for name, budget in calibration.budgets.items()},
-        "operating_point": _operating_point(calibration),
-        "residual_liquid": _residual(calibration),
+        "regime": calibration.regime.label,
         "tube_liquid": _tube_liquid(calibration),
         "asynchronous_instability": _instability(calibration),
-        "identifiability": Finding(code="identifiability").text,
         "tolerance": scene.tolerance,
         "holding": _holding(calibration),
         "gas_line": line_document(calibration.gas_line),
@@ -88,8 +83,6 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
     fills = chamber.reported_fill_ratio
     return (
         {
-            "volume_m3": chamber.volume,
-            "max_liquid_volume_m3": scene.disc.max_fill_ratio * chamber.volume,
             "fill_ratio": _listed(fills),
             "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
             "row_status": [str(status) for status in chamber_status(calibration)],
@@ -134,20 +127,6 @@ def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[s
     return {"wall_pressure_paper_Pa": pressure, "moment_paper_kg_m": moment}
 
 
-def _lambda(calibration: Calibration) -> dict[str, Any]:
-    chamber = calibration.chamber
-    value = float(chamber.moment_per_mass.value)
-    return {
-        "per_transferred_mass_m": value,
-        "per_mass_difference_m": value / 2,
-        "status": str(chamber.moment_per_mass.status.code),
-        "uncertainty_m": float(chamber.moment_per_mass.uncertainty),
-        "input_uncertainty_m": chamber.moment_per_mass_inputs,
-        "variation_over_range": calibration.lambda_variation,
-        "paper_m": paper.PAPER_LAMBDA,
-    }
-
-
 def _tube(calibration: Calibration) -> dict[str, Any]:
     tube = calibration.tube
     return {
@@ -180,18 +159,6 @@ def _law(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _budget(budget: Budget) -> dict[str, Any]:
-    return {
-        "value": budget.value,
-        "unit": budget.unit,
-        "numerical": budget.numerical,
-        "input": budget.input,
-        "model": budget.model,
-        "total": budget.total,
-        "inputs": dict(budget.inputs),
-    }
-
-
 def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
     """What limits a chamber at the reported fill ratios."""
     scene, chamber = calibration.scene, calibration.chamber
@@ -208,58 +175,8 @@ def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[R
         fill_ratio=fill_ratio,
         closed=closed_ring(scene, fill_ratio),
         fullest=np.maximum(fill_ratio, scene.disc.max_fill_ratio - fill_ratio),
-        residual=calibration.residual.fill_ratio,
+        residual=float(calibration.answers.residual_fill_ratio),
     )
-
-
-def _operating_point(calibration: Calibration) -> dict[str, Any]:
-    point, told = calibration.operating_point, calibration.budgets
-
-    def total(name: str, otherwise: float | None) -> float | None:
-        return told[name].total if name in told else otherwise
-
-    return {
-        "fill_ratio": point.fill_ratio,
-        "gas_pressure_Pa": point.gas_pressure,
-        "regime": point.regime.label,
-        "velocity_m_s": point.velocity,
-        "velocity_uncertainty": told["velocity"].total,
-        "k_at_velocity_m_s": point.loss_velocity,
-        "k": point.k,
-        "k_uncertainty": total("drag_coefficient", point.k_uncertainty),
-        "priming_pressure_vented_Pa": point.priming_vented,
-        "priming_pressure_trapped_Pa": point.priming_trapped,
-        "stall_pressure_Pa": point.stall,
-        "stall_pressure_paper_Pa": point.stall_paper,
-        "hump_pressure_Pa": point.hump_pressure,
-        "cavity_pressure_Pa": point.cavity_pressure,
-        "cavitation_margin_Pa": point.cavitation_margin,
-        "cavitation_margin_uncertainty": total("cavitation_margin", point.cavitation_margin_uncertainty),
-    }
-
-
-def _residual(calibration: Calibration) -> dict[str, Any]:
-    rest, fill = calibration.residual, calibration.budgets["least_fill_ratio"].total
-    moment = calibration.budgets["usable_moment"].total
-    return {
-        "fill_ratio": rest.fill_ratio,
-        "fill_ratio_uncertainty": rest.fill_ratio_uncertainty,
-        "stalled_fill_ratio": rest.stalled_fill_ratio,
-        "least_fill_ratio": rest.least_fill_ratio,
-        "least_fill_ratio_uncertainty": fill,
-        "limited_by": rest.limited_by,
-        "largest_fill_ratio": rest.largest_fill_ratio,
-        "depth_m": rest.depth,
-        "depth_uncertainty": rest.depth_uncertainty,
-        "flow_rate_m3_s": rest.flow_rate,
-        "usable_volume_m3": rest.usable_volume,
-        "usable_volume_uncertainty": 2 * fill * calibration.chamber.volume,
-        "pair_moment_kg_m": rest.pair_moment,
-        "usable_pair_moment_kg_m": rest.usable_pair_moment,
-        "usable_pair_moment_uncertainty": moment,
-        "reach_kg_m": rest.reach,
-        "reach_uncertainty": rest.reach_share * moment,
-    }
 
 
 def _tube_liquid(calibration: Calibration) -> dict[str, Any]:
@@ -273,22 +190,12 @@ def _tube_liquid(calibration: Calibration) -> dict[str, Any]:
             "moment_across_kg_m": held.across,
         }
         for name, held in states.items()
-    } | {
-        "flowing_vibration_m": found.flowing_vibration,
-        "lasting_vibration_m": found.lasting_vibration,
-        "limit_m": found.limit,
-        "returned_volume_m3": found.returned_volume,
     }
 
 
 def _holding(calibration: Calibration) -> dict[str, Any]:
     found = calibration.holding
-    return {
-        "holds": found.holds,
-        "fill_ratio": calibration.residual.largest_fill_ratio,
-        "largest_hump_radius_m": found.largest_hump_radius,
-        "warning": "" if found.finding is None else found.finding.text,
-    }
+    return {"holds": found.holds, "largest_hump_radius_m": found.largest_hump_radius}
 
 
 def _instability(calibration: Calibration) -> dict[str, Any] | None:
@@ -299,7 +206,6 @@ def _instability(calibration: Calibration) -> dict[str, Any] | None:
         "fill_ratio": found.fill_ratio,
         "critical_speed_rad_s": found.critical_speed,
         "growth_over_critical_speed": found.growth,
-        "warning": "" if found.finding is None else found.finding.text,
     }
 
 

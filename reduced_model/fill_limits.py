@@ -39,9 +39,9 @@ def _fill_at(disc: Disc, radius: npt.ArrayLike) -> FloatArray:
     return np.clip(liquid_area(disc=disc, surface_radius=level) / whole, 0.0, 1.0)
 
 
-def drawn_fill(scene: Scene, *, flow_rate: FloatArray, factor: npt.ArrayLike = 1.0) -> FloatArray:
-    """Fill at which the layer over the port is as deep as `port_depth` for a flow, with a factor on that."""
-    depth = np.asarray(factor) * port_depth(scene, flow_rate=flow_rate)
+def drawn_fill(scene: Scene, *, flow_rate: FloatArray) -> FloatArray:
+    """Fill at which the layer over the port is as deep as `port_depth` for a flow."""
+    depth = port_depth(scene, flow_rate=flow_rate)
     return np.minimum(_fill_at(scene.disc, scene.tube.port_radius - depth), scene.disc.max_fill_ratio)
 
 

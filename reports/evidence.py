@@ -187,28 +187,19 @@ def _keep(ran: Mapping[str, Record], kept: Mapping[str, Record]) -> None:
 
 
 def _operating_point(scene: Scene, calibration: Calibration) -> Record:
-    """The calibration's operating point, with the flow state there and Eq. 19's velocity."""
-    record: Record = dict(calibration_document(calibration)["operating_point"])
-    speed, tube = record["k_at_velocity_m_s"], calibration.tube
-    reynolds = speed * scene.tube.bore / scene.liquid.kinematic_viscosity
+    """Equal fills under the scene's gas pressure: the flow there, and Eq. 19's velocity."""
+    speed, tube = abs(float(calibration.answers.velocity)), calibration.tube
     nearest = int(np.argmin(np.abs(np.asarray(tube.velocity) - speed)))
+    half = scene.disc.max_fill_ratio / 2
     by_paper = calibration.paper_law.evaluate(
-        fill_ratio=record["fill_ratio"],
-        opposite_fill_ratio=record["fill_ratio"],
-        gas_pressure=scene.gas.pressure,
+        fill_ratio=half, opposite_fill_ratio=half, gas_pressure=scene.gas.pressure
     )
-    budgets = calibration.budgets
-
-    def total(name: str) -> float | None:
-        return budgets[name].total if name in budgets else None
-
-    return record | {
-        "reynolds": reynolds,
+    return {
+        "fill_ratio": half,
+        "gas_pressure_Pa": scene.gas.pressure,
+        "reynolds": speed * scene.tube.bore / scene.liquid.kinematic_viscosity,
         "flow_state": str(np.asarray(tube.flow_state)[nearest]),
         "velocity_paper_m_s": float(by_paper.velocity),
-        # None where a quantity has no budget.
-        "priming_uncertainty": total("priming_pressure_vented"),
-        "stall_uncertainty": total("stall_pressure"),
     }
 
 

@@ -18,7 +18,6 @@ import jinja2
 from markupsafe import Markup, escape
 from PIL import Image
 
-from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.figure import DARK, LIGHT, Drawing
 from ringbalance.reports.pages.cases import FILTERS as QUANTITY_FILTERS
@@ -38,6 +37,7 @@ from ringbalance.reports.section import Record
 from ringbalance.reports.sections import CASES_VIEW, PREFIXES, drawings_in, numbered, views_of
 from ringbalance.reports.traced import (
     FILTERS,
+    budgets_of,
     finished,
     listing_of,
     placed,
@@ -55,6 +55,10 @@ from ringbalance.scene.describe import usual_name
 _Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
 
+_UNSTATED: Final = (
+    "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
+    "± is known no better than the inputs."
+)
 _ANNEX: Final = "annex.html"
 DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
     {
@@ -146,7 +150,8 @@ def _frame(evidence: Record) -> Record:
         "e": placed(evidence),
         "known": partial(believed, stated=states_uncertainty(evidence)),
         "named": partial(named_with_origin, evidence),
-        "unstated": UNSTATED,
+        "unstated": _UNSTATED,
+        "budgets": budgets_of(placed(evidence)),
         "scene": evidence["scene"],
         "papers": summary.is_papers(evidence),
         "stamp": _stamp(evidence),

@@ -69,8 +69,7 @@ def _calibration(result: Any) -> list[Drawing]:
         "lambda_m": paper.PAPER_LAMBDA,
         "lambda_spread": papers.LAMBDA_TOLERANCE,
     }
-    point = document["operating_point"]
-    evidence = {"calibration": document, "operating_point": point, "paper": printed, "verification": []}
+    evidence = {"calibration": document, "paper": printed, "verification": []}
     return drawings_in([section.view(evidence) for section in (CONDITIONS, MOMENT, TUBE)])
 
 

@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 from ringbalance.reports.prose import typeset
 from ringbalance.results import numbers
 from ringbalance.results.result import Table
+from ringbalance.scene.fitted import MODEL
 
 Form = Literal["measured", "given", "percent", "change", "fixed"]
 
@@ -61,7 +62,7 @@ def _marked_up(value: object) -> object:
 
 
 def evidence_at(evidence: Any, path: str) -> Any:
-    """What the evidence holds at a dotted place; in a list by position, or by the `id` of an item.
+    """What the evidence holds at a dotted place; in a list by position, or by the `id` or `key` of an item.
 
     Raises: KeyError, IndexError: nothing is there.
     """
@@ -71,8 +72,24 @@ def evidence_at(evidence: Any, path: str) -> Any:
         elif key.lstrip("-").isdigit():
             evidence = evidence[int(key)]
         else:
-            evidence = {item.get("id"): item for item in evidence}[key]
+            evidence = {item.get("id", item.get("key")): item for item in evidence}[key]
     return evidence
+
+
+def budgets_of(evidence: Mapping[str, Any]) -> dict[str, Any]:
+    """Quantities of the calibration that have an uncertainty budget, by key; empty without a calibration."""
+    found = (evidence.get("calibration") or {}).get("quantities") or ()
+    return {each["key"]: each for each in found if each["parts"]}
+
+
+def inputs_of(quantity: Mapping[str, Any]) -> dict[str, float]:
+    """Half-widths (95 %) of a quantity by the inputs of the scene that cause them."""
+    return {path: width for path, width in quantity["causes"].items() if not path.startswith(MODEL)}
+
+
+def total_of(quantity: Mapping[str, Any]) -> float:
+    """Half-width (95 %) of a quantity, the root of the sum of the squares of its parts."""
+    return math.hypot(*quantity["parts"].values())
 
 
 def states_uncertainty(evidence: Any) -> bool:
@@ -104,7 +121,7 @@ class Count(int):
 
 
 class _Items(Sequence[Any]):
-    """A list of the evidence; of cases, the place is by `id`."""
+    """A list of the evidence; quantities of a result stand in it by `key`."""
 
     def __init__(self, values: Sequence[Any], path: str) -> None:
         self._values, self._path = values, path
@@ -116,7 +133,9 @@ class _Items(Sequence[Any]):
     def __getitem__(self, index: int | slice) -> Any:
         if isinstance(index, slice):
             return [self[place] for place in range(*index.indices(len(self)))]
-        return placed(self._values[index], f"{self._path}.{index}")
+        value = self._values[index]
+        key = value.get("key", "") if isinstance(value, Mapping) else ""
+        return placed(value, f"{self._path}.{key if key.isidentifier() else index}")
 
     def __len__(self) -> int:
         return len(self._values)
@@ -275,7 +294,7 @@ def finished(value: object) -> object:
 
 _FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")
 FILTERS: Final = MappingProxyType(
-    {"q": printed, "part_of": _part_of, "column": column, "span": span}
+    {"q": printed, "total": total_of, "part_of": _part_of, "column": column, "span": span}
     | {form: partial(printed, form=form) for form in _FORMS}
 )
 """Filters of the templates: each formats, and traces what it prints."""

@@ -53,6 +53,9 @@ class Quantity:
     upper: float | None = None
     """Ends of the 95 % interval; None: not known, or no end on this side."""
     parts: Parts | None = None
+    causes: Mapping[str, float] = field(default_factory=dict)
+    """Expanded uncertainties (95 %) of the parts `input` and `model`: by path in the scene file, "fitted" for
+    all that were fitted together, by error of a model such as "model: ends"; SI."""
     origin: str = "computed"
     """ "computed", "simulated", "fitted", "given", "inferred", "assumed", "measured" or "default"."""
     status: str = "ok"
@@ -93,6 +96,8 @@ class Quantity:
         """For JSON."""
         document = asdict(self)
         del document["digits"]
+        if self.parts is None:
+            del document["causes"]
         return document
 
 

@@ -39,11 +39,17 @@ BY_NAME: Final = {
     *("verdicts", "best.changes"),
     *("ended", "own.ended", "clipped", "along.levels.settings", "tried.settings"),
     *(f"{each}.{key}" for each in ("remedies", "valves") for key in ("changes", "settings")),
-    *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
+    *(
+        "quantities.causes",
+        "numbers",
+        "tables.columns",
+        "tables.units",
+        "endings",
+        "loop_endings",
+        "violations.point",
+    ),
 }
 """Whose keys are names of what the scene, the fit or the case has."""
-INPUTS: Final = re.compile(r"budgets\.\w+\.inputs")
-"""Whose keys are those of the scene."""
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +104,7 @@ def paths(value: Any, place: str = "") -> Iterator[tuple[str, str]]:
     """Place and key of every entry of nested tables and lists; keys that are names count as "*"."""
     if isinstance(value, dict):
         for key, inside in value.items():
-            known = "*" if place in BY_NAME or INPUTS.fullmatch(place) else key
+            known = "*" if place in BY_NAME else key
             yield place, known
             yield from paths(inside, f"{place}.{known}" if place else known)
     elif isinstance(value, list):

@@ -21,26 +21,10 @@ _OUTER: Final = re.compile("\\)\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]
 _RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FACTORS: Final = frozenset({1.0, 100.0, 1e3, *(scale[1] for scales in SCALES.values() for scale in scales)})
 SAME: Final = (
-    ("operating_point.k", "calibration.operating_point.k", "calibration.budgets.drag_coefficient.value"),
-    (
-        *("operating_point.velocity_m_s", "calibration.budgets.velocity.value"),
-        "consequences.gain.-1.velocity_m_s",
-    ),
-    ("operating_point.velocity_uncertainty", "calibration.budgets.velocity.total"),
-    ("operating_point.k_uncertainty", "calibration.budgets.drag_coefficient.total"),
-    ("operating_point.priming_uncertainty", "calibration.budgets.priming_pressure_vented.total"),
-    ("operating_point.stall_uncertainty", "calibration.budgets.stall_pressure.total"),
-    (
-        *("operating_point.priming_pressure_vented_Pa", "calibration.budgets.priming_pressure_vented.value"),
-        "calibration.operating_point.priming_pressure_vented_Pa",
-    ),
-    ("operating_point.stall_pressure_Pa", "calibration.budgets.stall_pressure.value"),
-    ("calibration.chamber.wall_pressure_Pa.-1", "calibration.budgets.wall_pressure.value"),
-    (
-        *("calibration.lambda.per_transferred_mass_m", "calibration.budgets.lambda.value"),
-        "consequences.gain.-1.moment_per_transferred_mass_m",
-    ),
-    ("calibration.residual_liquid.usable_pair_moment_kg_m", "calibration.budgets.usable_moment.value"),
+    ("calibration.quantities.velocity.value", "consequences.gain.-1.velocity_m_s"),
+    ("calibration.quantities.lambda.value", "consequences.gain.-1.moment_per_transferred_mass_m"),
+    ("calibration.quantities.wall_pressure.value", "calibration.chamber.wall_pressure_Pa.-1"),
+    ("calibration.quantities.moment.value", "calibration.chamber.moment_kg_m.-1"),
 )
 """Places of the evidence that hold the same quantity; the liquids of `fifty` are those of a primed tube."""
 _APART: Final = 5e-3

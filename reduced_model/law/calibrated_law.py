@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -35,8 +35,9 @@ from ringbalance.reduced_model.tube.heads import (
     roots_of,
     velocities_of,
 )
-from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath
+from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath, priming_pressure
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ringbalance.scene.models import HumpGas
 from ringbalance.scene.registry import registered
 
 WIDTH: Final = 3
@@ -313,6 +314,26 @@ class CalibratedLaw:
             upstream_hydrostatic=own,
             downstream_hydrostatic=other,
         )
+
+    def priming_pressure(
+        self,
+        *,
+        fill_ratio: npt.ArrayLike,
+        opposite_fill_ratio: npt.ArrayLike | None = None,
+        hump_gas: HumpGas,
+    ) -> FloatArray | None:
+        """Gas pressure that lifts the liquid over the crest of an empty tube, whatever gas the law has there.
+
+        Returns: Gauge pressure, Pa, of the broadcast shape; None without a crest.
+        Source: `regime.priming_pressure`. For the liquid-ring paper's disc a crest at 31.5 mm gives its 0.54
+            MPa, vented with the driven chamber nearly empty or trapped at equal fills: an inference, because
+            the paper does not say what its figure means.
+        """
+        if not self.path.crest:
+            return None
+        path = replace(self.path, trapped=hump_gas == "trapped")
+        ends = self.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
+        return np.asarray(priming_pressure(path, ends)) / self.gas_factor
 
     def holds(self, fill_ratio: float) -> bool:
         """Whether a chamber of that fill keeps it against a lower one with the gas off."""

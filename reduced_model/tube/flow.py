@@ -172,9 +172,17 @@ class TubeFlow:
     """Of that from the driven chamber to the lowest pressure at the crest; None without one."""
     waves: Waves | None = field(default=None, kw_only=True)
     """Error of the chambers' levels; None: none is supposed."""
+    curve: Callable[[FloatArray], FloatArray] | None = field(default=None, kw_only=True)
+    """Of one scene the level over the fill ratio with gravity, Pa; None: the closed form."""
 
     @classmethod
-    def of(cls, designs: Designs, *, waves: Waves | None = None) -> TubeFlow:
+    def of(
+        cls,
+        designs: Designs,
+        *,
+        waves: Waves | None = None,
+        curve: Callable[[FloatArray], FloatArray] | None = None,
+    ) -> TubeFlow:
         """Those of designs, with the nodes that roots start from."""
         scene, path, factor = designs.scene, tube_path(designs.scene), pressure_factor(designs.scene)
         highest = factor * np.abs(scene.gas.pressure) + chamber_pressure(
@@ -183,7 +191,7 @@ class TubeFlow:
         fastest = np.log(2 * np.maximum(highest, 1.0) / path.density * np.ones(designs.size)) / 2
         log_velocity = fastest + _NODES[:, None]
         heads = [_Inverse.through(log_velocity, head) for head in _log_heads(scene, log_velocity)]
-        return cls(designs, path, factor, *heads, waves=waves)
+        return cls(designs, path, factor, *heads, waves=waves, curve=curve)
 
     def of_neighbours(self, designs: Designs, rows: IntArray) -> TubeFlow:
         """Those of designs that differ little from some of these: roots start from tables of these."""
@@ -205,6 +213,8 @@ class TubeFlow:
 
     def level(self, fill_ratio: FloatArray) -> FloatArray:
         """Hydrostatic pressure of a chamber's liquid at the outer radius, Pa, with the error of `waves`."""
+        if self.curve is not None:
+            return self.curve(fill_ratio)
         level = chamber_pressure(scene=self.designs.scene, fill_ratio=fill_ratio)
         return level if self.waves is None else level * self.waves.factor(fill_ratio)
 

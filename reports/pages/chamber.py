@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -34,6 +33,7 @@ from ringbalance.reports.figure import (
     upright,
 )
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.traced import budgets_of, total_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -75,7 +75,7 @@ def _pressure(own: Record, _evidence: Record) -> Record:
 def _moment(_own: Record, evidence: Record) -> Record:
     """Balancing moment of one chamber, and lambda per transferred mass, with what the paper has."""
     calibration, paper = evidence["calibration"], evidence["paper"]
-    chamber, summary = calibration["chamber"], calibration["lambda"]
+    chamber = calibration["chamber"]
     fill, found, printed = chamber["fill_ratio"], chamber["moment_kg_m"], paper["lambda_m"]
     spread = printed * paper["lambda_spread"]
     moment = draw(
@@ -94,7 +94,7 @@ def _moment(_own: Record, evidence: Record) -> Record:
             fill,
             chamber["lambda_per_transferred_mass_m"],
             "finite elements",
-            band=math.hypot(summary["uncertainty_m"], summary["input_uncertainty_m"]),
+            band=total_of(budgets_of(evidence)["lambda"]),
             **_DOTS,
         ),
         x=("fill ratio of the driven chamber", "1"),

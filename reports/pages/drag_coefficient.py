@@ -85,11 +85,13 @@ def _with_budget(liquids: list[Record], calibration: Calibration) -> list[Record
     Where an unprimed tube spills at the operating point, the primed one of this section is another point.
     """
     first, *others = liquids
-    budgets, speed = calibration.budgets, float(calibration.operating_point.velocity)
+    known, speed = calibration.quantities, float(calibration.answers.velocity)
     same = math.isclose(first["velocity_m_s"], speed, rel_tol=_SAME_POINT)
     if first["starts_at_scene_pressure"] and same and calibration.scene.tube.drag_coefficient is None:
         names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
-        first = first | {key: budgets[name].total for key, name in names.items() if name in budgets}
+        first = first | {
+            key: parts.total for key, name in names.items() if name in known and (parts := known[name].parts)
+        }
     return [first, *others]
 
 
@@ -105,12 +107,10 @@ def _verdict_on_fifty(record: Record) -> str:
 
 def _separated(calibration: Calibration) -> Record | None:
     """The velocity at which a separated column reads as k = 50, and the gas for it; None where none does."""
-    law, point = calibration.flow_law, calibration.operating_point
-    if law.path.hump_pressure is None or not point.loss_velocity:
+    law, point = calibration.flow_law, abs(float(calibration.answers.velocity))
+    if law.path.hump_pressure is None or not point:
         return None
-    speed = np.geomspace(
-        max(VELOCITIES[0], point.loss_velocity / 15), max(VELOCITIES[1], 2 * point.loss_velocity), _READINGS
-    )
+    speed = np.geomspace(max(VELOCITIES[0], point / 15), max(VELOCITIES[1], 2 * point), _READINGS)
     _, separated = read_by_eq_18(law, speed, opposite_fill_ratio=law.max_fill_ratio / 2)
     if not separated.min() < _FIFTY < separated.max():
         return None

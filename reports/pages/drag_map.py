@@ -21,7 +21,7 @@ from scipy.interpolate import PchipInterpolator
 from ringbalance.physics.tube.loss import TUBE_INPUTS, corrected_state, flow_states, model_parts, range_notes
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration_record import Calibration, priming_pressure
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -415,7 +415,7 @@ def _starting_pressure(calibration: Calibration) -> float:
     law = calibration.flow_law
     half = law.max_fill_ratio / 2
     gas: HumpGas = "trapped" if law.path.trapped else "vented"
-    pressure = priming_pressure(law=law, fill_ratio=half, opposite_fill_ratio=half, hump_gas=gas)
+    pressure = law.priming_pressure(fill_ratio=half, opposite_fill_ratio=half, hump_gas=gas)
     return 0.0 if pressure is None else max(float(pressure), 0.0)
 
 

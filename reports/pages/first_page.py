@@ -132,7 +132,7 @@ def _other_reading(scene: Scene) -> Record | None:
     except SceneError:
         return None
     found = judgement_record(judged(balancer_of(other), {}, most=BLOCK))
-    k = calibration_of(other).operating_point.k
+    k = calibration_of(other).quantities["drag_coefficient"].value
     return {"bore_m": other.tube.bore, "k": k, "fraction": found["fraction"]}
 
 

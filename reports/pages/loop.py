@@ -57,7 +57,7 @@ _FRAMES: Final = 7
 
 def _reach(work: Work) -> Record:
     """What a pair cancels at the most, as a vibration; where the first pair's lies, by the sensor's phase."""
-    scene, moment = work.ring, work.calibration.residual.usable_pair_moment
+    scene, moment = work.ring, float(work.calibration.answers.usable_moment)
     return {
         "pairs": scene.disc.chambers // 2,
         "vibration_m": moment * scene.rotor.influence_coefficient,

@@ -94,22 +94,22 @@ def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.
 
 def _collect(work: Work) -> Record:
     scene, calibration = work.ring, work.calibration
-    law, point, rest = calibration.flow_law, calibration.operating_point, calibration.residual
-    top = _HIGHEST * max(scene.gas.pressure, point.priming_vented or 0.0)
+    law, answers, half = calibration.flow_law, calibration.answers, scene.disc.max_fill_ratio / 2
+    top = _HIGHEST * np.nanmax([scene.gas.pressure, float(answers.priming_pressure_vented)])
     fill, pressure = np.linspace(0, law.max_fill_ratio, _FILLS), np.linspace(0, top, _PRESSURES)
-    at = int(_regimes(law, point.fill_ratio, scene.gas.pressure))
+    at = int(_regimes(law, half, scene.gas.pressure))
     return {
         "fill_ratio": fill.tolist(),
         "gas_pressure_Pa": pressure.tolist(),
         "regimes": list(_NAMES),
         "regime": ["".join(map(str, row)) for row in _regimes(law, fill[None, :], pressure[:, None])],
         "point": {
-            "fill_ratio": point.fill_ratio,
+            "fill_ratio": half,
             "gas_pressure_Pa": scene.gas.pressure,
             "regime": _NAMES[at],
         },
         "crest": _crest(work, fill),
-        "working_fill_ratio": [rest.fill_ratio, rest.largest_fill_ratio],
+        "working_fill_ratio": [float(answers.residual_fill_ratio), float(answers.largest_fill_ratio)],
         "disc": _disc(work),
     }
 

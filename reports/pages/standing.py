@@ -27,6 +27,7 @@ from ringbalance.reports.figure import (
 )
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section
+from ringbalance.reports.traced import budgets_of, inputs_of
 from ringbalance.results.result import Table
 from ringbalance.verification.standing import HEADS, budget_standing, standing_rows
 
@@ -36,20 +37,25 @@ _BARS: Final = 5
 
 
 def _conditions(_own: Record, evidence: Record) -> Record:
-    budgets = evidence["calibration"].get("budgets") or {}
+    budgets = budgets_of(evidence)
     drawn = {_DRAWN[key]: budgets[key] for key in _DRAWN if key in budgets and budgets[key]["value"]}
     causes = {title: _causes(budget) for title, budget in drawn.items()}
     return {
         "behind": {name: budget_standing(evidence["verification"], name) for name in budgets},
         "tornado": _tornado(causes) if causes else None,
         "largest": {title: each[0][0] for title, each in causes.items()},
+        "inputs": {
+            key: max(inputs, key=inputs.__getitem__)
+            for key, each in budgets.items()
+            if (inputs := inputs_of(each))
+        },
     }
 
 
 def _causes(budget: Record) -> list[tuple[str, float]]:
     """What makes a result uncertain, with its part relative to the result, the largest first."""
-    parts = {key_words(path): width for path, width in budget["inputs"].items()}
-    parts |= {"the model": budget["model"], "numerics": budget["numerical"]}
+    parts = {key_words(path): width for path, width in inputs_of(budget).items()}
+    parts |= {"the model": budget["parts"]["model"], "numerics": budget["parts"]["numerical"]}
     return sorted(((name, abs(part / budget["value"])) for name, part in parts.items()), key=lambda c: -c[1])
 
 
@@ -106,7 +112,7 @@ def _credibility(_own: Record, evidence: Record) -> Record:
         "failed": any(case["verdict"] == "failed" for case in checks),
         "validated": any(case["kind"] == "validation" for case in checks),
         "unsure": [f"{counts[origin]} {words}" for origin, words in _NOBODYS.items() if counts[origin]],
-        "budgets": bool((evidence.get("calibration") or {}).get("budgets")),
+        "budgets": bool(budgets_of(evidence)),
         "drawn": "summary" in evidence,
     }
 

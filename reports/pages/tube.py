@@ -32,6 +32,7 @@ from ringbalance.reports.figure import (
     upright,
 )
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.traced import budgets_of
 from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import stretches
 from ringbalance.scene.models import Scene
@@ -48,10 +49,12 @@ _REGIME_LINES: Final[dict[str, Record]] = {
 
 
 def _tube(_own: Record, evidence: Record) -> Record:
-    tube, point = evidence["calibration"]["tube"], evidence["operating_point"]
+    tube, known = evidence["calibration"]["tube"], budgets_of(evidence)
+    velocity = abs(known["velocity"]["value"])
+    point = [(velocity, known["drag_coefficient"]["value"])] if velocity else []
     return {
         "drag": _drag(tube, point, evidence["paper"]["drag_coefficient"]),
-        "at": _nearest(tube, point["k_at_velocity_m_s"]),
+        "at": _nearest(tube, velocity),
     }
 
 
@@ -61,7 +64,7 @@ def _nearest(tube: Record, velocity: float) -> int:
     return int(np.argmin(np.abs(speeds - (math.log(velocity) if velocity else speeds[-1]))))
 
 
-def _drag(tube: Record, point: Record, printed: float) -> Drawing:
+def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Drawing:
     """k against velocity and Reynolds number, with its 95 % band and the paper's one number."""
     velocity, k, width = (np.asarray(tube[key]) for key in ("velocity_m_s", "k", "k_uncertainty"))
     bottom = 0.8 * min((k - width).clip(0.2 * k.min()).min(), printed)
@@ -75,8 +78,7 @@ def _drag(tube: Record, point: Record, printed: float) -> Drawing:
                 ends = velocity[part.start], velocity[part.stop - 1]
                 axes.axvspan(*ends, color=MUTED, alpha=0.13, linewidth=0, label=state)
 
-    runs = point["k"] is not None
-    place = ([point["k_at_velocity_m_s"]], [point["k"]]) if runs else ([], [])
+    speeds, coefficients = [u for u, _ in point], [each for _, each in point]
     return draw(
         "drag",
         logarithmic("x", ticks=_VELOCITY_TICKS),
@@ -85,7 +87,13 @@ def _drag(tube: Record, point: Record, printed: float) -> Drawing:
         level(printed, "the paper", **AS_PAPER),
         curve(velocity, k, "found, 95 % band", band=width, color=FOUND),
         curve(
-            *place, "operating point" if runs else None, linestyle="", marker="o", color=INK, markersize=4.5
+            speeds,
+            coefficients,
+            "operating point" if point else None,
+            linestyle="",
+            marker="o",
+            color=INK,
+            markersize=4.5,
         ),
         _reynolds_axis(tube["reynolds"][-1] / velocity[-1]),
         x=_VELOCITY,

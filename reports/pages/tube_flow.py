@@ -38,7 +38,7 @@ _ALONG: Final = 2.9
 
 def _collect(work: Work) -> Record | None:
     """Laminar flow fields at the operating point, or at the nearest one that can be drawn."""
-    scene, speed = work.ring, work.calibration.operating_point.loss_velocity
+    scene, speed = work.ring, float(work.calibration.answers.velocity)
     if not speed:
         return None
     loss = tube_loss(scene, speed)

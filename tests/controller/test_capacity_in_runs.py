@@ -34,7 +34,7 @@ def driven(scene: Scene, calibration: Calibration, *, share: float) -> Simulatio
     # Each injection fills the tube up to the crest before any liquid passes.
     moved = 0.02 * start * calibration.chamber.volume + 0.5 * scene.tube.length * scene.tube.area
     longest = moved / (scene.tube.area * float(flow.velocity))
-    amplitude = share * calibration.residual.pair_moment * rotor.influence_coefficient
+    amplitude = share * float(calibration.answers.moment) * rotor.influence_coefficient
     changed = scene.with_values(
         {
             "rotor.initial_vibration": {"amplitude": amplitude, "phase": math.pi / 2 - rotor.lag_angle},
@@ -65,14 +65,14 @@ def test_a_chamber_empties_to_the_printed_fill(paper_scene: Scene, pressure: flo
 
 def judged(run: Simulation, found: Calibration) -> None:
     """A run ends where the calibration says: the fill, and what the moment of all pairs takes away."""
-    rest, kappa = found.residual, run.scene.rotor.influence_coefficient
+    rest, kappa = found.answers, run.scene.rotor.influence_coefficient
     assert min(float(fill.min()) for fill in run.fill_ratio.values()) == pytest.approx(
         rest.least_fill_ratio, abs=NEAR
     )
     moved = (float(run.amplitude[0]) - float(run.amplitude[-1])) / kappa
-    per_fill = rest.pair_moment / run.scene.disc.initial_fill
+    per_fill = rest.moment / run.scene.disc.initial_fill
     assert moved == pytest.approx(
-        rest.reach, abs=1.1 * NEAR * per_fill * rest.reach / rest.usable_pair_moment
+        rest.reach, abs=float(1.1 * NEAR * per_fill * rest.reach / rest.usable_moment)
     )
 
 
@@ -115,8 +115,8 @@ speed = "{omega} rad/s"
 def test_capacity_and_runs_agree_on_random_discs(tmp_path: Path, number: int) -> None:
     scene = random_scene(tmp_path, number)
     found = ringbalance.calibrate(scene)
-    usable = found.residual.usable_pair_moment / found.residual.pair_moment
-    run = driven(scene, found, share=1.1 * usable * found.residual.reach / found.residual.usable_pair_moment)
+    usable = float(found.answers.usable_moment / found.answers.moment)
+    run = driven(scene, found, share=1.1 * usable * float(found.answers.reach / found.answers.usable_moment))
     judged(run, found)
 
 
@@ -126,6 +126,6 @@ def test_a_stalled_run_names_the_pressure_from_which_injections_begin(paper_scen
     run = ringbalance.simulate(scene)
     assert run.outcome is Outcome.STALLED
     (named,) = re.findall(r"to empty it: ([0-9.]+) MPa", run.status)
-    priming = ringbalance.calibrate(scene).operating_point.priming_vented
+    priming = ringbalance.calibrate(scene).quantities["priming_pressure_vented"].value
     assert priming is not None
     assert float(named) == pytest.approx(1e-6 * priming, rel=2e-3)

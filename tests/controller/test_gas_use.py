@@ -162,8 +162,8 @@ def test_a_pressure_on_the_axis_counts_with_its_column(
     ambient = factor * scene.gas.ambient_pressure
     here = calibrate(replace(scene, gas=replace(scene.gas, ambient_pressure=ambient)))
     there = calibrate(own)
-    for name in ("priming_vented", "stall"):
-        near, far = (getattr(found.operating_point, name) for found in (here, there))
+    for name in ("priming_pressure_vented", "stall_pressure"):
+        near, far = (float(getattr(found.answers, name)) for found in (here, there))
         assert near == pytest.approx(far * factor)
     asked = {"fill_ratio": 0.25, "primed": True}
     at_axis = there.flow_law.evaluate(gas_pressure=0.7e6, **asked).velocity

@@ -60,13 +60,15 @@ def test_static_rows_are_those_of_a_calibration(name: str) -> None:
     found = rb.sweep(scene, vary, sample="latin:10", check=2)
     compared = 0
     for row in range(10):
-        budgets = rb.calibrate(found.point_scene(row)).budgets
+        known = rb.calibrate(found.point_scene(row)).quantities
         assert found.static[row]["sha256"] == found.point_scene(row).sha256
         for quantity, (value, width) in found.static[row]["values"].items():
-            if quantity in budgets and value is not None:
+            if quantity in known and value is not None:
                 compared += 1
-                assert value == pytest.approx(budgets[quantity].value, rel=3e-6, abs=1e-9), quantity
-                assert width == pytest.approx(budgets[quantity].input, rel=1e-3, abs=1e-9), quantity
+                parts = known[quantity].parts
+                assert parts is not None
+                assert value == pytest.approx(known[quantity].value, rel=3e-6, abs=1e-9), quantity
+                assert width == pytest.approx(parts.input, rel=1e-3, abs=1e-9), quantity
     assert compared >= 60
     assert {each["quantity"] for each in found.errors} >= {"lambda", "velocity", "usable_moment"}
     assert all(each["error"] < 1e-4 for each in found.errors)

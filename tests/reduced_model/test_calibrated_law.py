@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import chamber_and_law
-from ringbalance.reduced_model.calibration_record import Calibration, priming_pressure
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.estimates import range_flow
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -90,7 +90,7 @@ def test_priming_thresholds_of_both_readings_are_0_54_mpa(
         (trapped, {"fill_ratio": 0.25, "opposite_fill_ratio": 0.25}, "trapped"),
     )
     for each, fills, gas in readings:
-        threshold = priming_pressure(law=each, **fills, hump_gas=gas)  # type: ignore[arg-type]
+        threshold = each.priming_pressure(**fills, hump_gas=gas)  # type: ignore[arg-type]
         assert threshold is not None
         assert round(float(threshold) / 1e6, 2) == 0.54
         flow = each.evaluate(**fills, gas_pressure=float(threshold) * factor)
@@ -124,7 +124,7 @@ def test_straight_tube_levels_out_with_the_gas_off(straight: CalibratedLaw, prim
 
 
 def test_hysteresis_a_running_column_needs_less_than_an_empty_tube(slow: CalibratedLaw) -> None:
-    threshold = priming_pressure(law=slow, fill_ratio=0.25, hump_gas="vented")
+    threshold = slow.priming_pressure(fill_ratio=0.25, hump_gas="vented")
     assert threshold is not None
     below = 0.5 * float(threshold)
     assert float(slow.evaluate(fill_ratio=0.25, gas_pressure=below, primed=False).velocity) == 0

@@ -100,12 +100,13 @@ def test_lambda_of_the_papers_disc_is_73_mm_and_nearly_constant(
 def test_paper_disc_prints_the_known_numbers(table_1_calibration: Calibration) -> None:
     found = table_1_calibration
     assert found.chamber.volume * 1e6 == pytest.approx(67.7, abs=0.05)
-    point = found.operating_point
-    assert point.stall_paper / 1e6 == pytest.approx(0.381, abs=5e-4)
-    assert point.stall / 1e6 == pytest.approx(0.419, abs=1e-3)  # Eq. 12 leaves the plates out of its levels
-    assert point.priming_vented is not None
-    assert point.priming_trapped is not None
-    assert round(point.priming_vented / 1e6, 2) == round(point.priming_trapped / 1e6, 2) == 0.54
+    pressures = {
+        key: (each.value or 0.0) / 1e6 for key, each in found.quantities.items() if each.unit == "Pa"
+    }
+    assert pressures["stall_pressure_paper"] == pytest.approx(0.381, abs=5e-4)
+    # Eq. 12 leaves the plates out of its levels.
+    assert pressures["stall_pressure"] == pytest.approx(0.419, abs=1e-3)
+    assert {round(pressures[f"priming_pressure_{gas}"], 2) for gas in ("vented", "trapped")} == {0.54}
 
 
 @pytest.mark.parametrize("tolerance", [0.3, 1e-7])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quantities import inputs_of
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -92,9 +93,9 @@ def test_budget_and_law_follow_the_correlations(paper_scene: Scene) -> None:
         scene = fitted(paper_scene, correlation)
         expected = by_hand(scene, correlation)
         calibration, by_law = found(scene)
-        budget = calibration.budgets["velocity"]
-        assert set(budget.inputs) == {"fitted"}
-        assert budget.inputs["fitted"] == pytest.approx(expected, rel=0.05)
+        inputs = inputs_of(calibration.quantities["velocity"])
+        assert set(inputs) == {"fitted"}
+        assert inputs["fitted"] == pytest.approx(expected, rel=0.05)
         assert by_law == pytest.approx(expected, rel=0.05)
         assert expected != pytest.approx(alone, rel=0.15)
 
@@ -117,7 +118,7 @@ def test_a_correction_of_a_model_changes_the_law(paper_scene: Scene) -> None:
     corrected = replace(paper_scene, tube=replace(paper_scene.tube, model_errors=(error,)))
     both = [calibrate(scene) for scene in (paper_scene, corrected)]
     k = [float(each.tube.k.value[-1]) for each in both]
-    velocity = [each.operating_point.velocity for each in both]
+    velocity = [each.answers.velocity for each in both]
     assert abs(k[1] / k[0] - 1) > 0.005
     assert velocity[1] != pytest.approx(velocity[0], rel=1e-4)
 
@@ -131,7 +132,7 @@ TRANSITION = [
 def test_errors_of_ordinary_size_leave_a_head_that_grows_through_the_transition(paper_scene: Scene) -> None:
     """Those that the bundled injections leave: a width that stepped at Re = 2000 made the head step down."""
     scene = paper_scene.with_values({"tube.model_errors": TRANSITION})
-    assert 0 < calibrate(scene).operating_point.velocity < math.inf
+    assert 0 < calibrate(scene).answers.velocity < math.inf
 
 
 @pytest.mark.parametrize("size", [-100.0, 100.0])

@@ -40,14 +40,12 @@ def test_lambda_and_moments_are_multiplied(by_geometry: Calibration, measured: C
         FACTOR * by_geometry.lambda_over_fill(fill_ratio=fills),
         rtol=1e-9,
     )
-    assert measured.residual.usable_pair_moment == pytest.approx(
-        FACTOR * by_geometry.residual.usable_pair_moment
-    )
+    assert measured.answers.usable_moment == pytest.approx(FACTOR * by_geometry.answers.usable_moment)
 
 
 def test_flow_and_geometry_stay(by_geometry: Calibration, measured: Calibration) -> None:
     """Finite elements check the geometry, so they agree with it whatever was measured."""
-    assert measured.operating_point.velocity == by_geometry.operating_point.velocity
+    assert measured.answers.velocity == by_geometry.answers.velocity
     np.testing.assert_array_equal(
         measured.chamber.wall_pressure.value, by_geometry.chamber.wall_pressure.value
     )
@@ -57,11 +55,11 @@ def test_flow_and_geometry_stay(by_geometry: Calibration, measured: Calibration)
 
 def test_its_uncertainty_is_in_the_budget(by_geometry: Calibration, measured: Calibration) -> None:
     lam = float(by_geometry.chamber.moment_per_mass.value)
-    share = measured.budgets["lambda"].inputs["disc.lambda_factor"]
+    share = measured.quantities["lambda"].causes["disc.lambda_factor"]
     assert share == pytest.approx(WIDTH * lam, rel=1e-6)
     geometry = FACTOR * by_geometry.chamber.moment_per_mass_inputs
     assert measured.chamber.moment_per_mass_inputs == pytest.approx(np.hypot(geometry, WIDTH * lam), rel=1e-6)
-    assert "disc.lambda_factor" not in measured.budgets["velocity"].inputs
+    assert "disc.lambda_factor" not in measured.quantities["velocity"].causes
 
 
 def test_the_injection_that_decides_is_longer_by_it(paper_scene: Scene) -> None:

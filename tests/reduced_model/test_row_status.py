@@ -51,7 +51,7 @@ def test_what_limits_a_row(
 
 
 def test_velocities_of_residual_liquid_are_marked(table_1_calibration: Calibration) -> None:
-    rest = table_1_calibration.residual.fill_ratio
+    rest = table_1_calibration.answers.residual_fill_ratio
     law = calibration_document(table_1_calibration)["law"]
     marked = [x for x, s in zip(law["fill_ratio"], law["column_status"], strict=True) if s == "gas_drawn"]
     assert marked == [x for x in law["fill_ratio"] if x < rest]

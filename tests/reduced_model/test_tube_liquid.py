@@ -65,7 +65,7 @@ def test_at_rest_each_leg_is_full_to_the_level(table_1_calibration: Calibration)
 def test_vapour_holds_the_legs_above_the_level_and_the_rest_falls_back(
     table_1_calibration: Calibration,
 ) -> None:
-    found, point = table_1_calibration.tube_liquid, table_1_calibration.operating_point
+    found, point = table_1_calibration.tube_liquid, table_1_calibration.answers
     assert found.after.state == "separated"
     assert found.before.mass < found.after.mass < found.flowing.mass < LINE * 120e-3
     # What flows over the crest on the near side, less what stays in the near leg.

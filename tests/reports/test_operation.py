@@ -52,14 +52,14 @@ def test_the_map_agrees_with_the_law(work: Work, collected: Record) -> None:
 
 def test_liquid_spills_between_the_priming_pressure_and_a_full_bore(work: Work, collected: Record) -> None:
     """At the crest's priming pressure the flow begins at zero, gas on the crest until swept out."""
-    point = work.calibration.operating_point
-    column = collected["fill_ratio"].index(point.fill_ratio)
+    half = work.ring.disc.max_fill_ratio / 2
+    column = collected["fill_ratio"].index(half)
     pressure = np.asarray(collected["gas_pressure_Pa"])
     names = [collected["regimes"][int(row[column])] for row in collected["regime"]]
     order = list(dict.fromkeys(names))
     assert order[:2] == ["blocked", "spilling"]
     first = pressure[names.index("spilling")]
-    lift = work.calibration.flow_law.ends(fill_ratio=point.fill_ratio).upstream_hydrostatic
+    lift = work.calibration.flow_law.ends(fill_ratio=half).upstream_hydrostatic
     priming = (work.calibration.flow_law.path.hump_pressure or 0.0) - float(lift)
     assert 0 < first - priming <= pressure[1]
 
@@ -97,13 +97,13 @@ def test_the_section_carries_its_dimensions(collected: Record) -> None:
 
 def test_the_tornado_begins_with_the_largest_cause() -> None:
     budget = {
+        "key": "velocity",
         "value": 10.0,
-        "numerical": 1e-4,
-        "model": 0.2,
-        "inputs": {"tube.bore": 0.5, "rotor.speed": -0.3, "disc.outer_radius": 0.0},
+        "parts": {"numerical": 1e-4, "input": 0.6, "model": 0.2},
+        "causes": {"tube.bore": 0.5, "rotor.speed": -0.3, "disc.outer_radius": 0.0, "model: ends": 0.2},
     }
-    budgets = {"velocity": budget, "lambda": {**budget, "value": 0.0}}
-    view = CONDITIONS.view({"calibration": {"budgets": budgets}, "verification": []})
+    quantities = [budget, {**budget, "key": "lambda", "value": 0.0}]
+    view = CONDITIONS.view({"calibration": {"quantities": quantities}, "verification": []})
     assert view is not None
     shown = texts(view["tornado"])
     places = [shown.index(name) for name in ("bore", "speed", "the model", "numerics")]
@@ -146,7 +146,7 @@ def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> Non
 def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
     reach = LOOP.collect(work)
     assert reach is not None
-    moment = work.calibration.residual.usable_pair_moment
+    moment = float(work.calibration.answers.usable_moment)
     assert reach["vibration_m"] == pytest.approx(moment * work.ring.rotor.influence_coefficient)
 
 

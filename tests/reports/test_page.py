@@ -16,6 +16,7 @@ from PIL import Image
 
 from ringbalance.reports.figure import DARK, LIGHT
 from ringbalance.reports.page import render
+from ringbalance.reports.traced import evidence_at
 
 Record = dict[str, Any]
 VOID = {"meta", "link", "img", "br", "source", "col", "input", "hr"}
@@ -169,9 +170,9 @@ def test_the_same_evidence_gives_the_same_pages(evidence: Record, pages: dict[st
 
 
 CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
-    (("calibration", "budgets", "lambda", "value"), 0.06543, "65.43"),
-    (("calibration", "budgets", "drag_coefficient", "value"), 7.77, "7.8"),
-    (("operating_point", "stall_pressure_Pa"), 0.379e6, "0.379"),
+    (("calibration", "quantities", "lambda", "value"), 0.06543, "65.43"),
+    (("calibration", "quantities", "drag_coefficient", "value"), 7.77, "7.8"),
+    (("calibration", "quantities", "stall_pressure", "value"), 0.379e6, "0.379"),
     (("paper", "drag_coefficient"), 41.0, "about 41"),
     (("closed_loop", "calibrated", "settling_time_s"), 9.87, "9.87"),
     (("closed_loop", "paper", "overshoots"), 1717, "1717"),
@@ -196,10 +197,7 @@ CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
 def test_the_pages_say_what_the_evidence_says(evidence: Record) -> None:
     before = both(evidence).replace("\u202f", " ")
     for path, value, said in CHANGES:
-        place: Any = evidence
-        for key in path[:-1]:
-            place = place[key]
-        place[path[-1]] = value
+        evidence_at(evidence, ".".join(map(str, path[:-1])))[path[-1]] = value
         assert said not in before
     after = both(evidence).replace("\u202f", " ")
     assert [said for _, _, said in CHANGES if said not in after] == []
@@ -275,11 +273,10 @@ def test_markup_in_texts_is_shown_not_obeyed(evidence: Record) -> None:
 
 @pytest.mark.usefixtures("unwritten")
 def test_nothing_flows(evidence: Record) -> None:
-    point = evidence["operating_point"]
-    point.update(
-        velocity_m_s=0.0, velocity_uncertainty=0.0, k=None, k_uncertainty=None, k_at_velocity_m_s=0.0
-    )
-    point.update(regime="blocked", priming_pressure_vented_Pa=None, priming_pressure_trapped_Pa=None)
+    calibration = evidence["calibration"]
+    calibration["regime"] = "blocked"
+    evidence_at(evidence, "calibration.quantities.velocity")["value"] = 0.0
+    calibration["quantities"] = [q for q in calibration["quantities"] if q["key"] != "drag_coefficient"]
     text = both(evidence)
     assert "nothing flows" in text
     assert "lifts the liquid over the siphon crest" not in text

@@ -53,8 +53,8 @@ def test_places_of_one_quantity_agree(whole: Record) -> None:
 
 
 def test_two_values_of_one_quantity_are_found(evidence: Record) -> None:
-    evidence["calibration"]["budgets"]["velocity"]["value"] = 7.0
-    assert [held for held in apart(evidence) if "operating_point.velocity_m_s" in held]
+    evidence_at(evidence, "calibration.quantities.wall_pressure")["value"] = 7.0
+    assert [held for held in apart(evidence) if "calibration.chamber.wall_pressure_Pa.-1" in held]
 
 
 def test_a_number_is_printed_with_its_place_and_markup_is_not_obeyed() -> None:

@@ -243,8 +243,8 @@ class Calibration(PresentedResult):
         >>> calibration = rb.calibrate(scene)
         >>> f"{calibration.answers.velocity:.1f} m/s"
         '14.9 m/s'
-        >>> calibration.quantities["lambda"].text
-        '(73.361 ± 0.081)\u202fmm'
+        >>> f"{calibration.quantities['lambda'].value:.4f} m"
+        '0.0734 m'
     """
 
     scene: Scene

@@ -1,81 +1,258 @@
-"""The registry of physical terms: estimate, dimensionless group and model of each, and what a scene uses.
+"""Every physical term of a scene: what leaving it out would change, and the model that holds it.
 
 Every term that has a model is modelled, whatever the tolerance: none of them costs what a user could feel.  A
-new term is one entry of `TERMS`; its estimate is a function in `estimates` and its model lives with the part
-that it changes.  Every command takes `models_used` from here, so that all of them report the same list for
-the same scene.
+new term is one `Term` of its part below; its model lives with the part that it changes.  Every command takes
+`models_used` from here, so that all of them report the same list for the same scene.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
-from typing import Final, Literal, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
-from ringbalance.mesh.geometry import chamber_volume
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.gas import HEAT_CAPACITY_RATIO
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.reduced_model import estimates, paper
-from ringbalance.reduced_model.chamber.contributions import Contribution, percent
+from ringbalance.reduced_model.chamber.contributions import (
+    amplification,
+    capillary_share,
+    chamber_fills,
+    gravity_shares,
+    percent,
+    range_fills,
+    wall_layers,
+)
 from ringbalance.reduced_model.chamber.values import chamber_pressure
+from ringbalance.reduced_model.estimates import SHARES, RangeFlow
+from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
+from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
 from ringbalance.scene.models import Scene
 
 INERTIA: Final = "tube inertia"
 FILLING: Final = "gas filling"
 LAG: Final = "valve lag"
 HELD: Final = "liquid held in the tube"
+IN_INJECTIONS: Final = (INERTIA, FILLING, LAG, HELD)
+"""Terms that a closed-loop run models beyond its flow law."""
 LEFT_OUT: Final = "left out"
 NOT_MODELLED: Final = "not modelled in this version"
-
-
-def _counts(_: Scene, estimate: Contribution) -> bool:
-    return estimate.above(0.0)
-
-
-def _always(*_: object) -> bool:
-    return True
-
-
-def _has_crest(scene: Scene, _: Contribution) -> bool:
-    return scene.tube.hump_radius is not None
-
-
-def _has_loss(scene: Scene, estimate: Contribution) -> bool:
-    """Unless the scene prescribes k; also of a tube in which nothing flows."""
-    return scene.tube.drag_coefficient is None and estimate.value != 0.0
-
-
+_NOTHING_FLOWS: Final = "nothing flows"
 Part = Literal["chamber", "tube", "injection"]
 PARTS: Final[tuple[Part, ...]] = get_args(Part)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Term:
-    """One physical term."""
+class Term(NamedTuple):
+    """One physical term of a scene."""
 
     name: str
-    part: Part
-    """Those of chamber and tube are part of a flow law; those of an injection go beyond it."""
     group: str
     """Dimensionless group that its contribution grows with."""
-    estimate: Callable[[Scene], Contribution]
-    """What leaving it out changes, relative, at the worst fill."""
-    model: str = ""
+    model: str
     """Empty where none holds it."""
+    value: float | None
+    """What leaving it out changes, relative, at the worst fill; None where the scene gives no basis."""
+    formula: str
+    """How that is estimated, with its numbers."""
+    remark: str = ""
+    """Further reason, or what the scene makes of the model."""
+    needed: bool | None = None
+    """Whether there is anything to model; None: where the estimate is above zero."""
     without: str = LEFT_OUT
     """What stands in its place where there is nothing to model."""
-    needed: Callable[[Scene, Contribution], bool] = _counts
-    """Whether a scene has anything to model; the size of the estimate never decides."""
-    remark: Callable[[Scene, Contribution], str] = lambda *_: ""
-    """Further reason, or what the scene makes of the model."""
+    unknown: str = "the scene gives no basis for an estimate"
+    """Said where there is no value."""
 
-    def model_of(self, scene: Scene, estimate: Contribution) -> str:
-        """The model that serves a scene; none where the scene gives no numbers or nothing to model."""
+    def chosen(self, tolerance: float) -> str:
+        """The model that serves; none where the scene gives no numbers or nothing to model."""
+        counts = self.value is not None and self.value > (0.0 if self.model else tolerance)
         if not self.model:
-            return NOT_MODELLED if estimate.above(scene.tolerance) else self.without
-        return self.model if self.needed(scene, estimate) else self.without
+            return NOT_MODELLED if counts else LEFT_OUT
+        return self.model if (counts if self.needed is None else self.needed) else self.without
+
+    def reason(self, tolerance: float = 0.0) -> str:
+        """Formula and value, of a term without a model compared with the tolerance."""
+        text = self.unknown if self.value is None else percent(self.value)
+        if self.value is not None and tolerance and not self.model:
+            side = "above" if self.value > tolerance else "below"
+            text = f"{text} is {side} the tolerance of {percent(tolerance)}"
+        return f"{self.formula}; {text}"
+
+
+def terms_of(scene: Scene, parts: Collection[str] = PARTS) -> Iterator[Term]:
+    """Estimate every term of a scene, those of chamber, tube and injection, in the order of `models_used`.
+
+    Those of chamber and tube are part of a flow law; those of an injection go beyond it.
+    """
+    for part, terms in zip(PARTS, (_of_chamber, _of_tube, _of_injection), strict=True):
+        if part in parts:
+            yield from terms(scene)
+
+
+def _of_chamber(scene: Scene) -> Iterator[Term]:
+    disc, fills, gravity = scene.disc, chamber_fills(scene), gravity_shares(scene)
+    fills = fills if fills.size else range_fills(scene)
+    # Eqs. 1 and 2: S_c = theta (R2^2 - R1^2)/2, without plates.
+    bare = disc.axial_width * disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
+    volume, group = chamber_volume(disc=disc), "1 - V/(B theta (R2^2 - R1^2)/2)"
+    simpler = "flat strips" if disc.geometry is None else "a plain sector"
+    off = percent(abs(paper.chamber_volume_paper(disc=disc) / volume - 1))
+    off = f"{simpler} would be {off} off in volume"
+    yield Term("plates between the chambers", group, "exact geometry", 1 - volume / bare, group, off, True)
+    model = "quasi-static, free surface found, mean over a turn"
+    text = "free surface |r + g/omega^2| = b against a concentric one, at the worst fill of the range"
+    yield Term("gravity, mean over a turn", "(g/(omega^2 a))^2", model, gravity.mean, text)
+    group, model = "g/(omega^2 a) |1/(1 - 1/s^2)|", "apart, as waves; means over a turn do not hold it"
+    text = "on a vertical shaft gravity does not turn in the disc's frame"
+    if scene.environment.shaft != "vertical":
+        text = (
+            "first order in g/(omega^2 a), times 1 + 2 max(1, n) in the wall pressure, where the liquid's "
+            f"swing at 1x makes n = |1/(1 - 1/s^2)| up to {np.max(amplification(scene, fills).largest):.2g} "
+            f"over the range of fills, s being known to {percent(FREQUENCY_UNCERTAINTY)}"
+        )
+    apart = "it vanishes in the mean over a turn"
+    yield Term("gravity ripple at 1x and sloshing", group, model, gravity.swing, text, apart)
+    tension = float(np.max(capillary_share(scene, fills)["pressures"]))
+    text = "sigma (2/B + 1/(a alpha) + 1/a)/P, an inverse Bond number"
+    yield Term("surface tension", "sigma/(P B)", "", tension, text)
+    layers, ekman = wall_layers(scene, fills[-1])
+    group = "g/(omega^2 a) sqrt(nu/(omega R2^2))"
+    text = f"g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2) = {ekman:.1e}"
+    yield Term("friction at the walls of a chamber", group, "", float(layers), text)
+
+
+_TUBE: Final[Mapping[str, tuple[str, str, str]]] = {
+    "whole": ("loss of the tube", "k", "k(u), friction by Churchill's formula and what follows"),
+    "roughness": ("roughness of the tube's wall", "eps/d", "in Churchill's formula"),
+    "rotation": (
+        "friction by rotation",
+        "omega d^2/nu",
+        "finite-element table laminar, correlation turbulent",
+    ),
+    "bends": ("bends of the tube", "K/k", "finite elements laminar, correlation turbulent"),
+    "ends": ("entrance and exit of the tube", "K/k", "finite elements laminar, constants turbulent"),
+}
+"""Name, group and model, by part of the loss."""
+
+
+def _of_tube(scene: Scene) -> Iterator[Term]:
+    tube, flow = scene.tube, estimates.range_flow(scene)
+    name, group = "priming over the siphon crest", "(p_A + P_A - D_m)/(p_A + P_A - P_C)"
+    model, without = "four regimes", "always a full siphon"
+    if tube.hump_radius is None:
+        text, remark = (
+            "the scene gives no hump_radius",
+            "Eq. 18, which levels the chambers out while the gas is off",
+        )
+        yield Term(name, group, model, None, text, remark, False, without)
+    else:
+        text = "1 - u_separated/u_siphon, or 1 where the column to the siphon crest outweighs the gas"
+        yield Term(name, group, model, estimates.lost_at_crest(flow), text, _over_crest(scene), True, without)
+    velocity, free = estimates.range_velocities(flow), tube.drag_coefficient is None
+    changes = estimates.tube_changes(scene, velocity) if free and velocity.size else {}
+    for part, (name, group, model) in _TUBE.items():
+        value, text = changes.get(part), _NOTHING_FLOWS if free else "the scene prescribes k"
+        if changes:
+            simpler = f"k = {paper.PAPER_DRAG_COEFFICIENT:g}" if part == "whole" else "leaving it out"
+            over = f"over {velocity[0]:.2g} to {velocity[-1]:.2g} m/s"
+            text = f"{simpler} changes k, or the head up to the siphon crest, {over}"
+        # Also of a tube in which nothing flows.
+        needed, without = free and value != 0.0, "constant k" if part == "whole" else LEFT_OUT
+        yield Term(name, group, model, value, text, "", needed, without)
+
+
+def _over_crest(scene: Scene) -> str:
+    moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
+    gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"
+    return (
+        f"{scene.tube.hump_shape}, {scene.tube.hump_gas} gas, cavity of {gas}; "
+        f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
+    )
+
+
+def _of_injection(scene: Scene) -> Iterator[Term]:
+    gas, flow, deciding = scene.gas, estimates.range_flow(scene), estimates.injection_time(scene)
+    within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
+    value, text = None, _NOTHING_FLOWS
+    if np.any(flow.starts):
+        re = abs(flow.equal) * scene.tube.bore / scene.liquid.kinematic_viscosity
+        laminar = float(1 - turbulent_share(reynolds=np.array(re)))
+        velocity, driving = flow.velocity[flow.starts], flow.driving[flow.starts]
+        # A column that never moves costs nothing to start.
+        slowest = max(float(np.max(scene.liquid.density * scene.tube.length * velocity / driving)), 1e-12)
+        value = estimates.start_up_loss(start_up=slowest, gas_time=deciding, laminar=laminar)
+        text = f"start-up time 2 L/((k + 1) u) up to {1e3 * slowest:.3g} ms over the range of fills, {within}"
+    yield Term(
+        INERTIA, "2 L/((k + 1) u T)", "rho L du/dt of the liquid in the tube, in injections", value, text
+    )
+    # The fast and the slow end of the line.
+    ends = (line_ends(scene)[-1], line_ends(scene)[0])
+    volume, supply = chamber_volume(disc=scene.disc) + (gas.dead_volume or 0.0), ends[1].line.supply_pressure
+    fill = [float(end.line.filling_time(supply, volume=volume)) for end in ends]
+    vent = [float(end.line.venting_time(supply, volume=volume)) for end in ends]
+    longer, lags = [max(pair) for pair in zip(fill, vent, strict=True)], [end.valve_lag for end in ends]
+    text = f"an empty chamber fills in {_span(fill)} ms and vents in {_span(vent)} ms, {within}"
+    group, model = "V/(C p_0 T)", "ISO 6358, in injections"
+    yield _timed(FILLING, group, model, longer, deciding, text, gas.conductance, _heat(scene, longer[1]))
+    text, model = f"{_span(lags)} ms {within}", "pure delay, in injections"
+    yield _timed(LAG, "t/T", model, lags, deciding, text, gas.valve_lag)
+    yield _held(scene, flow, deciding, within)
+
+
+def _timed(
+    name: str,
+    group: str,
+    model: str,
+    times: Sequence[float],
+    deciding: float,
+    text: str,
+    given: float | None,
+    remark: str = "",
+) -> Term:
+    """A term of the times of the fast and the slow end of a gas line, s, over the deciding injection's."""
+    fast, slow = (min(time / deciding, 1.0) for time in times)
+    if given is not None:
+        return Term(name, group, model, slow, text, remark)
+    both = " to ".join(dict.fromkeys((percent(fast), percent(slow))))
+    return Term(name, group, model, None, text, unknown=f"not in the scene: {both} over a default range")
+
+
+def _held(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Term:
+    """What is lifted to the crest and falls back, as in a run, at the lowest level of the range."""
+    tube, value, text = scene.tube, None, _NOTHING_FLOWS
+    slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
+    if tube.hump_radius is None:
+        value, text = 0.0, "a tube without a crest stays full"
+    elif np.isfinite(slowest):
+        level = float(surface_radius(disc=scene.disc, fill_ratio=SHARES[0] * scene.disc.max_fill_ratio))
+        near = share_at_radius(tube=tube, radius=level, far_leg=False)
+        length = tube.length * (crest_middle(tube) - near)
+        value = min(length / max(slowest, 1e-300) / deciding, 1.0)
+        text = (
+            f"at most what fills {1e3 * length:.3g} mm of tube, from the level to the crest's middle, falls "
+            f"back after venting, over the liquid moved {within}, at the worst fill"
+        )
+    model = "lifted from the level to the crest unless the tube is primed, in injections"
+    return Term(HELD, "l/(u T)", model, value, text)
+
+
+def _span(times: Sequence[float]) -> str:
+    """ms, of the fast and of the slow end."""
+    return " to ".join(dict.fromkeys(f"{1e3 * time:.3g}" for time in times))
+
+
+def _heat(scene: Scene, time: float) -> str:
+    """How far heat from the walls of a chamber moves the estimate of a filling time, s."""
+    if scene.gas.process == "adiabatic":
+        return "estimated isothermal, modelled without heat from the walls, which takes less"
+    sooner = 1e3 * time * (1 - 1 / HEAT_CAPACITY_RATIO)
+    return f"isothermal: without heat from the walls it would take up to {sooner:.3g} ms less"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,41 +290,25 @@ def models_used(
         parts: those whose terms are listed.
     """
     rows = []
-    for term in (each for each in TERMS if each.part in parts):
-        estimate = term.estimate(scene)
-        model, more = _model(term, scene, estimate, law=law, obstacles=obstacles, asked=asked)
-        reason = estimate.reason(None if term.model else scene.tolerance)
+    for term in terms_of(scene, parts):
+        model, more = term.chosen(scene.tolerance), term.remark
+        if term.name not in IN_INJECTIONS:
+            if law != CALIBRATED:
+                model, more = f"as in the law “{law}”", ""
+        elif asked is not None:
+            model, more = (term.model if term.name in asked else LEFT_OUT), "the caller's choice"
+        elif model != LEFT_OUT and term.name in obstacles:
+            model, more = NOT_MODELLED, obstacles[term.name]
+        why = term.reason(scene.tolerance)
         rows.append(
             ModelUsed(
                 term=term.name,
                 model=model,
-                why=f"{reason}; {more}" if more else reason,
-                estimated_contribution=estimate.value,
+                why=f"{why}; {more}" if more else why,
+                estimated_contribution=term.value,
             )
         )
     return tuple(rows)
-
-
-def _model(
-    term: Term,
-    scene: Scene,
-    estimate: Contribution,
-    *,
-    law: str,
-    obstacles: Mapping[str, str],
-    asked: Collection[str] | None,
-) -> tuple[str, str]:
-    """Model and further reason."""
-    if term.part != "injection":
-        if law != CALIBRATED:
-            return f"as in the law “{law}”", ""
-        return term.model_of(scene, estimate), term.remark(scene, estimate)
-    if asked is not None:
-        return (term.model if term.name in asked else LEFT_OUT), "the caller's choice"
-    model = term.model_of(scene, estimate)
-    if model != LEFT_OUT and term.name in obstacles:
-        return NOT_MODELLED, obstacles[term.name]
-    return model, term.remark(scene, estimate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,174 +332,16 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
     known = {r.term: r.estimated_contribution for r in rows if r.estimated_contribution is not None}
     unknown = tuple(row.term for row in rows if row.estimated_contribution is None)
     bound = float(sum(known.values()))
+    numbers = " that the scene gives numbers for" if unknown else ""
+    text = f"no term of an injection{numbers} is neglected"
+    if known:
+        text = (
+            f"neglected terms ({', '.join(known)}) change the liquid moved by the shortest injection that "
+            f"matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
+        )
     # Without their numbers in the scene these two are a default range.
     ranges = [term for term in unknown if term in (FILLING, LAG)]
     others = [term for term in unknown if term not in ranges]
-    more = f"; not in the scene, see the gas line's default range: {', '.join(ranges)}" if ranges else ""
-    more += f"; not estimated, for lack of numbers in the scene: {', '.join(others)}" if others else ""
-    return _Neglected(
-        terms=tuple(known),
-        bound=bound,
-        unknown=unknown,
-        text=f"{_change(known, bound, unknown)}{more}",
-    )
-
-
-def _change(terms: Collection[str], bound: float, unknown: Collection[str]) -> str:
-    if not terms:
-        numbers = " that the scene gives numbers for" if unknown else ""
-        return f"no term of an injection{numbers} is neglected"
-    return (
-        f"neglected terms ({', '.join(terms)}) change the liquid moved by the shortest injection that "
-        f"matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
-    )
-
-
-def _off_in_volume(scene: Scene, _: Contribution) -> str:
-    strips, exact = paper.chamber_volume_paper(disc=scene.disc), chamber_volume(disc=scene.disc)
-    simpler = "flat strips" if scene.disc.geometry is None else "a plain sector"
-    return f"{simpler} would be {percent(abs(strips / exact - 1))} off in volume"
-
-
-def _crest(scene: Scene, _: Contribution) -> str:
-    if scene.tube.hump_radius is None:
-        return "Eq. 18, which levels the chambers out while the gas is off"
-    moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
-    gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"
-    return (
-        f"{scene.tube.hump_shape}, {scene.tube.hump_gas} gas, cavity of {gas}; "
-        f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
-    )
-
-
-def _heat(scene: Scene, estimate: Contribution) -> str:
-    """How far heat from the walls of a chamber moves the estimate."""
-    if estimate.time is None:
-        return ""
-    if scene.gas.process == "adiabatic":
-        return "estimated isothermal, modelled without heat from the walls, which takes less"
-    sooner = 1e3 * estimate.time * (1 - 1 / HEAT_CAPACITY_RATIO)
-    return f"isothermal: without heat from the walls it would take up to {sooner:.3g} ms less"
-
-
-TERMS: Final = (
-    Term(
-        name="plates between the chambers",
-        part="chamber",
-        group="1 - V/(B theta (R2^2 - R1^2)/2)",
-        estimate=estimates.plates,
-        model="exact geometry",
-        needed=_always,
-        remark=_off_in_volume,
-    ),
-    Term(
-        name="gravity, mean over a turn",
-        part="chamber",
-        group="(g/(omega^2 a))^2",
-        estimate=estimates.gravity_mean,
-        model="quasi-static, free surface found, mean over a turn",
-    ),
-    Term(
-        name="gravity ripple at 1x and sloshing",
-        part="chamber",
-        group="g/(omega^2 a) |1/(1 - 1/s^2)|",
-        estimate=estimates.ripple_and_sloshing,
-        model="apart, as waves; means over a turn do not hold it",
-        remark=lambda *_: "it vanishes in the mean over a turn",
-    ),
-    Term(
-        name="surface tension",
-        part="chamber",
-        group="sigma/(P B)",
-        estimate=estimates.surface_tension,
-    ),
-    Term(
-        name="friction at the walls of a chamber",
-        part="chamber",
-        group="g/(omega^2 a) sqrt(nu/(omega R2^2))",
-        estimate=estimates.wall_friction,
-    ),
-    Term(
-        name="priming over the siphon crest",
-        part="tube",
-        group="(p_A + P_A - D_m)/(p_A + P_A - P_C)",
-        estimate=estimates.crest,
-        model="four regimes",
-        needed=_has_crest,
-        without="always a full siphon",
-        remark=_crest,
-    ),
-    Term(
-        name="loss of the tube",
-        part="tube",
-        group="k",
-        estimate=partial(estimates.tube_part, part=estimates.WHOLE),
-        model="k(u), friction by Churchill's formula and what follows",
-        needed=_has_loss,
-        without="constant k",
-    ),
-    Term(
-        name="roughness of the tube's wall",
-        part="tube",
-        group="eps/d",
-        estimate=partial(estimates.tube_part, part="roughness"),
-        model="in Churchill's formula",
-        needed=_has_loss,
-    ),
-    Term(
-        name="friction by rotation",
-        part="tube",
-        group="omega d^2/nu",
-        estimate=partial(estimates.tube_part, part="rotation"),
-        model="finite-element table laminar, correlation turbulent",
-        needed=_has_loss,
-    ),
-    Term(
-        name="bends of the tube",
-        part="tube",
-        group="K/k",
-        estimate=partial(estimates.tube_part, part="bends"),
-        model="finite elements laminar, correlation turbulent",
-        needed=_has_loss,
-    ),
-    Term(
-        name="entrance and exit of the tube",
-        part="tube",
-        group="K/k",
-        estimate=partial(estimates.tube_part, part="ends"),
-        model="finite elements laminar, constants turbulent",
-        needed=_has_loss,
-    ),
-    Term(
-        name=INERTIA,
-        part="injection",
-        group="2 L/((k + 1) u T)",
-        estimate=estimates.inertia,
-        model="rho L du/dt of the liquid in the tube, in injections",
-    ),
-    Term(
-        name=FILLING,
-        part="injection",
-        group="V/(C p_0 T)",
-        estimate=estimates.filling,
-        model="ISO 6358, in injections",
-        remark=_heat,
-    ),
-    Term(
-        name=LAG,
-        part="injection",
-        group="t/T",
-        estimate=estimates.lag,
-        model="pure delay, in injections",
-    ),
-    Term(
-        name=HELD,
-        part="injection",
-        group="l/(u T)",
-        estimate=estimates.held,
-        model="lifted from the level to the crest unless the tube is primed, in injections",
-    ),
-)
-"""All physical terms, in the order of every `models_used`."""
-IN_INJECTIONS: Final = tuple(term.name for term in TERMS if term.part == "injection")
-"""Terms that a closed-loop run models beyond its flow law."""
+    text += f"; not in the scene, see the gas line's default range: {', '.join(ranges)}" if ranges else ""
+    text += f"; not estimated, for lack of numbers in the scene: {', '.join(others)}" if others else ""
+    return _Neglected(terms=tuple(known), bound=bound, unknown=unknown, text=text)

@@ -16,7 +16,6 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.calibration import calibrate, chamber_and_law
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.estimates import steady
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -33,6 +32,7 @@ GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""
 PERIODS: Final = (0.25, 0.5, 1.0)
 """Between operations, s: the paper gives none; the middle one is judged and the others bound it."""
+_STEPS: Final = ("first_trial", "long_step", "short_step")
 _POINTS: Final = 400
 """Of a curve."""
 
@@ -69,7 +69,7 @@ def mistaken_lag(scene: Scene) -> Scene:
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
     """One closed-loop run. Args: `law`: "paper" or "calibrated"; one calibrated law serves all runs."""
     paper = law == "paper"
-    return simulate(scene, paper_model(scene) if paper else BalancerModel.of(flow_law_of(steady(scene))))
+    return simulate(scene, paper_model(scene) if paper else BalancerModel.of(flow_law_of(scene)))
 
 
 @lru_cache(maxsize=16)
@@ -78,9 +78,20 @@ def calibration_of(scene: Scene) -> Calibration:
     return calibrate(scene)
 
 
-@lru_cache(maxsize=64)
 def flow_law_of(scene: Scene) -> CalibratedLaw:
-    """The law of `calibrate` without the rest, which takes half of the time."""
+    """The law of `calibrate` without the rest, once for all scenes that differ in rotor and control alone."""
+    rotor = {"influence_coefficient": 1.0, "lag_angle": 0.0, "initial_amplitude": 1.0, "initial_phase": 0.0}
+    control = dict.fromkeys(("limit", "period", "hold_time", "proportional", *_STEPS), 1.0)
+    still = dataclasses.replace(
+        loop_scene(scene, kind="target_vector", **control),
+        rotor=dataclasses.replace(scene.rotor, **rotor),
+        run=dataclasses.replace(scene.run, seed=0, time_limit=1.0),
+    )
+    return _flow_law(still)
+
+
+@lru_cache(maxsize=64)
+def _flow_law(scene: Scene) -> CalibratedLaw:
     return chamber_and_law(scene)[1]
 
 

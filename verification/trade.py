@@ -29,7 +29,7 @@ from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
-from ringbalance.reduced_model.terms import TERMS, models_used
+from ringbalance.reduced_model.terms import models_used, terms_of
 from ringbalance.results.numbers import MISSING, number, percent
 from ringbalance.results.result import Result, Rows, Table, print_rows
 from ringbalance.results.rows import Quantity
@@ -97,7 +97,6 @@ class TradeStudy(Result):
     def to_dict(self) -> Record:
         """Plain numbers and texts; all but `times` is the same on every machine."""
         scene = self.scene
-        estimates = [(term, term.estimate(scene)) for term in TERMS]
         return {
             "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
             "tolerance": scene.tolerance,
@@ -105,10 +104,10 @@ class TradeStudy(Result):
                 {
                     "term": term.name,
                     "group": term.group,
-                    "estimated_contribution": estimate.value,
-                    "why": estimate.reason(None),
+                    "estimated_contribution": term.value,
+                    "why": term.reason(),
                 }
-                for term, estimate in estimates
+                for term in terms_of(scene)
             ],
             "models_used": [asdict(used) for used in models_used(scene)],
             "quantities": list(self.quantities),

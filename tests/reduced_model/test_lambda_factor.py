@@ -9,7 +9,7 @@ import pytest
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.estimates import _injection_time
+from ringbalance.reduced_model.estimates import injection_time
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 
@@ -66,4 +66,4 @@ def test_the_injection_that_decides_is_longer_by_it(paper_scene: Scene) -> None:
     law_based = replace(paper_scene.controller, kind="law_based")
     plain = replace(paper_scene, controller=law_based)
     smaller = replace(plain, disc=replace(plain.disc, lambda_factor=0.5))
-    assert _injection_time(smaller) == pytest.approx(2 * _injection_time(plain))
+    assert injection_time(smaller) == pytest.approx(2 * injection_time(plain))

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, TERMS, ModelUsed, models_used
+from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, ModelUsed, models_used, terms_of
 from ringbalance.scene.models import Scene
 
 
@@ -17,7 +17,7 @@ def chosen(scene: Scene) -> dict[str, ModelUsed]:
 @pytest.mark.parametrize("tolerance", [0.9, 0.01, 1e-6])
 def test_the_tolerance_decides_on_no_model(table_1_scene: Scene, tolerance: float) -> None:
     used = chosen(dataclasses.replace(table_1_scene, tolerance=tolerance))
-    models = {term.name: term.model for term in TERMS if term.model}
+    models = {term.name: term.model for term in terms_of(table_1_scene) if term.model}
     without = {"gas filling": LEFT_OUT, "valve lag": LEFT_OUT}
     assert {name: used[name].model for name in models} == models | without
     # What no model holds is compared with it.

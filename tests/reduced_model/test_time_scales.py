@@ -9,12 +9,8 @@ from typing import Literal
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.reduced_model import estimates
-from ringbalance.reduced_model.estimates import (
-    _deciding_gas_time,
-    _long_start_up_loss,
-    _start_up_loss,
-)
+from ringbalance.reduced_model.estimates import deciding_gas_time, start_up_loss
+from ringbalance.reduced_model.terms import FILLING, LAG, ModelUsed, models_used
 from ringbalance.scene.models import Scene
 
 
@@ -29,17 +25,15 @@ def moved(gas_time: float, *, power: int) -> float:
 
 @pytest.mark.parametrize("gas_time", [1e-4, 2e-3, 4e-3, 0.8])
 @pytest.mark.parametrize(("power", "laminar"), [(2, 0.0), (1, 1.0)])
-def test_start_up_loss_is_that_of_the_column(gas_time: float, power: int, laminar: float) -> None:
-    lost = _start_up_loss(start_up=3e-3, gas_time=gas_time, laminar=laminar)
+def teststart_up_loss_is_that_of_the_column(gas_time: float, power: int, laminar: float) -> None:
+    lost = start_up_loss(start_up=3e-3, gas_time=gas_time, laminar=laminar)
     assert lost == pytest.approx(moved(gas_time, power=power), rel=1e-6)
     assert 0 < lost < 1
 
 
 def test_a_long_injection_loses_tau_ln_2() -> None:
     tau, long = 3e-3, 30.0
-    assert _start_up_loss(start_up=tau, gas_time=long) * long == pytest.approx(tau * math.log(2), rel=1e-9)
-    assert _long_start_up_loss(tau) == pytest.approx(tau * math.log(2))
-    assert _long_start_up_loss(tau, laminar=1.0) == tau
+    assert start_up_loss(start_up=tau, gas_time=long) * long == pytest.approx(tau * math.log(2), rel=1e-9)
 
 
 def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) -> None:
@@ -51,23 +45,27 @@ def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) ->
     }
     for kind, expected in kinds.items():
         scene = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind=kind))
-        assert _deciding_gas_time(scene, rate=7.2e-6) == pytest.approx(expected)
+        assert deciding_gas_time(scene, rate=7.2e-6) == pytest.approx(expected)
     trial = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind="trial"))
-    assert _deciding_gas_time(trial, rate=7.2e-6) == control.short_step
+    assert deciding_gas_time(trial, rate=7.2e-6) == control.short_step
     slow = dataclasses.replace(control, minimum_gas_time=0.02)
-    assert _deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02
+    assert deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02
 
 
 def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scene) -> None:
     """C of 0.2 to 1 l/(s bar) and 5 to 10 ms of lag are longer than an injection of 4 ms."""
     gas = dataclasses.replace(table_1_scene.gas, conductance=None, critical_ratio=None, valve_lag=None)
     scene = dataclasses.replace(table_1_scene, gas=gas)
-    for found in (estimates.filling(scene), estimates.lag(scene)):
-        assert found.value is None
-        assert found.default_range == (1.0, 1.0)
-        assert "100 % over a default range" in found.reason(None)
-    assert "5 to 10 ms" in estimates.lag(scene).formula
+    silent = _lines(scene)
+    for found in silent.values():
+        assert found.estimated_contribution is None
+        assert "100 % over a default range" in found.why
+    assert "5 to 10 ms" in silent[LAG].why
     own = dataclasses.replace(gas, conductance=1e-8, critical_ratio=0.3, valve_lag=1e-3)
-    given = estimates.lag(dataclasses.replace(table_1_scene, gas=own))
-    assert given.value == pytest.approx(0.25)
-    assert given.default_range is None
+    known = _lines(dataclasses.replace(table_1_scene, gas=own))[LAG]
+    assert known.estimated_contribution == pytest.approx(0.25)
+    assert "default range" not in known.why
+
+
+def _lines(scene: Scene) -> dict[str, ModelUsed]:
+    return {used.term: used for used in models_used(scene) if used.term in (FILLING, LAG)}

@@ -44,8 +44,9 @@ _OF_SHARE: Final = 5e-4
 """Where a share decides whether a column separates, `point` allows for more."""
 _OF_CHAMBER: Final = 2e-6
 """Of the largest squared radius and moment."""
-_EASES: Final = (1.0, 1.6)
-"""Times the first of these errors, and its cube the second, where levels would have no room otherwise."""
+_EASES: Final = (1.0, 1.6, 2.5, 4.0)
+"""Times the first of these errors, and its cube the second, where levels would have no room otherwise; the
+larger it is the fewer levels do, as `_MOST_LEVELS` over its square."""
 _OF_WIDTHS: Final = 0.08
 """Of a half-width, and a tenth of that of the largest one."""
 _OF_MOMENT_WIDTH: Final = 0.1
@@ -172,9 +173,13 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
         _add_chamber(rows, scene, law, slack, ease)
         before, count = map(len, rows.arrays({}))
         left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
-        if left >= 8 * WIDTH_OF_ROW * _MOST_LEVELS:
+        most = left // (8 * WIDTH_OF_ROW)
+        if most * ease**2 >= _MOST_LEVELS:
             break
-    level_error = _add_levels(level_rows, law, slack, most=min(_MOST_LEVELS, left // (8 * WIDTH_OF_ROW)))
+    else:
+        problem = f"its law does not fit into the {LARGEST} bytes of its compact form"
+        raise SceneError.of_file(scene.file, problem, "a tube whose loss changes less abruptly")
+    level_error = _add_levels(level_rows, law, slack, most=min(_MOST_LEVELS, most))
     level_numbers, levels = level_rows.arrays({})
     numbers, pieces = rows.arrays(
         law.scalars()
@@ -239,7 +244,11 @@ class _Column:
         t = (x[at] - x[last]) / (x[last] - x[first])
         exact = np.linalg.solve(np.vander(t, increasing=True), self.value[at]) / powers
         step = 2.0 ** np.floor(np.log2(_OF_ROUNDING * self.allowed[first : last + 1].min() / powers))
-        return np.pad(np.rint(exact / step) * step + 0.0, (0, self.degree + 1 - at.size))
+        rounded = np.rint(exact / step) * step
+        if self.degree == 1 and rounded @ (x[first] - x[last]) ** np.arange(2) < 0.0:
+            # A half-width is rounded up where it would begin below zero.
+            rounded = np.array([np.ceil(exact[0] / step[0]), np.floor(exact[1] / step[1])]) * step
+        return np.pad(rounded + 0.0, (0, self.degree + 1 - at.size))
 
     def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
         """Of one piece, at the samples that it spans."""

@@ -79,6 +79,8 @@ _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
 _LARGEST_ERROR: Final = 0.5
 """Of a constant k."""
+_LEAST_LEFT: Final = 0.1
+"""Of another k, whatever the errors of its models."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -174,7 +176,8 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
     measured smooth tubes have.
-    Errors of a constant k count for half of it at most: no error makes a loss a gain.
+    Errors of a constant k count for half of it at most, and of another they leave a tenth: no error makes a
+    loss a gain.
     """
     if not tube.model_errors:
         return state
@@ -194,7 +197,18 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
         terms[term] = terms[term] + error
     if "decree" in terms:
         terms["decree"] = terms["decree"] + _limited(lumped, _LARGEST_ERROR * state.k)
-    return replace(state, terms=terms, bends=bends)
+    return _still_a_loss(state, replace(state, terms=terms, bends=bends))
+
+
+def _still_a_loss(right: TubeState, wrong: TubeState) -> TubeState:
+    """The state with errors, all of them made smaller by one factor where they leave too little of k."""
+    most, change = (1 - _LEAST_LEFT) * right.k, right.k - wrong.k
+    if not np.any(change > most):
+        return wrong
+    part = np.where(change > most, most / np.where(change > most, change, 1.0), 1.0)
+    terms = {name: right.terms[name] + part * (wrong.terms[name] - right.terms[name]) for name in right.terms}
+    bends = tuple(one + part * (other - one) for one, other in zip(right.bends, wrong.bends, strict=True))
+    return replace(wrong, terms=terms, bends=bends)
 
 
 def _all_parts(tube: Tube, state: TubeState) -> Mapping[str, FloatArray]:

@@ -336,6 +336,22 @@ def test_both_parts_together_are_the_stated_uncertainty_at_every_velocity(
     assert sides[0] == pytest.approx(stated * np.cos(angle), abs=1e-12)
 
 
+def test_no_error_makes_a_loss_a_gain(paper_scene: Scene) -> None:
+    """Friction of a rough bore of 22 um is known to 140 % near Re 2400; a tenth of k is left at least."""
+    fine = dataclasses.replace(paper_scene.tube, bore=22e-6, length=62e-3, bends=())
+    scene = dataclasses.replace(paper_scene, tube=fine)
+    right = tube_state(scene, np.geomspace(0.1, 200.0, 400))
+    width = model_parts(tube=fine, state=right)["friction correlation"]
+    assert np.max(width / right.k) > 1.3
+    shares = []
+    for size in (-3.0, 3.0):
+        error = ModelError.named("model: friction correlation, odd", size)
+        wrong = with_errors(tube=dataclasses.replace(fine, model_errors=(error,)), state=right)
+        shares.append(wrong.k / right.k)
+    assert np.min(shares) == pytest.approx(0.1)
+    assert np.max(shares) > 2.0
+
+
 def test_an_error_of_bends_stays_with_the_bends(paper_scene: Scene) -> None:
     """Of two bends alike one lies before the crest, and half of the error with it."""
     (_, right), (_, wrong) = erring(paper_scene), erring(paper_scene, ("bends", 1.0, 0.0))

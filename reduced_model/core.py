@@ -90,8 +90,6 @@ class Answers:
     with six, as a chamber that has nothing to give leaves its share to other pairs.
     Source: elementary geometry (a sum of segments is a zonotope).
     """
-    holds: BoolArray
-    """Whether the fullest chamber keeps its liquid with the gas off."""
     loop_factor: FloatArray
     """Change of the vibration per valve-open time at equal fills, kappa lambda rho S u, times the scene's
     proportional gain."""
@@ -145,9 +143,6 @@ class Answers:
             moment = moments(fills)
         usable, volume = moment[1] - moment[0], chamber_volume(disc=scene.disc) * np.ones(designs.size)
         gas = _draining_flow(tube, residual, top - residual)
-        holds = np.zeros(designs.size, dtype=np.bool_)
-        if tube.path.crest:
-            holds = tube.level(top - least) <= tube.path.return_pressure
         rate = scene.rotor.influence_coefficient * ratio[0] * rho * scene.tube.area * running
         crest, nothing = tube.path.crest, np.full(designs.size, np.nan)
         separated = np.where(flow.separated, Regime.SEPARATED, Regime.SIPHON)
@@ -177,7 +172,6 @@ class Answers:
             usable_volume=(top - 2 * least) * volume,
             usable_moment=usable,
             reach=usable / np.tan(np.pi / np.asarray(scene.disc.chambers)),
-            holds=holds,
             loop_factor=scene.controller.proportional * rate,
         )
 

@@ -54,8 +54,8 @@ class LineAnswer:
     """Change of the vibration by the shortest opening, m."""
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
-    holds: bool = True
-    """Whether what an injection moves stays moved with the gas off."""
+    holds: bool | None = True
+    """Whether what an injection moves stays moved with the gas off; None: likely, as `TubePath.holds`."""
 
 
 def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
@@ -79,14 +79,15 @@ def _end(gas: Gas, name: str, place: int) -> LineEnd:
 
 def line_text(answers: tuple[LineAnswer, ...]) -> str:
     """What the shortest opening that primes the tube at equal fills corrects, in one phrase."""
-    if not answers[0].holds:
+    if answers[0].holds is False:
         return "what an injection moves runs back while the gas is off"
     if any(answer.smallest_correction is None for answer in answers):
         return "the gas starts no flow at equal fills"
     whose = "the scene's" if answers[0].end == "given" else "not in the scene, default range"
     each = [f"{1e6 * (answer.smallest_correction or 0.0):.2g} um{_which(answer)}" for answer in answers]
     what = "the shortest opening that primes the tube at equal fills corrects"
-    return f"{whose}: {what} {' or '.join(each)}, shorter ones less"
+    lasts = "" if answers[0].holds else "; whether it lasts hangs on the pressure of a cavity over the crest"
+    return f"{whose}: {what} {' or '.join(each)}, shorter ones less{lasts}"
 
 
 def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from ringbalance.controller.simulation import Outcome
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.reduced_model.tube.path import crest_middle, crest_span
@@ -57,9 +59,14 @@ def crest_fill(scene: Scene, model: BalancerModel) -> float:
 
 
 def running_fill(scene: Scene, model: BalancerModel) -> float:
-    """Fill down to which the gas drives a chamber whose flow never stops; at equal fills where that does not
-    carry the gas off the crest."""
+    """Fill down to which the gas at most drives a chamber whose flow never stops, with vapour alone in a
+    cavity over the crest; at equal fills where that flow does not carry the gas off the crest.
+
+    The gas that a cavity may hold besides stops it earlier, at its full pressure where a new injection stalls.
+    """
     total, law, gas = 2 * scene.disc.initial_fill, model.flow, scene.gas.pressure
+    if isinstance(law, CalibratedLaw):
+        law = replace(law, path=replace(law.path, released=0.0))
     rest = law.evaluate(fill_ratio=total / 2, gas_pressure=0.0, primed=True)
     start = law.evaluate(fill_ratio=total / 2, gas_pressure=gas, primed=bool(rest.primed))
     if not bool(start.primed):

@@ -34,8 +34,8 @@ def _injections(scene: Scene, line: GasLine, model: BalancerModel) -> Injections
     return Injections.of(dynamics, model, fill=total / 2, total=total)
 
 
-def _holds(model: BalancerModel) -> bool:
-    """Whether what an injection moves at equal fills stays moved with the gas off."""
+def _holds(model: BalancerModel) -> bool | None:
+    """Whether what an injection moves at equal fills stays moved with the gas off; as `TubePath.holds`."""
     law = model.flow
     return not isinstance(law, CalibratedLaw | PaperLaw) or law.holds(law.max_fill_ratio / 2)
 
@@ -43,7 +43,7 @@ def _holds(model: BalancerModel) -> bool:
 def _answer(scene: Scene, end: LineEnd, model: BalancerModel) -> LineAnswer:
     line, limit, holds = end.line, scene.controller.limit, _holds(model)
     volume = (1 - model.flow.max_fill_ratio / 2) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
-    injections = _injections(scene, line, model) if holds else None
+    injections = _injections(scene, line, model) if holds is not False else None
     opening = correction = dead = None
     if injections is not None and injections.shortest is not None:
         opening = max(injections.shortest, end.valve_lag)

@@ -335,8 +335,8 @@ class CalibratedLaw:
         ends = self.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
         return np.asarray(priming_pressure(path, ends)) / self.gas_factor
 
-    def holds(self, fill_ratio: float) -> bool:
-        """Whether a chamber of that fill keeps it against a lower one with the gas off."""
+    def holds(self, fill_ratio: float) -> bool | None:
+        """Whether a chamber of that fill keeps it against a lower one with the gas off; as `TubePath.holds`."""
         return self.path.holds(max(float(self.hydrostatic_pressure(fill_ratio)), 0.0))
 
     def table(self) -> Mapping[str, FloatArray]:

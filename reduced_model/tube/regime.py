@@ -115,9 +115,14 @@ class TubePath:
         highest: float = plain(-crest_margins(self, TubeEnds(0.0, 0.0, 0.0, self.port_pressure))[0])
         return highest
 
-    def holds(self, level: float) -> bool:
-        """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off."""
-        return self.crest and level <= self.return_pressure
+    def holds(self, level: float) -> bool | None:
+        """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off.
+
+        None: likely, under the pressure of a cavity over the crest that runs take, and not under every one.
+        """
+        if not self.crest or level > self.return_pressure:
+            return False
+        return True if self.column_pressure >= self.holding_pressure(level) else None
 
     def holding_pressure(self, level: float) -> float:
         """D_m of a crest from which on it lasts whatever the pressure of a cavity over the crest, Pa."""

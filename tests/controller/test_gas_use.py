@@ -243,3 +243,13 @@ def test_a_run_reports_its_gas(model: BalancerModel, scene: Scene) -> None:
     assert gas["fillings"] == len(run.injections)
     assert document["gas_line"]["given"] is False
     assert document["energy_J"] == run.energy
+
+
+def test_what_a_cavity_decides_is_not_said_to_last(scene: Scene) -> None:
+    """At equal fills the column is sure to stand down to 5446 rpm, and under half of the gas to 3851 rpm."""
+    hangs = "hangs on the pressure of a cavity"
+    for rpm, holds in ((5600, True), (5300, None), (4000, None), (3700, False)):
+        slower = replace(scene, rotor=replace(scene.rotor, speed=rpm * math.pi / 30))
+        answers = line_answers(slower, BalancerModel.of(calibrate(slower).flow_law))
+        assert {each.holds for each in answers} == {holds}
+        assert (hangs in line_text(answers)) is (holds is None)

@@ -62,7 +62,7 @@ def running_fill(scene: Scene, model: BalancerModel) -> float:
     """Fill down to which the gas at most drives a chamber whose flow never stops, with vapour alone in a
     cavity over the crest; at equal fills where that flow does not carry the gas off the crest.
 
-    The gas that a cavity may hold besides stops it earlier, at its full pressure where a new injection stalls.
+    Gas that a cavity holds besides stops it earlier, at its full pressure where a new injection stalls.
     """
     total, law, gas = 2 * scene.disc.initial_fill, model.flow, scene.gas.pressure
     if isinstance(law, CalibratedLaw):

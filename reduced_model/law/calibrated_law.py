@@ -336,7 +336,10 @@ class CalibratedLaw:
         return np.asarray(priming_pressure(path, ends)) / self.gas_factor
 
     def holds(self, fill_ratio: float) -> bool | None:
-        """Whether a chamber of that fill keeps it against a lower one with the gas off; as `TubePath.holds`."""
+        """Whether a chamber of that fill keeps it against a lower one with the gas off.
+
+        None: as `TubePath.holds`.
+        """
         return self.path.holds(max(float(self.hydrostatic_pressure(fill_ratio)), 0.0))
 
     def table(self) -> Mapping[str, FloatArray]:

@@ -27,8 +27,8 @@ from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.reduced_model.tube.flow import Waves
 from ringbalance.results.result import PresentedResult
 from ringbalance.results.rows import Parts, Quantity, around
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.designs import Designs, alike, changes_of
+from ringbalance.scene.arrays import FloatArray, plain
+from ringbalance.scene.designs import Designs, changes_of
 from ringbalance.scene.errors import (
     MOMENT,
     VOLUME,
@@ -174,18 +174,17 @@ class _Changes:
         """
         asked = [(place, side) for place in places for side in (-1, 1)]
         z = np.array([self._most_probable(place, side) for place, side in asked])
-        base, scenes = with_places(self.scene, self.errors), []
-        for row in z:
-            scene = base
-            for error, each in zip(self.errors, row.tolist(), strict=True):
-                scene = error.moved(scene, error.deviation_of_normal(each))
-            scenes.append(scene)
-        waves = z[:, [each.name for each in self.errors].index(WAVES)]
-        values = np.empty((len(ANSWERED), len(scenes)))
+        waves = [each.name for each in self.errors].index(WAVES)
+        values, base = np.empty((len(ANSWERED), len(z))), with_places(self.scene, self.errors)
         # Chambers of a mesh move with the scene, so that each scene has its own.
-        for rows in alike(scenes):
-            designs = Designs.stacked([scenes[row] for row in rows])
-            values[:, rows] = _quantities(designs, waves=replace(self.waves, deviation=waves[rows]))
+        at_once = np.arange(len(z)) if base.disc.geometry is None else None
+        for rows in [at_once] if at_once is not None else range(len(z)):
+            scene = base
+            for error, deviates in zip(self.errors, z[rows].T, strict=True):
+                scene = error.moved(scene, error.deviation_of_normal(plain(deviates)))
+            designs = Designs(scene=scene, size=np.size(rows))
+            moved = replace(self.waves, deviation=np.atleast_1d(z[rows, waves]))
+            values[:, rows] = np.reshape(_quantities(designs, waves=moved), values[:, rows].shape)
         found, alone = [], both_sides(self.alone)
         for row, (place, side) in enumerate(asked):
             moved = side * (values[place, row] - self.values[place])

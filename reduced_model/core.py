@@ -12,8 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.tube.draw_down import port_depth
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -77,7 +76,7 @@ class Answers:
     largest_fill_ratio: FloatArray
     """That the opposite chamber reaches then."""
     residual_depth: FloatArray
-    """Of the liquid over the port as gas enters it, m."""
+    """Of the liquid over the port as gas enters it, m; zero where none does before the chamber is empty."""
     usable_volume: FloatArray
     """That a pair can move from one chamber to the other, m^3."""
     usable_moment: FloatArray
@@ -142,7 +141,7 @@ class Answers:
         else:
             moment = moments(fills)
         usable, volume = moment[1] - moment[0], chamber_volume(disc=scene.disc) * np.ones(designs.size)
-        gas = _draining_flow(tube, residual, top - residual)
+        depth = scene.tube.port_radius - surface_radius(disc=scene.disc, fill_ratio=residual)
         rate = scene.rotor.influence_coefficient * ratio[0] * rho * scene.tube.area * running
         crest, nothing = tube.path.crest, np.full(designs.size, np.nan)
         separated = np.where(flow.separated, Regime.SEPARATED, Regime.SIPHON)
@@ -168,7 +167,7 @@ class Answers:
             stalled_fill_ratio=stalled,
             least_fill_ratio=least,
             largest_fill_ratio=top - least,
-            residual_depth=port_depth(scene, flow_rate=gas),
+            residual_depth=np.where(residual > 0, depth, 0.0),
             usable_volume=(top - 2 * least) * volume,
             usable_moment=usable,
             reach=usable / np.tan(np.pi / np.asarray(scene.disc.chambers)),
@@ -191,22 +190,15 @@ def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tup
     return np.where(flows, at_end, np.nan), full - cavity_pressure(path, ends)
 
 
-def _draining_flow(
-    tube: TubeFlow, fills: FloatArray, opposite: FloatArray, *, exactly: bool = True
-) -> FloatArray:
-    """Flow rate of a running tube at the fills of both chambers, m^3/s."""
-    own, other = tube.level(np.array([fills, opposite]))
-    flow = tube.flow(tube.ends(own, other), primed=True, exactly=exactly)
-    return np.asarray(tube.designs.scene.tube.area * flow.velocity)
-
-
 def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     """Fill at which gas enters the port."""
 
     def drawn(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
         part = tube.take(rows)
-        rate = _draining_flow(part, fills, top[rows] - fills, exactly=exactly)
-        return drawn_fill(part.designs.scene, flow_rate=rate)
+        scene = part.designs.scene
+        own, other = part.level(np.array([fills, top[rows] - fills]))
+        flow = part.flow(part.ends(own, other), primed=True, exactly=exactly)
+        return drawn_fill(scene, flow_rate=scene.tube.area * flow.velocity)
 
     return first_gas(tube.designs.scene, drawn, top=top, about=partial(drawn, exactly=False))
 

@@ -166,11 +166,11 @@ class Uncertainty:
             return NORMAL_95 * (2.0 * np.asarray(quantile) - 1.0)
         return ndtri(quantile)
 
-    def deviation_of_normal(self, deviate: float) -> float:
+    def deviation_of_normal(self, deviate: Any) -> Any:
         """Its standard deviations where a standard normal variable has a value as likely to be exceeded."""
-        return float(self.deviation(ndtr(deviate))) if self.distribution == "uniform" else deviate
+        return self.deviation(ndtr(deviate)) if self.distribution == "uniform" else deviate
 
-    def moved(self, scene: Scene, deviation: float) -> Scene:
+    def moved(self, scene: Scene, deviation: Any) -> Scene:
         """The scene with it larger by standard deviations, as far as a device can have it."""
         return moved(scene, {name: deviation * each for name, each in self.change.items()})
 

@@ -214,7 +214,8 @@ class TubeFlow:
     def level(self, fill_ratio: FloatArray) -> FloatArray:
         """Hydrostatic pressure of a chamber's liquid at the outer radius, Pa, with the error of `waves`."""
         if self.curve is not None:
-            return self.curve(fill_ratio)
+            # Rounding of an empty chamber's would leave a port on the wall open.
+            return np.maximum(self.curve(fill_ratio), 0.0)
         level = chamber_pressure(scene=self.designs.scene, fill_ratio=fill_ratio)
         return level if self.waves is None else level * self.waves.factor(fill_ratio)
 

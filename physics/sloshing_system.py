@@ -91,7 +91,7 @@ class SloshingSystem:
         return np.asarray(ratios[squares.size :], dtype=np.float64)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=512)
 def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]) -> SloshingSystem:
     """Assemble and condense the problem in the chamber of a disc, on one mesh.
 
@@ -165,10 +165,40 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
 
 
 class _Near(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
-    """In a film rounding exceeds the 1e-12 where scikit-fem's Newton method ends; it is quadratic."""
+    """In a film rounding exceeds the 1e-12 where scikit-fem's Newton method ends; it is quadratic.
+
+    Shape functions are evaluated once for all components, and points of a facet are looked for once.
+    """
+
+    def __init__(self, mesh: Any, element: Any, of_facets: Any) -> None:
+        super().__init__(mesh, element, of_facets)
+        self._shapes: tuple[Any, list[tuple[Any, Any]]] = (None, [])
+        self._inverse: tuple[Any, Any, Any] = (None, None, None)
 
     def invF(self, x: Any, tind: Any = None, **_: Any) -> Any:  # noqa: N802
-        return super().invF(x, tind, newton_tol=1e-6)
+        if self._inverse[0] is not x or not np.array_equal(self._inverse[1], tind):
+            self._inverse = (x, tind, super().invF(x, tind, newton_tol=1e-6))
+        return self._inverse[2]
+
+    def Fmap(self, i: int, X: Any, tind: Any = None) -> Any:  # noqa: N802, N803
+        return self._summed(i, tind, [value for value, _ in self._shapes_at(X)])
+
+    def _J(self, i: int, j: int, X: Any, tind: Any = None) -> Any:  # noqa: N802, N803
+        return self._summed(i, tind, [slope[j] for _, slope in self._shapes_at(X)])
+
+    def _shapes_at(self, points: Any) -> list[tuple[Any, Any]]:
+        if self._shapes[0] is not points:
+            count = self.mesh.dofs.element_dofs.shape[0]
+            self._shapes = (points, [self.elem.lbasis(points, each) for each in range(count)])
+        return self._shapes[1]
+
+    def _summed(self, i: int, tind: Any, shapes: list[Any]) -> Any:
+        nodes = self.mesh.dofs.element_dofs
+        nodes = nodes if tind is None else nodes[:, tind]
+        total = np.zeros((nodes.shape[1], shapes[0].shape[-1]))
+        for row, shape in zip(nodes, shapes, strict=True):
+            total += self.mesh.doflocs[i, row][:, None] * shape
+        return total
 
 
 def _near(mesh: Any) -> tuple[Any, Any]:

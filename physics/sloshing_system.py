@@ -180,10 +180,10 @@ class _Near(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no ty
             self._inverse = (x, tind, super().invF(x, tind, newton_tol=1e-6))
         return self._inverse[2]
 
-    def Fmap(self, i: int, X: Any, tind: Any = None) -> Any:  # noqa: N802, N803
+    def Fmap(self, i: int, X: Any, tind: Any = None) -> Any:  # noqa: N802
         return self._summed(i, tind, [value for value, _ in self._shapes_at(X)])
 
-    def _J(self, i: int, j: int, X: Any, tind: Any = None) -> Any:  # noqa: N802, N803
+    def _J(self, i: int, j: int, X: Any, tind: Any = None) -> Any:  # noqa: N802
         return self._summed(i, tind, [slope[j] for _, slope in self._shapes_at(X)])
 
     def _shapes_at(self, points: Any) -> list[tuple[Any, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -41,7 +42,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         laminar tube, correlations beyond; see the parts.
     """
     scene = liquid_ring_scene(scene)
-    chamber, law = chamber_and_law(scene)
+    chamber, law = known_chamber_and_law(scene)
     heads = law.heads
     return Calibration(
         presentation=Presentation(document=calibration_document, rows=calibration_rows),
@@ -85,7 +86,7 @@ def calibrated_model(scene: Scene, *, checked: bool = True, varied: bool = True)
         `varied`: whether the law knows what the scene's uncertain inputs do to it, half of what remains.
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return BalancerModel.of(chamber_and_law(scene, checked=checked, varied=varied)[1])
+    return BalancerModel.of(known_chamber_and_law(scene, checked=checked, varied=varied)[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
@@ -109,3 +110,7 @@ def chamber_and_law(
     chamber = calibrate_chamber(scene, checked=checked, varied=varied)
     heads = TubeHeads.of(scene) if varied else TubeHeads.bare(scene)
     return chamber, calibrated_law(scene=scene, chamber=chamber, heads=heads, varied=varied)
+
+
+known_chamber_and_law = lru_cache(maxsize=16)(chamber_and_law)
+"""`chamber_and_law`, made once in a process."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.calibration import calibrate, chamber_and_law
+from ringbalance.reduced_model.calibration import calibrate, known_chamber_and_law
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -87,12 +87,7 @@ def flow_law_of(scene: Scene) -> CalibratedLaw:
         rotor=dataclasses.replace(scene.rotor, **rotor),
         run=dataclasses.replace(scene.run, seed=0, time_limit=1.0),
     )
-    return _flow_law(still)
-
-
-@lru_cache(maxsize=64)
-def _flow_law(scene: Scene) -> CalibratedLaw:
-    return chamber_and_law(scene)[1]
+    return known_chamber_and_law(still)[1]
 
 
 def runs_with(

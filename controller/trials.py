@@ -44,6 +44,8 @@ class Trials:
     """At a point, by path, SI, rounded as a scene file has them; None: there is none."""
     stated: bool = True
     """Whether the scene states settings of its own that can be judged."""
+    kept: bool = True
+    """Whether another kind that is merely faster is not taken in its place: the scene gives this one."""
     along: Axis | None = None
     """What is chosen only where the others do not suffice, or on request, and is answered for at every level,
     such as the supply's pressure; a point without it is at the scene's."""

@@ -38,7 +38,7 @@ _FEW: Final = 3
 _BEHIND: Final = 0.2
 """Level of the paired test by which a setting is worse than the best and does not run in the next heat."""
 _MORE: Final = 2 / DEVICES
-"""Fraction of the devices by which another kind of controller must be better than the scene's."""
+"""Fraction of the devices that another kind of controller serves beyond the scene's to be better."""
 _ENOUGH: Final = 0.9
 """Fraction of the devices from which on the best settings need not be looked for more widely."""
 _AS_FAST: Final = 1.3
@@ -127,8 +127,14 @@ class Tried:
         return float(np.sort(self.judgement.outcomes.settling_time)[max(count, 1) - 1])
 
     def replaces(self, scenes: Tried) -> bool:
-        """Whether it is taken in place of the best of the scene's kind of controller."""
-        return self.fraction - scenes.fraction >= _MORE
+        """Whether it is taken in place of the best of the scene's kind of controller.
+
+        It serves `_MORE` more of the devices, or no fewer, `_AS_FAST` times as fast, beside a kind that the
+        scene does not give.
+        """
+        more, most = self.fraction - scenes.fraction, math.ceil(_SETTLED * scenes.count)
+        faster = _AS_FAST * self.time(most) < scenes.time(most)
+        return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kept)
 
 
 _Ran = dict[object, Tried | None]

@@ -90,11 +90,13 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
             pressure = point.get(PRESSURE, scene.gas.pressure)
             return _settings(scene, kind, point, loop(pressure), limit=limit)
 
-        return Trials(kind=kind, axes=_OWN[kind], settings=settings, stated=stated, along=_pressures(scene))
+        return Trials(
+            kind=kind, axes=_OWN[kind], settings=settings, stated=stated, kept=kept, along=_pressures(scene)
+        )
 
     gain = scene.origin_of("controller.proportional")
     stated = gain != "default" or scene.controller.kind != "target_vector"
-    kind = scene.controller.kind
+    kind, kept = scene.controller.kind, scene.origin_of("controller.kind") == "given"
     return tuple(of(each) for each in (kind, *_INSTEAD[kind]))
 
 

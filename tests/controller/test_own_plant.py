@@ -79,11 +79,10 @@ def both(scene: Scene, count: int, *, offset: float = 0.0) -> tuple[Share, Share
     return Share.of(outcomes(scene, count, offset=offset).settled), own(scene, count, offset=offset)
 
 
-# (scene, values, offset in s, draws), and between which bounds the fraction is to lie.  At an
-# offset of 15 ms the fractions do not agree: of 64 the program serves 58, the own plant 64 (at 12 ms 44 and
-# 38).  A device that was traced rests just above the limit: noise takes every other sample below it, which
-# sets the integral back, and 19 ms of gas move no liquid.  Of six chambers at their own gain a further plant
-# with other correlations settles 957 to 979 of 1,000.
+# (scene, values, offset in s, draws), and between which bounds the fraction is to lie.  Six chambers with a
+# valve settle at an offset of 15 ms in 295 of 320 in the program and 300 in the own plant, of the first 64 in
+# 58 and 64.  Of six chambers at their own gain a further plant with other correlations settles 957 to 979 of
+# 1,000.
 LIGHT: Final = {
     "paper's disc at 0.42 MPa": (PAPER, {"gas.pressure": "0.42 MPa"}, 0.0, 32, 0.0, 0.02),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 128, 0.80, 0.88),
@@ -96,6 +95,7 @@ HEAVY: Final = {
     "six chambers at their own gain": (SIX, {}, 0.0, 512, 0.95, 0.98),
     "six chambers with an offset": (SIX, {}, 2e-3, 256, 0.97, 1.0),
     "six chambers with a valve": (SIX, VALVE, 17e-3, 128, 0.0, 1.0),
+    "six chambers with a valve, 15 ms": (SIX, VALVE, 15e-3, 320, 0.0, 1.0),
     "narrow tube with a valve": (CALIBRATED, VALVE, 30e-3, 128, 0.0, 1.0),
     "paper's disc with a valve": (PAPER, VALVE, 20e-3, 128, 0.0, 1.0),
 }
@@ -194,7 +194,8 @@ def test_twice_the_draws_move_no_verdict(pressure: str, verdict: str) -> None:
 )
 def test_recommended_settings_hold_in_the_own_plant(name: str, lowest: float, highest: float) -> None:
     """Both plants meet the fraction asked for, and settle from every direction as the scene says."""
-    scene = bundled(name)
+    # The own plant has this kind alone; a scene that gives it keeps it.
+    scene = bundled(name, {"controller.kind": "target_vector"})
     best = tuned(balancer_of(scene)).recommended
     assert best.verdict == MET
     scene = with_values_at(scene, best.settings)

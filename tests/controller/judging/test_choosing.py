@@ -176,7 +176,14 @@ def test_what_is_chosen_is_judged_on_devices_that_chose_nothing(paper_scene: Sce
 
 @dataclass(frozen=True, eq=False)
 class TwoKinds(Machine):
-    """A second kind of controller serves twice as many devices, and as many of the first 32."""
+    """A second kind of controller serves as many of the first 32 devices, and all others that the first does
+    not serve, too."""
+
+    alike: bool = False
+    """Whether both serve the same devices."""
+    faster: float = 1.0
+    """Times as fast as the first is the second."""
+    kept: bool = False
 
     def trials(self) -> tuple[Trials, ...]:
         (toy,) = super().trials()
@@ -184,12 +191,15 @@ class TwoKinds(Machine):
         def settings(point: Mapping[str, float]) -> Mapping[str, Any]:
             return {**(toy.settings(point) or {}), "controller.kind": "second"}
 
-        return toy, Trials(kind="second", axes=toy.axes, settings=settings, along=toy.along)
+        second = Trials(kind="second", axes=toy.axes, settings=settings, along=toy.along)
+        return replace(toy, kept=self.kept), second
 
     def _outcomes(self, settings: Mapping[str, Any], draws: Draws) -> Outcomes:
         outcomes, numbers = super()._outcomes(settings, draws), np.array(draws.numbers)
-        served = (numbers < 32) | (numbers % 2 == 0) | (settings.get("controller.kind") == "second")
-        return replace(outcomes, settling_time=np.where(served, outcomes.settling_time, math.inf))
+        second = settings.get("controller.kind") == "second"
+        served = (numbers < 32) | (numbers % 2 == 0) | second | self.alike
+        time = np.where(served, outcomes.settling_time, math.inf)
+        return replace(outcomes, settling_time=time / (self.faster if second else 1.0))
 
 
 def test_kinds_of_controller_that_few_devices_do_not_tell_apart_run_on_more(paper_scene: Scene) -> None:
@@ -198,6 +208,28 @@ def test_kinds_of_controller_that_few_devices_do_not_tell_apart_run_on_more(pape
     serving = [each.judgement for each in curve if each.judgement.fraction.count]
     assert len(serving) >= 6
     assert all(each.settings["controller.kind"] == "second" for each in serving)
+
+
+@pytest.mark.parametrize(
+    ("faster", "kept", "kind"),
+    [(1.0, False, "toy"), (1.25, False, "toy"), (1.35, False, "second"), (3.0, True, "toy")],
+)
+def test_of_kinds_that_serve_as_many_the_faster_is_taken_unless_the_scene_gives_one(
+    paper_scene: Scene, faster: float, kept: bool, kind: str
+) -> None:
+    machine = cast("Any", TwoKinds(at(paper_scene, 0.56), alike=True, faster=faster, kept=kept))
+    best, _ = search(machine, machine.trials(), progress=lambda _: None)
+    assert best.candidate.trials.kind == kind
+    assert tuned(machine).recommended.settings.get("controller.kind", "toy") == kind
+
+
+def test_only_a_kind_that_a_scene_gives_is_kept_beside_a_faster_one() -> None:
+    """The paper states the algorithm; the grinding spindle assumes it."""
+    given, assumed = (
+        balancer_of(rb.load_scene(rb.bundled_scene(name))).trials()[0]
+        for name in ("liquid_ring_paper", "grinding_spindle")
+    )
+    assert (given.kind, given.kept) == (assumed.kind, not assumed.kept) == ("target_vector", True)
 
 
 def test_a_remedy_names_the_pressure_that_goes_with_it(paper_scene: Scene) -> None:

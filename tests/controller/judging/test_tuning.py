@@ -142,6 +142,8 @@ def test_the_command_saves_a_scene_that_is_met(tmp_path: Path, capsys: pytest.Ca
     assert main(words) == 0
     document: dict[str, Any] = json.loads(capsys.readouterr().out)
     scene = liquid_ring_scene(rb.load_scene(target))
-    assert scene.controller.proportional == pytest.approx(document["settings"]["controller.proportional"])
+    settings = document["settings"]
+    assert scene.controller.kind == settings["controller.kind"] == "law_based"
+    assert scene.controller.offsets(6) == pytest.approx(6 * settings["controller.gas_time_offset"])
     assert judged(balancer_of(scene), {}).verdict == MET
     assert math.isfinite(document["settling_time_s"]["p90"])

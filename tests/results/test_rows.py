@@ -50,7 +50,7 @@ def printed(width: int = 80) -> str:
 def test_a_quantity_and_a_finding_have_the_documented_keys() -> None:
     document = json.loads(json.dumps(Answer().to_dict(), allow_nan=False))
     (quantity,), (finding,) = document["quantities"], document["findings"]
-    keys = ["key", "name", "symbol", "unit", "value", "lower", "upper", "parts", "origin", "status"]
+    keys = ["key", "name", "symbol", "unit", "value", "lower", "upper", "parts", "causes", "origin", "status"]
     assert sorted(quantity) == sorted(keys)
     assert quantity["parts"] == {"numerical": 10.0, "input": 7.4e3, "model": 0.0}
     assert sorted(finding) == ["change", "code", "severity", "text", "values"]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.errors import Uncertainty, with_places
 from ringbalance.scene.models import Scene
+
+_NUMBERS = (float, np.ndarray)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,22 +75,31 @@ class Designs:
         return {table: keys for table, keys in tables.items() if keys}
 
 
+@cache
+def _fields(kind: type[Any]) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
+    """Names of a record's fields, none where it is no record, and what gives all their values."""
+    names = tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
+    return names, attrgetter(*names) if len(names) > 1 else lambda record: tuple(vars(record).values())
+
+
 def _stacked(values: Sequence[Any], each: int) -> Any:
     first = values[0]
     if all(value is first for value in values) and (each == 1 or not _varies(first)):
         return first
-    if isinstance(first, ChamberGeometry):
-        return first
-    if is_dataclass(first):
-        names = [f.name for f in fields(first)]
-        parts = {name: _stacked([getattr(value, name) for value in values], each) for name in names}
-        return replace(first, **parts)  # type: ignore[type-var]
-    if isinstance(first, tuple):
-        return tuple(_stacked(parts, each) for parts in zip(*values, strict=True))
-    if isinstance(first, float | np.ndarray):
+    if isinstance(first, _NUMBERS):
         if all(isinstance(value, float) and value == first for value in values):
             return first
+        if each == 1 and all(isinstance(value, float) for value in values):
+            return np.array(values)
         return np.concatenate([np.broadcast_to(value, each) for value in values])
+    if isinstance(first, ChamberGeometry):
+        return first
+    names, values_of = _fields(first.__class__)
+    if names:
+        parts = zip(names, zip(*map(values_of, values), strict=True), strict=True)
+        return replace(first, **{name: _stacked(part, each) for name, part in parts})
+    if isinstance(first, tuple):
+        return tuple(_stacked(parts, each) for parts in zip(*values, strict=True))
     return first
 
 
@@ -114,12 +126,13 @@ def _taken(value: Any, rows: IntArray) -> Any:
 
 def _alike(first: Any, second: Any) -> bool:
     """Whether two records differ in numbers alone."""
-    if first is second or all(isinstance(value, float | np.ndarray) for value in (first, second)):
+    if first is second or (isinstance(first, _NUMBERS) and isinstance(second, _NUMBERS)):
         return True
     if type(first) is not type(second):
         return False
-    if is_dataclass(first) and not isinstance(first, ChamberGeometry):
-        return all(_alike(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
+    names, values_of = _fields(first.__class__)
+    if names and not isinstance(first, ChamberGeometry):
+        return all(map(_alike, values_of(first), values_of(second)))
     if isinstance(first, tuple):
         return len(first) == len(second) and all(map(_alike, first, second))
     return bool(np.all(first == second))

@@ -289,7 +289,7 @@ class Calibration(PresentedResult):
                 for key, name, unit, value in rest
             ),
         ]
-        return MappingProxyType({each.key: each for each in found})
+        return {each.key: each for each in found}
 
     @cached_property
     def regime(self) -> Regime:

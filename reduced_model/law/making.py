@@ -139,7 +139,7 @@ def _nominal(
 ) -> Iterator[CalibratedLaw]:
     """Of scenes that are alike."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
-    heads = TubeHeads.nominal(designs, drawn=waves is not None)
+    heads = TubeHeads.nominal(designs)
     pressures, moments = _chambers(designs, scenes, fills, gravity=gravity)
     if waves is not None:
         share = unmodelled_fractions(scenes[0], fills)["heads"] / NORMAL_95

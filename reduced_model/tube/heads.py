@@ -75,18 +75,15 @@ class TubeHeads:
     """Largest relative error of a head found between knots; zero where none was looked for."""
 
     @classmethod
-    def nominal(cls, designs: Designs, *, drawn: bool = False) -> tuple[TubeHeads, ...]:
+    def nominal(cls, designs: Designs) -> tuple[TubeHeads, ...]:
         """The heads of every design without uncertainties and on few knots.
 
-        These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values.
-        Args: `drawn`: whether errors of models are drawn, so that a head that falls is levelled.
-        Raises: ValueError: as `TubeHeads.of`. SceneError: a head that falls with the velocity.
+        These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values. Drawn
+        errors of models, and those that a fit tries, may make a head fall: it is then level.
+        Raises: ValueError: as `TubeHeads.of`. SceneError: a head that falls without such errors.
         """
         log_u = _places(_NOMINAL_KNOTS)
-        lost = [
-            _Lost.of(log_u[:, None], value)
-            for value in _sampled(designs.scene, log_u, falls=np.inf if drawn else _LEVELLED)
-        ]
+        lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u, falls=np.inf)]
         exact, tables = _Widths(*([np.zeros((log_u.size, 1))] * 4)), []
         # One column where nothing that a head depends on differs between designs.
         shape = log_u.size, designs.size

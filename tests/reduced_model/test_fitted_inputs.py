@@ -15,6 +15,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.making import nominal_law
+from ringbalance.reduced_model.tube.heads import velocities_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import Fitted, FittedQuantity, ModelError
@@ -133,6 +134,17 @@ def test_errors_of_ordinary_size_leave_a_head_that_grows_through_the_transition(
     """Those that the bundled injections leave: a width that stepped at Re = 2000 made the head step down."""
     scene = paper_scene.with_values({"tube.model_errors": TRANSITION})
     assert 0 < calibrate(scene).answers.velocity < math.inf
+
+
+def test_a_head_that_falls_with_what_a_fit_tries_is_level(paper_scene: Scene) -> None:
+    """The ends of the errors that it tries, of rotation in a wide tube at high speed, halve a head."""
+    causes = "rotation model", "rotation as built"
+    errors = [{"cause": each, "even": -2.5, "odd": -2.5} for each in causes]
+    wide = {"tube.model_errors": errors, "tube.bore": 4e-3, "rotor.speed": 1620.0}
+    scene = paper_scene.with_values(wide)
+    assert np.all(np.diff(velocities_of(nominal_law(scene, gravity=False).heads.siphon)) > 0)
+    with pytest.raises(SceneError, match="does not grow"):
+        calibrate(scene)
 
 
 @pytest.mark.parametrize("size", [-100.0, 100.0])

@@ -58,10 +58,6 @@ _REAL: Final = (
     "rest_limit",  # algorithm: amplitude at which it is content, m
     "minimum_gas_time",  # s
     "maximum_gas_time",  # s
-    "first_trial",  # trial: s
-    "long_step",  # s
-    "short_step",  # s
-    "fine_below",  # m
     "probe",  # law-based: valve-open time where the law says that nothing flows, s
     "least_fill",  # to which a pair is driven
     "assumed_amplitude_noise",  # standard deviation, m
@@ -77,15 +73,13 @@ _WHOLE: Final = (
     "rises_tolerated",
     "idle_tolerated",
     "most_samples",
-    "trials",  # trial: chambers in the sequence
 )
 LOOP: Final = np.dtype(
     [(name, np.float64) for name in _REAL]
     + [(name, np.int64) for name in _WHOLE]
     + [
         ("influence", np.complex128),  # that is assumed, m/(kg m)
-        ("target", np.float64, (DIRECTIONS + 3 * MAX_CHAMBERS,)),  # of `target_steps`
-        ("sequence", np.int64, (MAX_CHAMBERS,)),
+        ("settings", np.float64, (DIRECTIONS + 3 * MAX_CHAMBERS,)),  # of `target_steps` or `trial_steps`
         ("offset", np.float64, (MAX_CHAMBERS,)),  # that the algorithm adds to a valve's share, s
         ("axis", np.complex128, (PAIRS,)),  # directions of the pairs
     ]
@@ -126,8 +120,6 @@ _RUN_WHOLE: Final = (
     "usable",
     "resting",  # whether the algorithm is content
     "reason",
-    "position",  # trial: index into the sequence
-    "tried",  # whether a chamber has been tried
     "floods",  # whether liquid runs through an empty tube with the gas off
     "cut",  # whether the time limit has shortened a valve-open time or a wait
     "operated",  # whether a valve has opened since the last sample with an amplitude
@@ -169,7 +161,8 @@ RUN: Final = np.dtype(
 
 `start`: vibration with level chambers, m; `gain`: vibration per balancing moment, m/(kg m).
 `at_residual`: of every chamber, whether a sensor of the caller's says that it has no more liquid to give;
-`refused`: whether gas has entered its port in the last command. `memory`: of `target_steps` or `law_steps`.
+`refused`: whether gas has entered its port in the last command. `memory`: of `target_steps`, `trial_steps` or
+`law_steps`.
 """
 INJECTION: Final = np.dtype(
     [

@@ -15,8 +15,8 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from ringbalance.controller.algorithms import law_steps, target_steps, valve_steps
-from ringbalance.controller.algorithms.built_in import TargetVector
+from ringbalance.controller.algorithms import law_steps, target_steps, trial_steps, valve_steps
+from ringbalance.controller.algorithms.built_in import TargetVector, Trial
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.loop_records import LOOP, RUN
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
@@ -251,32 +251,32 @@ def _parts(value: complex) -> tuple[float, float]:
 def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
     """The control algorithm with the scene's settings. Args: `law`: calibrated, for the law-based one.
 
-    Raises: SceneError: another algorithm, or as `disc_block` for the law-based one.
+    Raises: SceneError: as `disc_block`, for the law-based one.
     """
-    if scene.controller.kind == "law_based" and law is not None:
-        return _law_based_block(scene, law)
-    if scene.controller.kind != "target_vector":
-        problem = f"the controller {scene.controller.kind!r} runs in this program alone and is not exported"
-        allowed = 'controller.kind = "target_vector" or "law_based"'
-        raise SceneError.of_file(scene.file, problem, allowed)
     chambers = scene.disc.chambers
+    if scene.controller.kind == "law_based":
+        if law is None:
+            raise ValueError("the law-based controller needs the calibrated law")
+        return _law_based_block(scene, law)
+    tries = scene.controller.kind == "trial"
+    steps: ModuleType = trial_steps if tries else target_steps
 
     def place(offset: str, chamber: int | None) -> int:
         if chamber is None:
-            return int(getattr(target_steps, offset))
+            return int(getattr(steps, offset))
         return (
-            target_steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chamber + int(getattr(valve_steps, offset))
+            int(steps.FIRST_CHAMBER) + valve_steps.PER_CHAMBER * chamber + int(getattr(valve_steps, offset))
         )
 
     return Block(
         kind="controller",
-        title="Target-vector controller of a liquid-ring balancer",
+        title=f"{'Trial' if tries else 'Target-vector'} controller of a liquid-ring balancer",
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
-        constants=TargetVector(scene=scene).constants,
+        constants=(Trial if tries else TargetVector)(scene=scene).constants,
         tables=None,
-        start=(0.0,) * (target_steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chambers),
-        modules=(point, valve_steps, target_steps),
+        start=(0.0,) * (steps.FIRST_CHAMBER + valve_steps.PER_CHAMBER * chambers),
+        modules=(point, valve_steps, steps),
         steps="step",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),

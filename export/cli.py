@@ -47,8 +47,7 @@ def export(
         to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
             text), python (a module that imports nothing of others), or csv (a grid).
         block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
-            and the rotor's vibration), or controller (the target-vector or the law-based one, with the
-            scene's settings).
+            and the rotor's vibration), or controller (the scene's algorithm with its settings).
         out: folder for the files.
         name: of files and functions; default that of the scene.
         points: of each axis of the grid of csv, 2 to 1001; default 41.

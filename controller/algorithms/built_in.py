@@ -19,6 +19,8 @@ from ringbalance.controller.algorithms.target_steps import (
     VIBRATION_Y,
     sample,
 )
+from ringbalance.controller.algorithms.trial_steps import FIRST_CHAMBER as FIRST_TRIED
+from ringbalance.controller.algorithms.trial_steps import sample as try_one
 from ringbalance.controller.algorithms.valve_steps import AT_RESIDUAL, OPEN_TIME, PER_CHAMBER
 from ringbalance.controller.loop_records import (
     NO_PHASE,
@@ -126,7 +128,7 @@ class TargetVector(BuiltIn):
         """As `BuiltIn.fill`."""
         super().fill(loop, run)
         constants = self.constants
-        loop["algorithm"], loop["target"][: len(constants)] = TARGET_VECTOR, constants
+        loop["algorithm"], loop["settings"][: len(constants)] = TARGET_VECTOR, constants
         run["proportional"], run["before_time"] = self.scene.controller.proportional, math.inf
 
     @property
@@ -155,7 +157,7 @@ class TargetVector(BuiltIn):
 @in_place
 def target_vector_step(loop: Record, run: Record) -> None:
     """One step of `TargetVector` on a usable sample."""
-    c, w = loop.target, run.memory
+    c, w = loop.settings, run.memory
     c[GAIN] = run.proportional
     w[VIBRATION_X] = run.seen_amplitude * math.cos(run.seen_phase)
     w[VIBRATION_Y] = run.seen_amplitude * math.sin(run.seen_phase)
@@ -165,11 +167,17 @@ def target_vector_step(loop: Record, run: Record) -> None:
         w[at + OPEN_TIME], w[at + AT_RESIDUAL] = 0.0, float(run.at_residual[chamber])
     sample(c, w)
     run.resting, run.before_time = int(w[RESTING]), run.time if w[HAS_BEFORE] != 0.0 else math.inf
+    _open_valves(loop, run, FIRST_CHAMBER)
+
+
+@in_place
+def _open_valves(loop: Record, run: Record, first: int) -> None:
+    """Command what the memory says of each chamber, from the place `first` on."""
     for chamber in range(loop.chambers):
-        if w[FIRST_CHAMBER + PER_CHAMBER * chamber + OPEN_TIME] > 0.0:
-            pair = chamber % (loop.chambers // 2)
-            run.asked[pair] = w[FIRST_CHAMBER + PER_CHAMBER * chamber + OPEN_TIME]
-            run.side[pair] = chamber // (loop.chambers // 2)
+        opened = run.memory[first + PER_CHAMBER * chamber + OPEN_TIME]
+        if opened > 0.0:
+            run.asked[chamber % (loop.chambers // 2)] = opened
+            run.side[chamber % (loop.chambers // 2)] = chamber // (loop.chambers // 2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -193,25 +201,35 @@ class Trial(BuiltIn):
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
         super().fill(loop, run)
+        constants = self.constants
+        loop["algorithm"], loop["settings"][: len(constants)] = TRIAL, constants
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """What `trial_steps` finds in its constants."""
         settings, letters = self.scene.controller, chamber_letters(self.scene.disc.chambers)
-        sequence = [letters.index(letter) for letter in settings.sequence]
-        loop["algorithm"], loop["trials"], loop["sequence"][: len(sequence)] = TRIAL, len(sequence), sequence
-        for name in ("first_trial", "long_step", "short_step", "fine_below"):
-            loop[name] = getattr(settings, name)
+        return (
+            float(len(letters)),
+            settings.limit,
+            settings.minimum_gas_time,
+            settings.maximum_gas_time,
+            settings.period,
+            settings.first_trial,
+            settings.long_step,
+            settings.short_step,
+            settings.fine_below,
+            float(len(settings.sequence)),
+            *(float(letters.index(letter)) for letter in settings.sequence),
+        )
 
 
 @in_place
 def trial_step(loop: Record, run: Record) -> None:
-    """One step of `Trial` on a usable sample."""
-    amplitude = run.seen_amplitude
-    if amplitude <= loop.rest_limit:
-        run.resting, run.tried = 1, 0
-        return
-    fell = run.tried > 0 and amplitude < run.before_amplitude
-    if run.tried > 0 and not fell:
-        run.position = (run.position + 1) % loop.trials
-    step = loop.long_step if fell else loop.first_trial
-    if amplitude < loop.fine_below:
-        step = loop.short_step if fell else min(step, loop.short_step)
-    run.tried, run.before_amplitude = 1, amplitude
-    open_valve(loop, run, loop.sequence[run.position], step, 0.0)
+    """One step of `Trial` on a sample with an amplitude."""
+    c, w = loop.settings, run.memory
+    w[VIBRATION_X], w[VIBRATION_Y] = run.seen_amplitude, 0.0
+    for chamber in range(loop.chambers):
+        w[FIRST_TRIED + PER_CHAMBER * chamber + OPEN_TIME] = 0.0
+    try_one(c, w)
+    run.resting = int(w[RESTING])
+    _open_valves(loop, run, FIRST_TRIED)

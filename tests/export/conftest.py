@@ -60,6 +60,7 @@ def all_blocks(name: str, both: Both) -> dict[str, Block]:
         "law": law_block(compact),
         "disc": disc_block(scene, law),
         "controller": controller_block(scene),
+        "trial": controller_block(scene.with_values({"controller.kind": "trial"})),
         "law_based": controller_block(other, law),
     }
 

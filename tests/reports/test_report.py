@@ -162,7 +162,7 @@ def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Recor
 
     def lacking(sample: Any, real: Any, place: str) -> list[str]:
         if isinstance(sample, dict) and not place.endswith(
-            ("terms", "versions", "verification", "fill_ratio", "inputs")
+            ("terms", "versions", "verification", "fill_ratio", "causes")
         ):
             missing = [f"{place}/{key}" for key in sample if key not in real]
             return missing + [

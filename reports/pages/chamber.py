@@ -236,4 +236,5 @@ def _swing(found: Record) -> Drawing:
 DISC: Final = Section(name="disc", title="The disc and its liquid")
 PRESSURE: Final = Section(name="pressure", title="Pressure of the liquid", show=_pressure)
 MOMENT: Final = Section(name="moment", title="Balancing moment and λ", show=_moment)
-WAVES: Final = Section(name="sloshing", title="Waves on the ring", collect=_collect, apart=True, show=_view)
+# Not apart: the case on waves, which this process comes to as well, looks at the same fills.
+WAVES: Final = Section(name="sloshing", title="Waves on the ring", collect=_collect, show=_view)

@@ -28,17 +28,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from fluids.fittings import (
-    bend_rounded,
-    bend_rounded_methods,
-    entrance_distance,
-    entrance_distance_methods,
-    entrance_rounded,
-    entrance_rounded_methods,
-    entrance_sharp,
-    entrance_sharp_methods,
-    exit_normal,
-)
+from fluids import fittings
 from fluids.friction import friction_factor, friction_factor_methods
 
 from ringbalance.physics.tube.local_losses import straight_length
@@ -109,7 +99,7 @@ def by_fluids(tube: Tube, reynolds: float, *, without: frozenset[str] = frozense
         friction = {"laminar": straight_length(tube=tube) / tube.bore * friction_factor(reynolds, rough)}
     bends = {
         name: float(sum(_bend(tube, bend, reynolds, name) for bend in tube.bends))
-        for name in bend_rounded_methods
+        for name in fittings.bend_rounded_methods
         if all(_bend_holds(tube, bend, reynolds, name) for bend in tube.bends)
     }
     # The "+1" of k + 1 is the exit of turbulent flow.
@@ -117,14 +107,14 @@ def by_fluids(tube: Tube, reynolds: float, *, without: frozenset[str] = frozense
         "friction": friction,
         "bends": bends,
         "entrance": _entrances(tube),
-        "exit": {"normal": exit_normal() - 1},
+        "exit": {"normal": fittings.exit_normal() - 1},
         "extra": {"scene": tube.extra_loss},
     }
 
 
 def _bend(tube: Tube, bend: Bend, reynolds: float, method: str) -> float:
     angle = math.degrees(bend.angle)
-    k: float = bend_rounded(
+    k: float = fittings.bend_rounded(
         Di=tube.bore, angle=angle, rc=bend.radius, Re=reynolds, roughness=tube.roughness, method=method
     )
     return k
@@ -141,17 +131,20 @@ def _bend_holds(tube: Tube, bend: Bend, reynolds: float, method: str) -> bool:
 def _entrances(tube: Tube) -> dict[str, float]:
     bore = tube.bore
     if tube.entrance == "sharp":
-        return {name: entrance_sharp(method=name) for name in entrance_sharp_methods}
+        return {name: fittings.entrance_sharp(method=name) for name in fittings.entrance_sharp_methods}
     if tube.entrance == "rounded":
         radius = tube.entrance_radius
-        return {name: entrance_rounded(bore, radius, method=name) for name in entrance_rounded_methods}
+        return {
+            name: fittings.entrance_rounded(bore, radius, method=name)
+            for name in fittings.entrance_rounded_methods
+        }
     thick = {
-        f"{name}, edge {edge:g} d": entrance_distance(bore, edge * bore, method=name)
-        for name in entrance_distance_methods
+        f"{name}, edge {edge:g} d": fittings.entrance_distance(bore, edge * bore, method=name)
+        for name in fittings.entrance_distance_methods
         for edge in _EDGES
         if name != "Crane"
     }
-    return {**thick, "Crane, any edge": entrance_distance(bore, method="Crane")}
+    return {**thick, "Crane, any edge": fittings.entrance_distance(bore, method="Crane")}
 
 
 def _departs(tube: Tube, reynolds: FloatArray) -> dict[str, float]:
@@ -337,7 +330,7 @@ def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> Table
             rows.append(("friction", name, MISSING, why))
         elif name not in stated and name != "laminar":
             rows.append(("friction", name, MISSING, "left out: beyond its stated Re or roughness"))
-    for name in bend_rounded_methods:
+    for name in fittings.bend_rounded_methods:
         if name not in parts["bends"]:
             steel = "left out: friction of steel pipes from 15 mm on, for all bores"
             why = "left out: beyond the angles, radii or Re of its source" if name in _BENDS else steel

@@ -17,7 +17,6 @@ from ringbalance.mesh.section import middle_section
 from ringbalance.physics.sloshing import (
     SloshingResponse,
     default_sloshing_cells,
-    resonant_fills,
     sloshing_modes,
     sloshing_response,
 )
@@ -34,9 +33,6 @@ from ringbalance.verification.reference.chambers import CosineWaves, disc_chambe
 
 _MODES: Final = 4
 _FILLS: Final = (0.1, 0.25, 0.5)
-_POINTS: Final = {"light": 13, "heavy": 49}
-_COARSE: Final = ((8, 24), (4, 12), (2, 6))
-"""Meshes of the figures: three digits."""
 _IMPORTED_FILL: Final = 0.4
 _IMPORTED_MODES: Final = 3
 _CELLS: Final = {"light": (8, 24, 2), "heavy": (16, 48, 4)}
@@ -45,7 +41,7 @@ _LEVELS: Final = {"light": (3, 5, 9), "heavy": (5, 9, 17)}
 
 
 def sloshing(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Natural frequencies of the ring against exact waves and sums of cosines, and the fills to avoid."""
+    """Natural frequencies of the ring, and its swing, against exact waves and sums of cosines."""
     bare = replace(scene.disc, plate_thickness=0.0)
     factor = 1.01 if defect == "coriolis_off_by_a_percent" else 1.0
     swing = _swing(bare, _FILLS)
@@ -53,55 +49,12 @@ def sloshing(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         swing = replace(swing, pressure_amplification=swing.amplification)
     still = _ring_frequencies(bare, 0.0) / _without_coriolis(bare, _depths(bare, _FILLS), _MODES)
     turning = _ring_frequencies(bare, factor) / _exact_frequencies(bare)
-    return replace(
-        _overview(scene, _POINTS[level]),
+    return Evidence(
         found=as_found(
             still=np.abs(still - 1).max(),
             frequencies=np.abs(turning - 1).max(),
             **_swing_errors(bare, _FILLS, swing, backwards=defect == "forcing_backwards"),
-        ),
-    )
-
-
-@lru_cache(maxsize=2)
-def _overview(scene: Scene, points: int) -> Evidence:
-    """What is shown of the scene's own disc; nothing of it is judged, so no mutation changes it."""
-    disc, fills = scene.disc, np.linspace(0.02, 1.0, points) * scene.disc.max_fill_ratio
-    ratios = sloshing_modes(disc=disc, fill_ratio=fills, modes=_MODES, cells=_COARSE).frequency_ratio.value
-    running, equal = (
-        sloshing_response(
-            disc=disc,
-            fill_ratio=at,
-            angular_velocity=scene.rotor.speed,
-            kinematic_viscosity=scene.liquid.kinematic_viscosity,
-            gravity=scene.environment.gravity,
-            cells=_COARSE,
         )
-        for at in (fills, np.array([disc.initial_fill]))
-    )
-    swings, x = running.amplification.value, ("fill ratio", "1", fills)
-    frequencies = figure(
-        "natural frequencies over the speed",
-        x,
-        *(Curve(f"mode {n + 1}", "1", np.array(column)) for n, column in enumerate(ratios.T)),
-        Curve("gravity, once a turn", "1", np.ones_like(fills), style="reference"),
-    )
-    swinging = figure(
-        "swing of the moment over that of a surface that follows gravity at once",
-        x,
-        Curve("with inertia and Coriolis force", "1", swings),
-        Curve("quasi-static", "1", np.ones_like(fills), style="reference"),
-    )
-    return Evidence(
-        found={},
-        numbers={
-            "first": ratios[-1, 0],
-            "third": dict(resonant_fills(disc=disc, modes=_MODES)).get(3, 0.0),
-            "double": np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2]),
-            "equal": equal.amplification.value[0],
-            "equal_pressure": equal.pressure_amplification.value[0],
-        },
-        series=(frequencies, swinging),
     )
 
 

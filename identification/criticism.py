@@ -28,8 +28,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
-from scipy.special import chdtri, ndtri
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri, ndtri
 
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
@@ -142,7 +141,7 @@ def _sizes(fit: _LinearFit) -> Iterator[_ResidualTest]:
             square, freedom = float(np.sum(fit.residuals[rows] ** 2)), fit.freedom(rows)
             times = math.sqrt(square / freedom)
             text = text_of("residuals_too_large", block=block, times=times)
-            yield _ResidualTest(test="size", block=block, p_value=float(chi2.sf(square, freedom)), text=text)
+            yield _ResidualTest(test="size", block=block, p_value=float(chdtrc(freedom, square)), text=text)
 
 
 def _runs(fit: _LinearFit) -> Iterator[_ResidualTest]:

@@ -3,31 +3,34 @@
 The law is the calibrated one without finite elements and uncertainties; injections run through the closed
 loop's own equations of motion, with the liquid's mass and its way up to the crest always, and the gas line
 and the lag of the valve where the scene gives them.  Which models serve the scene is decided once, so that a
-prediction is smooth in values.
+prediction is smooth in values.  Laws of scenes that are to be compared are made together: most of the work
+is the same for one and for many.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X, empty_plants
 from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.limits import hold_liquid
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.law.making import nominal_law
+from ringbalance.reduced_model.law.making import Rings, nominal_law, nominal_laws
 from ringbalance.reduced_model.residual_liquid import Holding
-from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
+from ringbalance.reduced_model.terms import FILLING, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, alike
 from ringbalance.scene.fitted import START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
@@ -38,8 +41,16 @@ thousandth of it, below what counts as dependent."""
 _SETTLED: Final = 10.0
 """s after a valve has closed: the gas has vented and the liquid rests, or has run back."""
 _KEPT: Final = 128
+"""Devices whose laws and predictions are kept."""
 _LEAST_LEFT: Final = 0.1
 """Of a valve-open time, when the start of the flow is supposed late."""
+
+
+class _Kept(dict[Any, Any]):
+    """Values that are made again where they are lacking: a copy and a file have none."""
+
+    def __reduce__(self) -> tuple[type[_Kept], tuple[()]]:
+        return _Kept, ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +63,10 @@ class Models:
     """Of the scene that is fitted, gauge, Pa: by what another one's differs the gauge of the data is off."""
     other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
     """Makes another law of the scene's, to be compared with it."""
+    devices: dict[Scene, Device] = field(default_factory=_Kept, init=False, repr=False, compare=False)
+    """The last `_KEPT` that were asked for."""
+    rings: Rings = field(default_factory=_Kept, init=False, repr=False, compare=False)
+    """Values of chambers under gravity, which few of the fitted quantities change."""
 
     @classmethod
     def of(cls, scene: Scene) -> Models:
@@ -61,6 +76,15 @@ class Models:
             velocity=_primed_velocity(law, scene),
             gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
         )
+
+    def expect(self, scenes: Sequence[Scene]) -> None:
+        """Make the laws of these scenes together, once any of them is asked for."""
+        devices = {id(device): device for device in (Device.of(scene, self) for scene in scenes)}
+        lacking = [device for device in devices.values() if "law" not in vars(device)]
+        for places in alike([device.scene for device in lacking]):
+            together = [lacking[place] for place in places]
+            for device in together:
+                device.together[:] = together
 
     def with_gauge_correction(self, scene: Scene) -> Scene:
         """A fitted scene that says by how much the gauge of the data is off."""
@@ -88,6 +112,8 @@ class Device:
 
     scene: Scene
     models: Models
+    together: list[Device] = field(default_factory=list)
+    """Devices whose laws are made with this one's."""
 
     @cached_property
     def law(self) -> CalibratedLaw:
@@ -96,22 +122,34 @@ class Device:
         Which flows carry the gas out of the crest is decided by the scene that is fitted: what a faster one
         would tell of k by that rests on a Froude number that is not known so well.
         """
-        law = nominal_law(self.scene, gravity=self.scene.environment.gravity > 0)
-        velocity = _primed_velocity(law, self.scene)
-        if velocity > 0 and self.models.velocity > 0:
-            froude = law.path.froude_velocity * velocity / self.models.velocity
-            law = replace(law, path=replace(law.path, froude_velocity=froude))
-        return law if self.models.other is None else self.models.other(law)
+        devices = [each for each in self.together if "law" not in vars(each)] or [self]
+        scenes = [each.scene for each in devices]
+        gravity = self.scene.environment.gravity > 0
+        laws = nominal_laws(scenes, gravity=gravity, rings=self.models.rings)
+        for device, law in zip(devices, laws, strict=True):
+            velocity = _primed_velocity(law, device.scene)
+            if velocity > 0 and self.models.velocity > 0:
+                froude = law.path.froude_velocity * velocity / self.models.velocity
+                law = law.cleared_at(froude)
+            vars(device)["law"] = law if self.models.other is None else self.models.other(law)
+        own: CalibratedLaw = vars(self)["law"]
+        return own
 
     @cached_property
     def _plant(self) -> npt.NDArray[np.void]:
-        gas = self.scene.gas
+        devices = [each for each in self.together if "_plant" not in vars(each)] or [self]
+        plants, gas = empty_plants(len(devices)), self.scene.gas
         line = gas.conductance is not None and gas.critical_ratio is not None
-        terms = [INERTIA, HELD, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
-        dynamics = dynamics_of(
-            scene=self.scene, model=BalancerModel.of(self.law), modelled=terms, checked=True
-        )
-        return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
+        terms = [INERTIA, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
+        for i, each in enumerate(devices):
+            model, total = BalancerModel.of(each.law), 2 * each.scene.disc.initial_fill
+            dynamics = dynamics_of(scene=each.scene, model=model, modelled=terms, checked=True)
+            dynamics.fill(plants[i : i + 1], total=total, relative_error=RELATIVE_ERROR)
+        hold_liquid(plants, Designs.stacked([each.scene for each in devices]))
+        for i, each in enumerate(devices):
+            vars(each)["_plant"] = plants[i : i + 1]
+        plant: npt.NDArray[np.void] = vars(self)["_plant"]
+        return plant
 
     @cached_property
     def _delay(self) -> float:
@@ -159,9 +197,9 @@ class Device:
             scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
         )
         disc = replace(scene.disc, lambda_factor=None)
-        return _device(replace(scene, rotor=rotor, disc=disc), models)
-
-
-@lru_cache(maxsize=_KEPT)
-def _device(scene: Scene, models: Models) -> Device:
-    return Device(scene=scene, models=models)
+        built, kept = replace(scene, rotor=rotor, disc=disc), models.devices
+        device = kept.pop(built, None) or Device(scene=built, models=models)
+        kept[built] = device
+        if len(kept) > _KEPT:
+            del kept[next(iter(kept))]
+        return device

@@ -35,6 +35,8 @@ STEP: Final = 1e-3
 """In t, of central differences; their error is STEP^2/6 times a third derivative of order one."""
 _RANK: Final = 1e-10
 """Smallest singular value that counts, relative to the largest."""
+_SHORTEST: Final = 1e-2
+"""Of `STEP`, below which there is no difference to that side."""
 _JUMP: Final = 0.1
 """Part of the differences on both sides by which they may differ: beyond it there is a jump between them."""
 
@@ -129,35 +131,39 @@ class Problem:
             self._known[key] = self.predicted(self.scene_at(t))
         return self._known[key]
 
+    def at_each(self, points: Sequence[FloatArray]) -> list[FloatArray]:
+        """L^-1 f at several t, whose laws are made together."""
+        lacking = [t for t in points if t.tobytes() not in self._known]
+        if self.models is not None:
+            self.models.expect([self.scene_at(t) for t in lacking])
+        return [self.at(t) for t in points]
+
     def slopes(self, t: FloatArray) -> FloatArray:
         """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters).
 
         Where a prediction jumps, as when liquid just reaches the crest, the smaller of both one-sided
         differences: a jump over the step is no slope.
         """
-        low, high = self.bounds
-        here, columns = self.at(t), []
-        for i in range(t.size):
-            below, above = max(float(t[i]) - STEP, float(low[i])), min(float(t[i]) + STEP, float(high[i]))
-            down, up = (self._difference(t, here, i, end) for end in (below, above))
-            part = (t[i] - below) / (above - below)
-            apart = np.abs(up - down) > _JUMP * (np.abs(up) + np.abs(down))
-            smaller = np.where(np.abs(up) < np.abs(down), up, down)
-            columns.append(np.where(apart & (0 < part < 1), smaller, part * down + (1 - part) * up))
-        return np.stack(columns, axis=1)
+        ends = [np.clip(t + step, *self.bounds) for step in (-STEP, STEP)]
+        # Next to a bound a difference would be round-off over next to nothing.
+        below, above = (np.where(np.abs(end - t) < _SHORTEST * STEP, t, end) for end in ends)
+        down, up = np.split(self._differences(t, np.concatenate([below, above])), 2, axis=1)
+        part = (t - below) / (above - below)
+        apart = np.abs(up - down) > _JUMP * (np.abs(up) + np.abs(down))
+        smaller = np.where(np.abs(up) < np.abs(down), up, down)
+        return np.where(apart & (part > 0) & (part < 1), smaller, part * down + (1 - part) * up)
 
     def quick_slopes(self, t: FloatArray) -> FloatArray:
         """The same by differences to one side, for a search."""
-        ends = np.where(t + STEP < self.bounds[1], t + STEP, t - STEP)
-        here = self.at(t)
-        return np.stack([self._difference(t, here, i, float(end)) for i, end in enumerate(ends)], axis=1)
+        return self._differences(t, np.where(t + STEP < self.bounds[1], t + STEP, t - STEP))
 
-    def _difference(self, t: FloatArray, here: FloatArray, i: int, end: float) -> FloatArray:
-        """Of L^-1 f, over that of one t; zero where there is none."""
-        if end == t[i]:
-            return np.zeros_like(here)
-        there = self.at(np.where(np.arange(t.size) == i, end, t))
-        return (there - here) / (end - float(t[i]))
+    def _differences(self, t: FloatArray, ends: FloatArray) -> FloatArray:
+        """Of L^-1 f from t to ends of each parameter in turn, over those of t; zero where there is none."""
+        which = np.arange(ends.size) % t.size
+        points = [np.where(np.arange(t.size) == i, end, t) for i, end in zip(which, ends, strict=True)]
+        here, *there = self.at_each([t, *points])
+        step = ends - t[which]
+        return (np.stack(there, axis=1) - here[:, None]) / np.where(step == 0, 1.0, step)
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -220,14 +226,14 @@ class Problem:
         Args: `changes`: the problem's scene with each input one standard deviation lower, or as it is, and
             higher.
         """
-        columns = [np.zeros((self.measured.size, 0))]
-        for low, high in changes:
-            above = replace(self, scene=high).at(t)
-            if low == self.scene:
-                columns.append((above - self.at(t))[:, None])
-            else:
-                columns.append((above - replace(self, scene=low).at(t))[:, None] / 2)
-        return np.concatenate(columns, axis=1)
+        moved = [
+            self if side == self.scene else replace(self, scene=side) for change in changes for side in change
+        ]
+        if self.models is not None:
+            self.models.expect([each.scene_at(t) for each in moved])
+        predicted = np.array([each.at(t) for each in moved]).reshape(-1, 2, self.measured.size)
+        steps = [1 if low is self else 2 for low in moved[::2]]
+        return np.asarray((predicted[:, 1] - predicted[:, 0]).T / np.array(steps))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -24,9 +24,9 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.tube.regime import driving_pressure
-from ringbalance.scene.errors import MODEL_ERRORS, MODEL_KINDS
+from ringbalance.scene.errors import Uncertainty, model_uncertainties, with_places
 from ringbalance.scene.faults import did_you_mean
-from ringbalance.scene.fitted import CREST_ERROR
+from ringbalance.scene.fitted import CREST_ERROR, MODEL
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile, with_values_at
@@ -37,7 +37,6 @@ from ringbalance.scene.uncertain import (
     half_widths,
     nominal_value,
     shifted,
-    with_model_error,
     with_value,
 )
 
@@ -265,10 +264,10 @@ class _SceneInputs:
         """Models that predictions take; None where there is but one."""
         return None
 
-    @property
-    def errors(self) -> tuple[str, ...]:
-        """Names of the errors of its models, of `MODEL_ERRORS`."""
-        return ()
+    @cached_property
+    def errors(self) -> Mapping[str, Uncertainty]:
+        """Errors of the models of what was built, by name."""
+        return {}
 
     def named(self, name: str) -> Sequence[str]:
         """Its own names of what kinds of data inform, as the liquid ring names that."""
@@ -312,15 +311,19 @@ class _SceneInputs:
 
     def changed(self, name: str, change: float) -> SceneFile:
         """The scene with one uncertain quantity changed, SI, or a model's error, in deviations."""
-        if name in MODEL_ERRORS:
-            return with_model_error(liquid_ring_scene(self.scene), name, change)
+        if name in self.errors:
+            return self.errors[name].moved(liquid_ring_scene(self.scene), change)
         return self._moved(name, change)
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
         """The scene with one of these lower and higher by a change, as far as a device can have it."""
+        error = self.errors.get(name)
         # Errors of models are nearly linear, and there are many, but a crest's arc has two different ends.
-        one = name in MODEL_ERRORS and MODEL_ERRORS[name] != CREST_ERROR
-        return self.scene if one else self.changed(name, -change), self.changed(name, change)
+        if error is None or error.group == f"{MODEL}{CREST_ERROR}":
+            return self.changed(name, -change), self.changed(name, change)
+        # All have the places of all, so that they differ in numbers alone.
+        scene = with_places(liquid_ring_scene(self.scene), self.errors.values())
+        return self.scene, error.moved(scene, change)
 
     def _moved(self, name: str, change: float) -> SceneFile:
         """The scene with one uncertain quantity changed, SI, as far as a device can have it."""
@@ -345,10 +348,9 @@ class _LiquidRing(_SceneInputs):
     def models(self) -> Models:
         return Models.of(self.scene)
 
-    @property
-    def errors(self) -> tuple[str, ...]:
-        """Those of the scene's models, and of what was built."""
-        return tuple(name for name, cause in MODEL_ERRORS.items() if MODEL_KINDS[cause].applies(self.scene))
+    @cached_property
+    def errors(self) -> Mapping[str, Uncertainty]:
+        return {each.name: each for each in model_uncertainties(self.scene, built=True)}
 
     def named(self, name: str) -> Sequence[str]:
         """A prescribed k stands in for the loss that it leaves out."""

@@ -245,8 +245,11 @@ def directions(
     )
 
 
-def model_uncertainties(scene: Scene) -> tuple[Uncertainty, ...]:
-    """Errors of the models of a design, but for those that were fitted together with inputs."""
+def model_uncertainties(scene: Scene, *, built: bool = False) -> tuple[Uncertainty, ...]:
+    """Errors of the models of a design, but for those that were fitted together with inputs.
+
+    Args: `built`: all errors instead that data of a device which was built are fitted with.
+    """
     fitted = fitted_causes(scene)
     return tuple(
         Uncertainty(
@@ -258,7 +261,7 @@ def model_uncertainties(scene: Scene) -> tuple[Uncertainty, ...]:
             change={name: 1.0},
         )
         for cause, kind in MODEL_KINDS.items()
-        if not kind.by_fit and kind.applies(scene) and cause not in fitted
+        if kind.applies(scene) and (built or not (kind.by_fit or cause in fitted))
         for name in kind.names(cause)
     )
 

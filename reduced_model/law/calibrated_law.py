@@ -161,6 +161,16 @@ class CalibratedLaw:
         velocities = self.path.froude_velocity * np.array([(low + high) / 2, low, high])
         return self.density * roots_of(table, velocities) ** 8 if self.path.froude_velocity else velocities
 
+    def cleared_at(self, froude_velocity: float) -> CalibratedLaw:
+        """The law with another velocity of the path that carries gas out of the crest, m/s."""
+        law = replace(self, path=replace(self.path, froude_velocity=froude_velocity))
+        numbers, pieces = (each.copy() for each in self.constants)
+        for way, table in enumerate(self.heads.tables):
+            pieces[way, [point.HALF, point.NONE, point.ALL]] = law.carrying_pressures(table)
+        numbers[[point.CARRY, point.CARRY_FROM]] = _carried_by(law.path)
+        vars(law)["constants"] = numbers, pieces
+        return law
+
     def scalars(self) -> dict[int, float]:
         """What is no table, at the places of `point`."""
         path, inputs, heads = self.path, self.inputs, self.heads
@@ -194,10 +204,10 @@ class CalibratedLaw:
         }
 
     @cached_property
-    def _lists(self) -> tuple[list[float], list[float], list[list[float]]]:
+    def _lists(self) -> tuple[list[float], FloatArray, Any]:
         """Numbers, cells and pieces."""
         numbers, pieces = self.constants
-        return numbers[: point.PLACES].tolist(), numbers[point.PLACES :].tolist(), pieces.tolist()
+        return numbers[: point.PLACES].tolist(), numbers[point.PLACES :], _Rows(pieces)
 
     def evaluate(
         self,
@@ -396,6 +406,18 @@ class CalibratedLaw:
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
+
+
+class _Rows(dict[int, list[float]]):
+    """Rows of an array as lists, each made when it is first looked at: few queries look at few."""
+
+    def __init__(self, pieces: FloatArray) -> None:
+        super().__init__()
+        self.pieces = pieces
+
+    def __missing__(self, row: int) -> list[float]:
+        self[row] = self.pieces[row].tolist()
+        return self[row]
 
 
 def _carried_by(path: TubePath) -> tuple[float, float]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, MutableMapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -119,28 +119,38 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
     return nominal_laws([scene], gravity=gravity)[0]
 
 
+Rings: TypeAlias = MutableMapping[Hashable, RingValues]
+"""Values of chambers under gravity, by all that they depend on."""
+
+
 def nominal_laws(
-    scenes: Sequence[Scene], *, gravity: bool, waves: Sequence[float] | None = None
+    scenes: Sequence[Scene],
+    *,
+    gravity: bool,
+    waves: Sequence[float] | None = None,
+    rings: Rings | None = None,
 ) -> tuple[CalibratedLaw, ...]:
     """The same of many scenes; those that differ in numbers alone, and not in their fills, at once.
 
-    Args: `waves`: error of each one's levels by what no model holds, in standard deviations.
+    Args: `waves`: error of each one's levels by what no model holds, in standard deviations. `rings`: of
+        laws made before, to which those that are lacking are added.
     """
+    rings = {} if rings is None else rings
     laws: dict[int, CalibratedLaw] = {}
     for places in alike(scenes):
         some = [scenes[place] for place in places]
         moved = None if waves is None else [waves[place] for place in places]
-        laws |= zip(places, _nominal(some, gravity=gravity, waves=moved), strict=True)
+        laws |= zip(places, _nominal(some, rings, gravity=gravity, waves=moved), strict=True)
     return tuple(laws[place] for place in range(len(scenes)))
 
 
 def _nominal(
-    scenes: Sequence[Scene], *, gravity: bool, waves: Sequence[float] | None
+    scenes: Sequence[Scene], kept: Rings, *, gravity: bool, waves: Sequence[float] | None
 ) -> Iterator[CalibratedLaw]:
     """Of scenes that are alike."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
     heads = TubeHeads.nominal(designs)
-    pressures, moments = _chambers(designs, scenes, fills, gravity=gravity)
+    pressures, moments = _chambers(designs, scenes, fills, kept, gravity=gravity)
     if waves is not None:
         share = unmodelled_fractions(scenes[0], fills)["heads"] / NORMAL_95
         pressures = [level * (1 + each * share) for level, each in zip(pressures, waves, strict=True)]
@@ -157,11 +167,16 @@ def _nominal(
 
 
 def _chambers(
-    designs: Designs, scenes: Sequence[Scene], fills: FloatArray, *, gravity: bool
+    designs: Designs, scenes: Sequence[Scene], fills: FloatArray, kept: Rings, *, gravity: bool
 ) -> tuple[list[FloatArray], FloatArray]:
     """Hydrostatic pressures, Pa, shape (fills,) each, and moments, kg m, shape (fills, designs)."""
     if gravity:
-        rings = [RingValues.of(scene, fill_ratio=fills, gravity=True) for scene in scenes]
+        rings = []
+        for scene in scenes:
+            key = scene.disc, scene.liquid.density, scene.rotor.speed, scene.environment
+            if key not in kept:
+                kept[key] = RingValues.of(scene, fill_ratio=fills, gravity=True)
+            rings.append(kept[key])
         moments = np.stack([ring.moment.value for ring in rings], axis=1)
         return [ring.hydrostatic_pressure.value for ring in rings], moments
     scene, shape = designs.scene, (fills.size, designs.size)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import least_squares
 from scipy.stats import t as student_t
-from synthetic_rigs import covered, fitted, measured, observations, rig
+from synthetic_rigs import READINGS, covered, fitted, measured, observations, rig
 
 from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit, problem_of
@@ -339,3 +339,18 @@ def test_few_rigs_are_covered() -> None:
 def test_a_thousand_rigs_are_covered() -> None:
     found = [holds for number in range(1000) for holds in covered(rig(number)).values()]
     assert 0.93 <= np.mean(found) <= 0.99
+
+
+def test_slopes_next_to_a_bound_are_those_at_it(paper_scene: Scene) -> None:
+    """A difference towards a bound that is next to nothing away is round-off: the noise that goes with a loss
+    of zero changed by 1 % with the last digit of a prediction."""
+    scene = with_value(scene=paper_scene, quantity="extra_loss", value=0.0)
+    count = 4
+    columns = {"gas_time": np.linspace(0.1, 0.3, count), "pressure": np.full(count, scene.gas.pressure)}
+    data = observations("injection", columns | dict.fromkeys(READINGS, np.ones(count)), ["A", "B", "C", "D"])
+    problem = problem_of(scene, [data], ["bore", "extra_loss"])
+    at_bound = problem.start
+    for away in (1e-15, 1e-14, 1e-9):
+        found = problem.slopes(at_bound + np.array([0.0, away]))
+        expected = problem.slopes(at_bound)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * float(np.max(np.abs(expected[:, 1]))))

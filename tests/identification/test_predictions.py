@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from ringbalance.identification.reading import KINDS
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
+from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.reduced_model.terms import HELD, INERTIA
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
@@ -98,6 +100,34 @@ def _misses_a_line(scene: Scene, models: Models) -> float:
     line = np.polynomial.Polynomial.fit
     left = [column / column.mean() - line(places, column / column.mean(), 1)(places) for column in sizes.T]
     return float(np.max(np.abs(left)))
+
+
+def test_laws_made_together_are_those_made_alone_with_one_chamber_for_all(
+    paper_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The chamber under gravity was worked out for every law, a third of a fit's time."""
+    counted: list[float] = []
+    of = RingValues.of
+
+    def counting(scene: Scene, **values: Any) -> RingValues:
+        counted.append(scene.rotor.speed)
+        return of(scene, **values)
+
+    columns = {"gas_time": [0.2, 0.1], "pressure": [paper_scene.gas.pressure] * 2}
+    data = observations("injection", columns | {name: [0.0] * 2 for name in READINGS}, ["A", "D"])
+    tubes = [
+        with_value(scene=paper_scene, quantity=name, value=value)
+        for name, value in (("bore", 1.49e-3), ("bore", 1.52e-3), ("extra_loss", 0.3), ("length", 0.125))
+    ]
+    scenes = [*tubes, with_value(scene=paper_scene, quantity="speed", value=1.001 * paper_scene.rotor.speed)]
+    monkeypatch.setattr(RingValues, "of", counting)
+    models = Models.of(paper_scene)
+    models.expect(scenes)
+    together = [KINDS["injection"].predict(each, data, models) for each in scenes]
+    assert len(counted) == 3, "of the scene, of the tubes, of the other speed"
+    for each, found in zip(scenes, together, strict=True):
+        alone = KINDS["injection"].predict(each, data, Models.of(paper_scene))
+        np.testing.assert_allclose(found, alone, rtol=1e-11)
 
 
 def test_a_stated_fill_begins_again(paper_scene: Scene) -> None:

@@ -31,8 +31,7 @@ import numpy as np
 from scipy.special import chdtrc, chdtri, ndtri
 
 from ringbalance.identification.fitting import FitResult
-from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block, Problem, basis_of
+from ringbalance.identification.likelihood import basis_of
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.other_laws import by_other_machines, by_other_tubes
 from ringbalance.identification.readings import ComparedColumn, Reading, compared_columns, other_readings
@@ -70,6 +69,10 @@ class _LinearFit:
     def beyond_parameters(self, rows: FloatArray) -> FloatArray:
         """What no change of the parameters can describe of changes of the predictions, shape (n, ...)."""
         return np.asarray(rows - self._basis @ (self._basis.T @ rows))
+
+    def turned(self, rows: FloatArray) -> FloatArray:
+        """Rows of all files, then of held inputs and priors, with those of vibrations along and across."""
+        return np.concatenate([self.turn @ rows[: len(self.turn)], rows[len(self.turn) :]])
 
     def freedom(self, chosen: BoolArray) -> float:
         """Degrees of freedom that some rows have left: their number less the parameters they determine."""
@@ -119,40 +122,30 @@ class _Criticism:
 
     @classmethod
     def of(cls, fit: _LinearFit) -> _Criticism:
-        """Test the residuals of a fit."""
-        tests = [*_sizes(fit), *_runs(fit)]
+        """Test the residuals of a fit, block by block."""
+        tests = []
+        for block in filter(None, dict.fromkeys(map(str, fit.block))):
+            rows = fit.block == block
+            count, freedom, residuals = int(np.count_nonzero(rows)), fit.freedom(rows), fit.residuals[rows]
+            if count < FEWEST or freedom <= 1:
+                continue
+            if np.all(fit.known_noise[rows]):
+                square = float(np.sum(residuals**2))
+                text = text_of("residuals_too_large", block=block, times=math.sqrt(square / freedom))
+                p_value = float(chdtrc(freedom, square))
+                tests.append(_ResidualTest(test="size", block=block, p_value=p_value, text=text))
+            signs = residuals > 0
+            plus = int(np.count_nonzero(signs))
+            if min(plus, count - plus) > 1:
+                runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
+                text = text_of("residuals_keep_sign", block=block, runs=runs, count=count)
+                p_value = _runs_probability(plus, count - plus, runs)
+                tests.append(_ResidualTest(test="runs", block=block, p_value=p_value, text=text))
         corrected = [
             replace(each, corrected=-math.expm1(len(tests) * math.log1p(-min(each.p_value, 1 - 1e-12))))
             for each in tests
         ]
         return cls(findings=tuple(sorted(corrected, key=lambda each: each.p_value)))
-
-
-def _blocks(fit: _LinearFit) -> Iterator[tuple[str, BoolArray]]:
-    for name in filter(None, dict.fromkeys(map(str, fit.block))):
-        rows = fit.block == name
-        if np.count_nonzero(rows) >= FEWEST and fit.freedom(rows) > 1:
-            yield name, rows
-
-
-def _sizes(fit: _LinearFit) -> Iterator[_ResidualTest]:
-    for block, rows in _blocks(fit):
-        if bool(np.all(fit.known_noise[rows])):
-            square, freedom = float(np.sum(fit.residuals[rows] ** 2)), fit.freedom(rows)
-            times = math.sqrt(square / freedom)
-            text = text_of("residuals_too_large", block=block, times=times)
-            yield _ResidualTest(test="size", block=block, p_value=float(chdtrc(freedom, square)), text=text)
-
-
-def _runs(fit: _LinearFit) -> Iterator[_ResidualTest]:
-    for block, rows in _blocks(fit):
-        signs = fit.residuals[rows] > 0
-        plus = int(np.count_nonzero(signs))
-        if min(plus, signs.size - plus) > 1:
-            runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
-            text = text_of("residuals_keep_sign", block=block, runs=runs, count=signs.size)
-            p_value = _runs_probability(plus, signs.size - plus, runs)
-            yield _ResidualTest(test="runs", block=block, p_value=p_value, text=text)
 
 
 def _runs_probability(plus: int, minus: int, runs: int) -> float:
@@ -254,35 +247,28 @@ class _Explained:
 def _shares_explained(best: Optimum) -> Iterator[_Explained]:
     """The share of each file whose rows leave one."""
     problem, residuals = best.residuals.problem, best.residuals
-    scale, parts, expected = residuals.scale, best.at, problem.at(problem.start)
+    scale, left_over, expected = residuals.scale, best.at, problem.at(problem.start)
     taken = residuals.leverage(best.slopes)
     for block, rows in problem.rows:
-        null = basis_of(scale[rows, None] * _null(block))
-        left = block.measured.size - null.shape[1]
-        freedom = block.measured.size - float(np.sum(taken[rows]))
+        count, size = len(block.observations), block.measured.size
+        # Without any effect: a mean of each part, and free unknowns.
+        mean = np.kron(np.eye(size // count), np.ones((count, 1)))
+        null_columns = block.whiten @ np.concatenate([mean, block.free], axis=1)
+        null = basis_of(scale[rows, None] * null_columns)
+        left = size - null.shape[1]
+        freedom = size - float(np.sum(taken[rows]))
         if left < 1 or freedom < 1:
             continue
+        scaled = [scale[rows] * values[rows] for values in (problem.measured, expected)]
         measured, effect = (
-            _square_off(null, scale[rows] * values[rows]) / left for values in (problem.measured, expected)
+            float(np.sum((values - null @ (null.T @ values)) ** 2)) / left for values in scaled
         )
-        noise = float(np.sum(parts[rows] ** 2)) / freedom
+        noise = float(np.sum(left_over[rows] ** 2)) / freedom
         if measured > 0:
             share = 1 - noise / measured
             seen = block.estimated and noise < _HIDDEN * effect
-            yield _Explained(
-                file=block.observations.file, share=share, fails=bool(seen and share < _LEAST_SHARE)
-            )
-
-
-def _null(block: Block) -> FloatArray:
-    """Whitened columns of what may be without any effect: a mean of each part, and free unknowns."""
-    count = len(block.observations)
-    mean = np.kron(np.eye(block.measured.size // count), np.ones((count, 1)))
-    return np.asarray(block.whiten @ np.concatenate([mean, block.free], axis=1))
-
-
-def _square_off(null: FloatArray, values: FloatArray) -> float:
-    return float(np.sum((values - null @ (null.T @ values)) ** 2))
+            fails = bool(seen and share < _LEAST_SHARE)
+            yield _Explained(file=block.observations.file, share=share, fails=fails)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -339,64 +325,50 @@ class Review:
     def of(cls, result: FitResult) -> Review:
         """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
         best = result.optimum
-        fit = _at_solution(best)
-        ranges = tuple(compared_columns(best.residuals.problem))
+        problem, fit = best.residuals.problem, _at_solution(best)
+        ranges, scene = tuple(compared_columns(problem)), problem.scene_at(best.t)
+        # Each yields nothing without data of the kinds that it is about.
+        others = (*by_other_tubes(problem, scene), *by_other_machines(problem, scene))
         return cls(
             criticism=_Criticism.of(fit),
-            laws=tuple(_comparisons(result, fit)),
+            laws=tuple(
+                _LawComparison.of(
+                    fit, other=name, residuals=fit.turned(best.residuals.at(best.t, predicted=predicted))
+                )
+                for name, predicted in others
+            ),
             explained=tuple(_shares_explained(best)),
             readings=other_readings(best, ranges, stated=result.stated),
             ranges=ranges,
         )
 
 
-def _comparisons(result: FitResult, fit: _LinearFit) -> Iterator[_LawComparison]:
-    best = result.optimum
-    problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
-    # Each yields nothing without data of the kinds that it is about.
-    for name, predicted in (*by_other_tubes(problem, scene), *by_other_machines(problem, scene)):
-        residuals = _turned(fit.turn, best.residuals.at(best.t, predicted=predicted))
-        yield _LawComparison.of(fit, other=name, residuals=residuals)
-
-
-def _turned(turn: FloatArray, rows: FloatArray) -> FloatArray:
-    """Rows of all files, then of held inputs and priors, with those of vibrations along and across."""
-    return np.concatenate([turn @ rows[: len(turn)], rows[len(turn) :]])
-
-
 def _at_solution(best: Optimum) -> _LinearFit:
-    """The fit linearised at its optimum; what is no parameter but was fitted too counts as one."""
+    """The fit linearised at its optimum; what is no parameter but was fitted too counts as one.
+
+    Real and imaginary parts of a vibration are turned into those along its predicted change and across.
+    """
     problem, residuals = best.residuals.problem, best.residuals
-    count, rows = problem.measured.size, best.at
-    turn = _rotation(problem, best.t)
-    more = np.zeros((rows.size - residuals.base.shape[0], residuals.base.shape[1]))
-    blocks = [_titles(block.observations, block.measured.size) for block in problem.blocks]
-    return _LinearFit(
-        residuals=_turned(turn, rows),
-        derivatives=_turned(turn, np.hstack([-best.slopes, np.concatenate([residuals.base, more])])),
-        block=np.concatenate([*blocks, np.full(rows.size - count, "")]),
-        known_noise=np.concatenate([problem.group < 0, np.zeros(rows.size - count, dtype=np.bool_)]),
+    predicted, turn, titles = problem.at(best.t), np.eye(problem.measured.size), []
+    for block, mine in problem.rows:
+        rows, title = len(block.observations), Path(block.observations.file).name
+        if block.measured.size == rows:
+            titles += [title] * rows
+            continue
+        for part in ("along the predicted change", "across the predicted change"):
+            titles += [f"{title} {part}"] * rows
+        along = block.observations.rows_of(predicted[mine])
+        angle = np.arctan2(along[:, 1], along[:, 0])
+        i = mine.start + np.arange(rows)
+        turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
+        turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
+    known = best.at.size - len(titles)
+    more = np.zeros((best.at.size - residuals.base.shape[0], residuals.base.shape[1]))
+    fit = _LinearFit(
+        residuals=best.at,
+        derivatives=np.hstack([-best.slopes, np.concatenate([residuals.base, more])]),
+        block=np.array([*titles, *[""] * known]),
+        known_noise=np.concatenate([problem.group < 0, np.zeros(known, dtype=np.bool_)]),
         turn=turn,
     )
-
-
-def _titles(observations: Observations, size: int) -> StringArray:
-    title = Path(observations.file).name
-    if size == len(observations):
-        return np.full(size, title)
-    parts = ("along the predicted change", "across the predicted change")
-    return np.repeat([f"{title} {part}" for part in parts], len(observations))
-
-
-def _rotation(problem: Problem, t: FloatArray) -> FloatArray:
-    """Rotates a vibration's real and imaginary part into those along its predicted change and across."""
-    predicted, turn = problem.at(t), np.eye(problem.measured.size)
-    for block, mine in problem.rows:
-        rows = len(block.observations)
-        if block.measured.size == 2 * rows:
-            along = block.observations.rows_of(predicted[mine])
-            angle = np.arctan2(along[:, 1], along[:, 0])
-            i = mine.start + np.arange(rows)
-            turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
-            turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
-    return turn
+    return replace(fit, residuals=fit.turned(fit.residuals), derivatives=fit.turned(fit.derivatives))

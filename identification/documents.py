@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import combinations
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.identification.criticism import Review, summaries
-from ringbalance.identification.fitting import FitResult, FittedParameter, Noise, exact_inputs
+from ringbalance.identification.fitting import FitResult, FittedParameter, exact_inputs
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block
 from ringbalance.identification.next_measurement import NextMeasurement
-from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.reading import KINDS
 from ringbalance.results.numbers import rounded
 from ringbalance.results.result import Rows, Table
@@ -39,7 +38,13 @@ def fit_document(
             | {"rows": len(each), "uncertainty_given": sorted(each.uncertainty)}
             for each in data
         ],
-        "parameters": [_parameter(each) for each in result.parameters],
+        "parameters": [
+            _chosen(
+                each, "name path value at_bound before before_interval before_source contradicts doubts text"
+            )
+            | {"interval": [finite(end) for end in each.interval], "verdict": each.verdict.value}
+            for each in result.parameters
+        ],
         "combinations": [asdict(each) for each in result.combinations],
         "correlations": {
             "names": [parameter.name for parameter in result.parameters],
@@ -57,7 +62,21 @@ def fit_document(
         "exact": exact_inputs(result),
         **_chosen(result, "loss starts evaluations log_likelihood"),
         **{name: dict(getattr(result, name)) for name in ("held", "pulls")},
-        "criticism": _criticism(told),
+        "criticism": {
+            **_chosen(told, "describes text"),
+            "findings": [
+                _chosen(each, "test p_value fails")
+                | {"residuals_of": each.block, "corrected_p_value": each.corrected}
+                for each in told.criticism.findings
+            ],
+            "laws": [
+                {"other_law": each.other} | _chosen(each, "separation preference text") for each in told.laws
+            ],
+            **{
+                name: [asdict(each) for each in getattr(told, name)]
+                for name in ("explained", "readings", "ranges")
+            },
+        },
         "next_measurement": _chosen(following, "parameter text")
         | {
             "candidates": [
@@ -72,34 +91,6 @@ def fit_document(
 def _chosen(record: Any, names: str) -> dict[str, Any]:
     """Fields and properties of a record that stand in the document under their own names."""
     return {name: getattr(record, name) for name in names.split()}
-
-
-def _criticism(told: Review) -> dict[str, Any]:
-    return {
-        **_chosen(told, "describes text"),
-        "findings": [
-            _chosen(each, "test p_value fails")
-            | {"residuals_of": each.block, "corrected_p_value": each.corrected}
-            for each in told.criticism.findings
-        ],
-        "laws": [
-            {"other_law": each.other} | _chosen(each, "separation preference text") for each in told.laws
-        ],
-        **{
-            name: [asdict(each) for each in getattr(told, name)]
-            for name in ("explained", "readings", "ranges")
-        },
-    }
-
-
-def _parameter(found: FittedParameter) -> dict[str, Any]:
-    return {
-        **_chosen(
-            found, "name path value at_bound before before_interval before_source contradicts doubts text"
-        ),
-        "interval": [finite(end) for end in found.interval],
-        "verdict": found.verdict.value,
-    }
 
 
 _STRONG: Final = 0.9
@@ -120,39 +111,40 @@ def fit_rows(
     """Parameters with their intervals, whether the fit holds, and what else the data say."""
     scene, count = result.optimum.residuals.problem.scene, sum(len(each) for each in data)
     held = [name for name in result.held if name not in MODEL_ERRORS]
+    causes = dict.fromkeys(MODEL_ERRORS[name] for name in result.held if name in MODEL_ERRORS)
     facts = {
         "not fitted, [uncertainty] in all intervals": ", ".join(held),
-        "errors of models, in all intervals": ", ".join(_causes(result.held)),
+        "errors of models, in all intervals": ", ".join(causes),
         "not fitted, taken as exact": ", ".join(exact_inputs(result)),
     }
     heads = ("quantity", "fitted", "from", "to", "unit", "before", "identified")
     rows = [(each.name, *_numbers(each), _WORDS[each.verdict]) for each in result.parameters]
+    quantities = [
+        Quantity(
+            key=each.path,
+            name=each.name,
+            unit=si_unit(each.path),
+            value=each.value,
+            lower=finite(each.interval[0]),
+            upper=finite(each.interval[1]),
+            origin="fitted",
+            status="ok" if each.verdict is Identified.IDENTIFIED else each.verdict.value.replace(" ", "_"),
+        )
+        for each in result.parameters
+    ]
     return Rows(
         title=f"{scene.name} ({scene.source}), fitted to {count} measurements",
-        quantities=tuple(_quantity(each) for each in result.parameters),
+        quantities=tuple(quantities),
         findings=(
             *_review(told),
-            *_findings(result),
+            *_of_parameters(result),
+            *_of_errors(result),
+            *result.pulled,
             Finding(code="next_measurement", values={"text": following.text}),
         ),
         facts=[(name, text) for name, text in facts.items() if text],
         tables=(Table(heads=heads, rows=rows, note="from, to: ends of the 95 % interval"),),
         listed=0,
-    )
-
-
-def _quantity(found: FittedParameter) -> Quantity:
-    low, high = (finite(end) for end in found.interval)
-    status = "ok" if found.verdict is Identified.IDENTIFIED else found.verdict.value.replace(" ", "_")
-    return Quantity(
-        key=found.path,
-        name=found.name,
-        unit=si_unit(found.path),
-        value=found.value,
-        lower=low,
-        upper=high,
-        origin="fitted",
-        status=status,
     )
 
 
@@ -178,80 +170,54 @@ def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
     return rounded(value, width), ends[0], ends[1], usual_unit(path), known
 
 
-def _findings(result: FitResult) -> Iterator[Finding]:
+def _of_parameters(result: FitResult) -> Iterator[Finding]:
+    """Verdicts on parameters, doubts of them, and products that are identified."""
     for each in result.parameters:
-        yield from _of_parameter(each)
-    for found in result.combinations:
-        numbers: dict[str, Value] = {"combination": found.text, "value": found.value}
-        yield Finding(
-            code="combination_identified", values=numbers | {"uncertainty": found.relative_uncertainty}
-        )
-    yield from (_noise_finding(each) for each in result.noise)
-    yield from _pairs(result)
-    yield from _far_rows(result)
-    yield from result.pulled
+        name: dict[str, Value] = {"name": each.name}
+        if each.verdict is not Identified.IDENTIFIED:
+            yield Finding(code="not_identified", values=name | {"text": each.text})
+        for end, bound, side in zip(each.interval, each.at_bound, ("lower", "upper"), strict=True):
+            # The data did not set this end.
+            if bound and math.isfinite(end):
+                yield Finding(code="interval_open", values=name | {"side": side})
+        yield from (Finding(code="parameter_doubted", values=name | {"text": text}) for text in each.doubts)
+    for product in result.combinations:
+        values: dict[str, Value] = {"combination": product.text, "value": product.value}
+        values["uncertainty"] = product.relative_uncertainty
+        yield Finding(code="combination_identified", values=values)
 
 
-def _of_parameter(found: FittedParameter) -> Iterator[Finding]:
-    name: dict[str, Value] = {"name": found.name}
-    if found.verdict is not Identified.IDENTIFIED:
-        yield Finding(code="not_identified", values=name | {"text": found.text})
-    for end, bound, side in zip(found.interval, found.at_bound, ("lower", "upper"), strict=True):
-        # The data did not set this end.
-        if bound and math.isfinite(end):
-            yield Finding(code="interval_open", values=name | {"side": side})
-    yield from (Finding(code="parameter_doubted", values=name | {"text": each}) for each in found.doubts)
-
-
-def _noise_finding(noise: Noise) -> Finding:
-    kind, name = noise.group.split(" ")
-    numbers: dict[str, Value] = {"kind": kind, "name": name}
-    if not noise.estimated or noise.standard_deviation is None:
-        return Finding(code="noise_stated", values=numbers)
-    column = KINDS[kind].column(name)
-    assert column is not None
-    size = column.written(noise.standard_deviation)
-    more: dict[str, Value] = {"size": size, "standard_deviation": noise.standard_deviation}
-    return Finding(
-        code="noise_estimated", values=numbers | more | {"freedom": round(noise.degrees_of_freedom or 0)}
-    )
-
-
-def _pairs(result: FitResult) -> Iterator[Finding]:
-    """Parameters whose errors go together."""
-    names = [each.name for each in result.parameters]
-    for i, first in enumerate(names):
-        for j in range(i + 1, len(names)):
-            correlation = float(result.correlations[i, j])
-            if abs(correlation) >= _STRONG:
-                numbers: dict[str, Value] = {"first": first, "second": names[j], "correlation": correlation}
-                yield Finding(code="errors_correlated", values=numbers)
-
-
-def _far_rows(result: FitResult) -> Iterator[Finding]:
-    """Rows that lie far off, and those that a robust loss counts less."""
-    for each in result.residuals:
-        far = each.lines[np.max(np.abs(each.normalised), axis=1) > _FAR]
+def _of_errors(result: FitResult) -> Iterator[Finding]:
+    """Noise, correlated errors, rows that lie far off, and those that a robust loss counts less."""
+    for noise in result.noise:
+        kind, column_name = noise.group.split(" ")
+        values: dict[str, Value] = {"kind": kind, "name": column_name}
+        if noise.standard_deviation is None:
+            yield Finding(code="noise_stated", values=values)
+            continue
+        column, size = KINDS[kind].column(column_name), noise.standard_deviation
+        assert column is not None
+        values |= {"size": column.written(size), "standard_deviation": size}
+        values["freedom"] = round(noise.degrees_of_freedom or 0)
+        yield Finding(code="noise_estimated", values=values)
+    for (i, first), (j, second) in combinations(enumerate(result.parameters), 2):
+        correlation = float(result.correlations[i, j])
+        if abs(correlation) >= _STRONG:
+            values = {"first": first.name, "second": second.name, "correlation": correlation}
+            yield Finding(code="errors_correlated", values=values)
+    for file in result.residuals:
+        far = file.lines[np.max(np.abs(file.normalised), axis=1) > _FAR]
         if far.size:
-            numbers: dict[str, Value] = {
-                "file": each.file,
-                "lines": _listed(far.tolist()),
-                "deviations": _FAR,
-            }
-            yield Finding(code="rows_far_off", values=numbers)
-        if np.any(each.down_weighted):
-            lines = _listed(each.lines[each.down_weighted].tolist())
-            yield Finding(code="rows_down_weighted", values={"file": each.file, "lines": lines})
+            values = {"file": file.file, "lines": _listed(far.tolist()), "deviations": _FAR}
+            yield Finding(code="rows_far_off", values=values)
+        if np.any(file.down_weighted):
+            lines = _listed(file.lines[file.down_weighted].tolist())
+            yield Finding(code="rows_down_weighted", values={"file": file.file, "lines": lines})
 
 
 def _listed(lines: Sequence[int]) -> str:
     shown = ", ".join(map(str, lines[:_MOST_LINES]))
     return shown + (f" and {len(lines) - _MOST_LINES} more" if len(lines) > _MOST_LINES else "")
-
-
-def _causes(names: Iterable[str]) -> list[str]:
-    """Causes of the errors of models among the names of inputs."""
-    return list(dict.fromkeys(MODEL_ERRORS[name] for name in names if name in MODEL_ERRORS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -296,58 +262,43 @@ class AgainstFit:
 def against_fit(result: FitResult) -> list[AgainstFit]:
     """One entry for each kind and column that was fitted, in the order of the data."""
     best = result.optimum
-    numbers = _beside(best)
-    parts: dict[str, list[tuple[Block, FloatArray]]] = {}
-    for block, rows in best.residuals.problem.rows:
-        parts.setdefault(block.group, []).append((block, numbers[:, rows]))
-    return [_entry(each) for each in parts.values()]
-
-
-def _entry(parts: Sequence[tuple[Block, FloatArray]]) -> AgainstFit:
-    first = parts[0][0]
-    kind, name = first.observations.kind, first.column
-    column = first.kind.column(name)
-    joined = np.concatenate([numbers for _, numbers in parts], axis=1)
-    return AgainstFit(
-        kind=kind,
-        column=name,
-        dimension=None if column is None else column.dimension,
-        unit="" if column is None else column.unit,
-        component=np.concatenate([_component(block) for block, _ in parts]),
-        measured=joined[0],
-        measured_uncertainty=joined[1],
-        fitted=joined[2],
-        fitted_uncertainty=joined[3],
-    )
-
-
-def _component(block: Block) -> IntArray:
-    rows = len(block.observations)
-    return np.arange(block.measured.size) // rows
-
-
-def _beside(best: Optimum) -> FloatArray:
-    """Measured, its uncertainty, fitted, its uncertainty, of all numbers, shape (4, n)."""
-    residuals = best.residuals
-    problem, scale = residuals.problem, residuals.scale
-    free = problem.free
-    effects, _ = best.of_all
+    problem, residuals, scale = best.residuals.problem, best.residuals, best.residuals.scale
+    (effects, _), free = best.of_all, problem.free
     spread = covariance(np.concatenate(best.of_all))
     b, n = residuals.linear_values(best.t)
-    fitted = problem.at(best.t) + residuals.held @ (n - residuals.pulled)
+    predicted = problem.at(best.t) + residuals.held @ (n - residuals.pulled)
     kept = np.r_[: best.t.size, best.t.size + free.shape[1] : effects.shape[1]]
     of_device, spread = effects[:, kept], spread[np.ix_(kept, kept)]
-    found = []
+    # Of each group: the number's part, measured, its uncertainty, fitted, its uncertainty.
+    numbers: dict[str, list[FloatArray]] = {}
+    first = {block.group: block for block in reversed(problem.blocks)}
     for block, mine in problem.rows:
         lower = np.linalg.inv(block.whiten)
         rows = lower @ (of_device[mine] / scale[mine][:, None])
         noise = lower / scale[mine][None, :]
-        found.append(
-            [
-                lower @ (problem.measured[mine] - free[mine] @ b),
-                NORMAL_95 * np.sqrt(np.sum(noise**2, axis=1)),
-                lower @ fitted[mine],
-                NORMAL_95 * np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows)),
-            ]
+        columns = [
+            np.arange(block.measured.size) // len(block.observations),
+            lower @ (problem.measured[mine] - free[mine] @ b),
+            NORMAL_95 * np.sqrt(np.sum(noise**2, axis=1)),
+            lower @ predicted[mine],
+            NORMAL_95 * np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows)),
+        ]
+        numbers.setdefault(block.group, []).append(np.array(columns))
+    entries = []
+    for group, parts in numbers.items():
+        block, joined = first[group], np.concatenate(parts, axis=1)
+        column = block.kind.column(block.column)
+        entries.append(
+            AgainstFit(
+                kind=block.observations.kind,
+                column=block.column,
+                dimension=None if column is None else column.dimension,
+                unit="" if column is None else column.unit,
+                component=joined[0].astype(np.int64),
+                measured=joined[1],
+                measured_uncertainty=joined[2],
+                fitted=joined[3],
+                fitted_uncertainty=joined[4],
+            )
         )
-    return np.concatenate([np.array(each) for each in found], axis=1)
+    return entries

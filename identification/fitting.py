@@ -22,12 +22,7 @@ from ringbalance.identification.intervals import (
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum, optimum_as_stated
-from ringbalance.identification.parameters import (
-    FitError,
-    Parameter,
-    inputs_of,
-    path_of,
-)
+from ringbalance.identification.parameters import FitError, Parameter, inputs_of, path_of
 from ringbalance.identification.reading import KINDS, kinds_of
 from ringbalance.identification.reading_likelihood import passive
 from ringbalance.results.rows import Finding, text_of
@@ -46,6 +41,12 @@ _FAR: Final = 3.0
 _TOLD: Final = 0.1
 """Of what is known beforehand, by which data must be able to move a value to disagree."""
 Source = Literal["[uncertainty]", "geometry"]
+_INTERVAL_FROM: Final[Mapping[Source | None, str]] = {
+    "[uncertainty]": "interval_stated",
+    "geometry": "interval_of_geometry",
+    None: "interval_unknown",
+}
+"""Code of the sentence that says where the interval before comes from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,33 +90,26 @@ class FittedParameter:
         return not low <= self.value <= high
 
     @property
-    def _disagrees(self) -> bool:
-        """Whether the data alone would have the value far outside what was known before.
-
-        Of data that agree with a prior of standard deviation p, of which the fit leaves q, the value is off
-        its middle by (p^2 - q^2)^(1/2).
-        """
-        if self.before_interval is None:
-            return False
-        known = (self.before_interval[1] - self.before) / NORMAL_95
-        left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
-        moved = math.sqrt(max(known**2 - left**2, 0.0))
-        return moved > _TOLD * known and abs(self.value - self.before) > _FAR * moved
-
-    @property
     def _impossible(self) -> bool:
-        """Whether it is a lag that no passive rotor has, and that the scene does not have either."""
+        """True for a lag that no passive rotor has, and that the scene does not have either."""
         is_lag = self.path.rpartition(".")[2] == "lag_angle" and passive(self.before)
         return is_lag and not any(map(passive, (self.value, *self.interval)))
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the value, each in one sentence."""
-        found = []
-        if self.before_source == "[uncertainty]" and (self.contradicts or self._disagrees):
+        disagrees, found = self.contradicts, []
+        if self.before_interval is not None:
+            # Of data that agree with a prior of standard deviation p, of which the fit leaves q, the value is
+            # off its middle by (p^2 - q^2)^(1/2).
+            known = (self.before_interval[1] - self.before) / NORMAL_95
+            left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
+            moved = math.sqrt(max(known**2 - left**2, 0.0))
+            disagrees |= moved > _TOLD * known and abs(self.value - self.before) > _FAR * moved
+        if self.before_source == "[uncertainty]" and disagrees:
             found.append(text_of("outside_stated" if self.contradicts else "data_outside_stated"))
         far = self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR
-        if far or (self.before_source == "geometry" and (self.contradicts or self._disagrees)):
+        if far or (self.before_source == "geometry" and disagrees):
             found.append(text_of("outside_geometry"))
         if self._impossible:
             found.append(text_of("lag_impossible"))
@@ -196,10 +190,7 @@ class FitResult:
 
     def parameter(self, name: str) -> FittedParameter:
         """One parameter by name. Raises: KeyError: it was not fitted."""
-        for each in self.parameters:
-            if each.name == name:
-                return each
-        raise KeyError(name)
+        return {each.name: each for each in self.parameters}[name]
 
 
 Loss = Literal["linear", "soft_l1"]
@@ -264,25 +255,46 @@ def exact_inputs(result: FitResult) -> list[str]:
 
 
 def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) -> FitResult:
-    problem, spread = best.residuals.problem, covariance(best.slopes)
+    residuals, problem, spread = best.residuals, best.residuals.problem, covariance(best.slopes)
     data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
     intervals = profiles(best, spread)
     found = verdicts(problem.parameters, best.t, data, intervals)
     products = combinations(problem.parameters, best.t, data, found, intervals)
     each = zip(problem.parameters, best.t.tolist(), intervals, found, strict=True)
     size = np.sqrt(np.diag(spread))
+    groups = zip(problem.estimated_groups, residuals.noise.tolist(), best.freedom.tolist(), strict=True)
+    given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
+    noise = [Noise(group=g, standard_deviation=s, estimated=True, degrees_of_freedom=f) for g, s, f in groups]
+    noise += [
+        Noise(group=g, standard_deviation=None, estimated=False, degrees_of_freedom=None) for g in given
+    ]
+    # Normalised after what is no parameter has taken up its part.
+    normalised, files = best.at[: problem.measured.size] / np.sqrt(residuals.weights), []
+    for block, mine in problem.rows:
+        data_set, weights = block.observations, block.observations.rows_of(residuals.weights[mine])
+        files.append(
+            _FileResiduals(
+                file=data_set.file,
+                kind=data_set.kind,
+                lines=data_set.lines,
+                normalised=data_set.rows_of(normalised[mine]),
+                down_weighted=np.asarray(np.min(weights, axis=1) < _HALF),
+            )
+        )
+    whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in problem.blocks)
+    noises = float(np.sum(np.log(residuals.noise[problem.group[problem.group >= 0]])))
     return FitResult(
         parameters=tuple(_fitted(*one, products) for one in each),
         correlations=spread / np.outer(size, size),
         combinations=products,
-        noise=_noises(best),
-        residuals=_residuals(best),
+        noise=tuple(noise),
+        residuals=tuple(files),
         held=held,
-        pulls=dict(zip(held, (best.residuals.held_values(best.t) / NORMAL_95).tolist(), strict=True)),
+        pulls=dict(zip(held, (residuals.held_values(best.t) / NORMAL_95).tolist(), strict=True)),
         loss=loss,
         starts=best.starts,
         evaluations=problem.evaluations,
-        log_likelihood=_log_likelihood(best),
+        log_likelihood=whitening - noises - float(np.sum(best.at**2)) / 2,
         scene=scene_as_fitted(best, held),
         stated=stated,
         joint=joint_of(best, held),
@@ -293,12 +305,21 @@ def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) 
 def _fitted(
     parameter: Parameter, t: float, found: Profile, verdict: Identified, products: Sequence[Combination]
 ) -> FittedParameter:
-    before = None
+    before, text = None, text_of("told_apart_by_data")
     source: Source | None = None
     if parameter.prior:
         source = "geometry" if parameter.by_geometry else "[uncertainty]"
         width = NORMAL_95 * parameter.prior
         before = parameter.start - width, parameter.start + width
+    if verdict is not Identified.IDENTIFIED:
+        never = verdict is Identified.STRUCTURALLY
+        within = " and ".join(c.text for c in products if parameter.name in c.names)
+        sentences = [
+            text_of("told_apart_by_none" if never else "hardly_narrowed", verdict=str(verdict)),
+            *([text_of("products_identified", products=within)] if within else []),
+            text_of(_INTERVAL_FROM[source]),
+        ]
+        text = "; ".join(sentences)
     return FittedParameter(
         name=parameter.name,
         value=parameter.value(t),
@@ -308,70 +329,7 @@ def _fitted(
         before_interval=before,
         before_source=source,
         verdict=verdict,
-        text=_verdict_text(parameter, verdict, products),
+        text=text,
         profile=found,
         curve=tuple((parameter.value(at), rise / found.factor**2) for at, rise in found.points),
     )
-
-
-def _interval_from(parameter: Parameter) -> str:
-    """Code of the sentence that says where the interval comes from."""
-    if parameter.by_geometry:
-        return "interval_of_geometry"
-    return "interval_stated" if parameter.prior else "interval_unknown"
-
-
-def _verdict_text(parameter: Parameter, verdict: Identified, found: Sequence[Combination]) -> str:
-    if verdict is Identified.IDENTIFIED:
-        return text_of("told_apart_by_data")
-    never = verdict is Identified.STRUCTURALLY
-    within = [c.text for c in found if parameter.name in c.names]
-    sentences = [
-        text_of("told_apart_by_none" if never else "hardly_narrowed", verdict=str(verdict)),
-        *([text_of("products_identified", products=" and ".join(within))] if within else []),
-        text_of(_interval_from(parameter)),
-    ]
-    return "; ".join(sentences)
-
-
-def _noises(best: Optimum) -> tuple[Noise, ...]:
-    problem = best.residuals.problem
-    estimated = problem.estimated_groups
-    given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
-    rows = [
-        Noise(group=name, standard_deviation=float(s), estimated=True, degrees_of_freedom=float(f))
-        for name, s, f in zip(estimated, best.residuals.noise, best.freedom, strict=True)
-    ]
-    return (
-        *rows,
-        *(
-            Noise(group=name, standard_deviation=None, estimated=False, degrees_of_freedom=None)
-            for name in given
-        ),
-    )
-
-
-def _residuals(best: Optimum) -> tuple[_FileResiduals, ...]:
-    """Normalised after what is no parameter has taken up its part."""
-    problem, residuals = best.residuals.problem, best.residuals
-    whole = best.at[: problem.measured.size] / np.sqrt(residuals.weights)
-    found = []
-    for block, mine in problem.rows:
-        weights = block.observations.rows_of(residuals.weights[mine])
-        found.append(
-            _FileResiduals(
-                file=block.observations.file,
-                kind=block.observations.kind,
-                lines=block.observations.lines,
-                normalised=block.observations.rows_of(whole[mine]),
-                down_weighted=np.asarray(np.min(weights, axis=1) < _HALF),
-            )
-        )
-    return tuple(found)
-
-
-def _log_likelihood(best: Optimum) -> float:
-    problem = best.residuals.problem
-    logs = [np.sum(np.log(np.diag(b.whiten))) for b in problem.blocks]
-    noise = np.sum(np.log(best.residuals.noise[problem.group[problem.group >= 0]]))
-    return float(sum(logs) - noise - np.sum(best.at**2) / 2)

@@ -30,7 +30,6 @@ from typing import Final
 import numpy as np
 from scipy.special import stdtrit
 
-from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum, searched
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.scene.arrays import FloatArray
@@ -77,54 +76,42 @@ def covariance(slopes: FloatArray) -> FloatArray:
     return np.asarray(scaled @ scaled.T)
 
 
-def profiles(optimum: Optimum, spread: FloatArray) -> list[Profile]:
+def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
     """Interval of each parameter. Args: `spread`: `covariance` at the optimum."""
-    return [_profile(optimum, i, float(factor), spread) for i, factor in enumerate(_student(optimum))]
+    least, found = float(np.sum(best.at**2)), []
+    for i, factor in enumerate(_student(best).tolist()):
+        low, high = (_end(best, i, sign, factor, spread, least) for sign in (-1.0, 1.0))
+        points = sorted([*low.points, (float(best.t[i]), 0.0), *high.points])
+        found.append(
+            Profile(
+                low=low.place,
+                high=high.place,
+                low_bound=low.bound,
+                high_bound=high.bound,
+                factor=factor,
+                ends=(tuple(low.t.tolist()), tuple(high.t.tolist())),
+                points=tuple(points),
+            )
+        )
+    return found
 
 
-def _student(optimum: Optimum) -> FloatArray:
+def _student(best: Optimum) -> FloatArray:
     """t(0.975) of each parameter, with what the estimated weights add."""
-    problem, slopes = optimum.residuals.problem, optimum.slopes
-    n = problem.measured.size
-    parts = np.linalg.pinv(slopes, rcond=1e-10) ** 2
-    total = np.sum(parts, axis=1)
-    by_group = [np.sum(parts[:, :n][:, problem.group == g], axis=1) for g in range(optimum.freedom.size)]
-    below = sum(
-        (c**2 / nu for c, nu in zip(by_group, optimum.freedom, strict=True)), start=np.zeros(total.size)
-    )
-    freedom = np.divide(total**2, below, out=np.full(total.size, np.inf), where=below > 1e-9 * total**2)
-    limited = np.minimum(np.maximum(freedom, 1.0), 1e9)
-    return np.asarray(stdtrit(limited, 0.975) * np.sqrt(1 + 2 * _by_weights(optimum)), dtype=np.float64)
-
-
-def _by_weights(optimum: Optimum) -> FloatArray:
-    """L over C of each parameter."""
-    (data, known), count = optimum.of_all, optimum.t.size
-    group, whole = optimum.residuals.problem.group, covariance(np.concatenate([data, known]))
-    added = np.zeros(count)
-    for g, nu in enumerate(optimum.freedom.tolist()):
+    (data, known), count, group = best.of_all, best.t.size, best.residuals.problem.group
+    whole, parts = covariance(np.concatenate([data, known])), np.linalg.pinv(best.slopes, rcond=1e-10) ** 2
+    total, below, added = np.sum(parts, axis=1), np.zeros(count), np.zeros(count)
+    for g, nu in enumerate(best.freedom.tolist()):
+        below += np.sum(parts[:, : group.size][:, group == g], axis=1) ** 2 / nu
         mine = data[group == g]
         rows = mine @ whole
         # Diagonal of C (W - W C W) C by the rows' own covariance.
         left = (rows.T @ rows) @ (np.eye(len(whole)) - mine.T @ rows)
         added += 2 / nu * np.diag(left)[:count]
-    return np.asarray(np.maximum(added, 0.0) / np.diag(whole)[:count])
-
-
-def _profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> Profile:
-    """Args: `factor`: Student's t."""
-    least = float(np.sum(optimum.at**2))
-    low, high = (_end(optimum, which, sign, factor, spread, least) for sign in (-1.0, 1.0))
-    points = sorted([*low.points, (float(optimum.t[which]), 0.0), *high.points])
-    return Profile(
-        low=low.place,
-        high=high.place,
-        low_bound=low.bound,
-        high_bound=high.bound,
-        factor=factor,
-        ends=(tuple(low.t.tolist()), tuple(high.t.tolist())),
-        points=tuple(points),
-    )
+    freedom = np.divide(total**2, below, out=np.full(count, np.inf), where=below > 1e-9 * total**2)
+    by_weights = np.maximum(added, 0.0) / np.diag(whole)[:count]
+    limited = np.minimum(np.maximum(freedom, 1.0), 1e9)
+    return np.asarray(stdtrit(limited, 0.975) * np.sqrt(1 + 2 * by_weights), dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,14 +122,13 @@ class _End:
     points: list[tuple[float, float]]
 
 
-def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float) -> _End:
+def _end(best: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float) -> _End:
     """Where the root of S - S0, nearly linear in t, is `factor`: by the secant, in steps."""
-    bounds = optimum.residuals.problem.bounds
-    bound, here = float(bounds[0 if sign < 0 else 1][which]), float(optimum.t[which])
+    bounds = best.residuals.problem.bounds
+    bound, here = float(bounds[0 if sign < 0 else 1][which]), float(best.t[which])
     wide = math.sqrt(float(spread[which, which]))
     along = spread[:, which] / max(float(spread[which, which]), 1e-300)
-    inside, outside = (0.0, 0.0), (math.inf, math.inf)
-    start = optimum.t
+    inside, outside, start = (0.0, 0.0), (math.inf, math.inf), best.t
     points: list[tuple[float, float]] = []
     distance = min(factor * wide, _LONGEST)
     for _ in range(_TRIALS):
@@ -151,7 +137,7 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
             place, distance = bound, abs(bound - here)
         begin = np.clip(start + along * (place - start[which]), *bounds)
         begin[which] = place
-        end, at = searched(optimum.residuals, begin, gain=_GAIN, fixed=which)
+        end, at = searched(best.residuals, begin, gain=_GAIN, fixed=which)
         rise = float(at @ at) - least
         root = math.sqrt(max(rise, 0.0))
         points.append((place, rise))
@@ -161,22 +147,19 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
         if root < factor:
             inside, start = (distance, root), end
             if len(points) > 1:
-                along = (end - optimum.t) / (place - here)
+                along = (end - best.t) / (place - here)
         else:
             outside = (distance, root)
-        distance = _next(inside, outside, factor, wide)
+        reach, root = inside
+        if math.isinf(outside[0]):
+            slope = root / reach if reach > 0 else 1 / wide
+            furthest = min(reach + _LONGEST, _LARGEST_STEP * max(reach, factor * wide))
+            distance = min(factor / max(slope, 1e-300), furthest)
+        else:
+            part = (factor - root) / (outside[1] - root)
+            distance = reach + min(max(part, 0.05), 0.95) * (outside[0] - reach)
     place = here + sign * (inside[0] if math.isinf(outside[0]) else outside[0])
     return _End(place=place, bound=False, t=end, points=points)
-
-
-def _next(inside: tuple[float, float], outside: tuple[float, float], factor: float, wide: float) -> float:
-    """Distance of the next trial from those within and beyond the end."""
-    reach, root = inside
-    if math.isinf(outside[0]):
-        slope = root / reach if reach > 0 else 1 / wide
-        return min(factor / max(slope, 1e-300), reach + _LONGEST, _LARGEST_STEP * max(reach, factor * wide))
-    part = (factor - root) / (outside[1] - root)
-    return reach + min(max(part, 0.05), 0.95) * (outside[0] - reach)
 
 
 _ROUNDS: Final = 4
@@ -212,11 +195,19 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
     for _ in range(_ROUNDS):
         residuals, t = best.residuals, best.t
         problem, pulls = residuals.problem, _allowed(held, residuals.held_values(t))
-        there = _pulled(problem, scene, t, dict(zip(held, pulls, strict=True)), held)
+        pulled = scene
+        for (name, sd), pull in zip(held.items(), pulls.tolist(), strict=True):
+            pulled = inputs_of(pulled).changed(name, pull * sd)
+        there = replace(problem, scene=pulled)
+        models = inputs_of(there.scene_at(t)).models
+        if models is not None:
+            # What the gauge of the data is off by stays that against the scene that is fitted.
+            gauge, other = problem.models.gas_pressure, problem.models.other
+            there = replace(there, models=replace(models, gas_pressure=gauge, other=other))
         linear = problem.at(t) + residuals.held @ (pulls - residuals.pulled)
         if np.max(residuals.scale * np.abs(there.at(t) - linear), initial=0.0) < _LINEAR:
             break
-        effects = there.held_effects(t, [inputs_of(there.scene).both_sides(*each) for each in held.items()])
+        effects = there.held_effects(t, [inputs_of(pulled).both_sides(*each) for each in held.items()])
         moved = replace(residuals, problem=there, held=effects, pulled=pulls)
         best = optimum(there, effects, loss=loss, starts=best.starts, before=replace(best, residuals=moved))
     return best
@@ -228,53 +219,25 @@ def _allowed(held: Mapping[str, float], pulls: FloatArray) -> FloatArray:
     return np.clip(pulls, -np.array(limits), limits)
 
 
-def _pulled(
-    problem: Problem, scene: AnyScene, t: FloatArray, pulls: Mapping[str, float], held: Mapping[str, float]
-) -> Problem:
-    """The problem of the scene with its held inputs pulled."""
-    for name, pull in pulls.items():
-        scene = inputs_of(scene).changed(name, pull * held[name])
-    there = replace(problem, scene=scene)
-    models = inputs_of(there.scene_at(t)).models
-    before = problem.models
-    if models is None or before is None:
-        return there
-    # What the gauge of the data is off by stays that against the scene that is fitted.
-    return replace(there, models=replace(models, gas_pressure=before.gas_pressure, other=before.other))
-
-
 def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
     """Distribution of parameters and held inputs at the optimum."""
-    problem, t = best.residuals.problem, best.t
+    problem, t, parameters = best.residuals.problem, best.t, best.residuals.problem.parameters
     data, known = best.of_all
     count, free = t.size, problem.free.shape[1]
-    rows = np.concatenate([data / _widening(best)[:, None], known, _weak(problem, data.shape[1])])
-    whole = covariance(rows)
+    student = np.append(stdtrit(np.clip(best.freedom, 1.0, 1e9), 0.975) / NORMAL_95, 1.0)
+    # Parameters of which nothing is known beforehand.
+    weak = np.zeros((count, data.shape[1]))
+    weak[np.arange(count), np.arange(count)] = [0.0 if p.prior else 1 / _UNKNOWN for p in parameters]
+    whole = covariance(np.concatenate([data / student[problem.group][:, None], known, weak]))
     kept = np.r_[:count, count + free : count + free + len(held)]
-    pulls = best.residuals.held_values(t)
-    slopes = [p.slope(inner) for p, inner in zip(problem.parameters, t.tolist(), strict=True)]
+    slopes = [p.slope(inner) for p, inner in zip(parameters, t.tolist(), strict=True)]
+    values = [p.value(inner) for p, inner in zip(parameters, t.tolist(), strict=True)]
     scale = np.concatenate([slopes, list(held.values())])
-    values = [p.value(inner) for p, inner in zip(problem.parameters, t.tolist(), strict=True)]
     return Joint(
-        names=(*(p.name for p in problem.parameters), *held),
-        values=np.concatenate([values, pulls]),
+        names=(*(p.name for p in parameters), *held),
+        values=np.concatenate([values, best.residuals.held_values(t)]),
         covariance=whole[np.ix_(kept, kept)] * np.outer(scale, scale),
     )
-
-
-def _widening(best: Optimum) -> FloatArray:
-    """t_nu(0.975)/1.96 of every number of the data."""
-    group = best.residuals.problem.group
-    by_group = np.append(stdtrit(np.clip(best.freedom, 1.0, 1e9), 0.975) / NORMAL_95, 1.0)
-    return np.asarray(by_group[group])
-
-
-def _weak(problem: Problem, count: int) -> FloatArray:
-    """Rows of parameters of which nothing is known beforehand."""
-    rows = np.zeros((len(problem.parameters), count))
-    for i, parameter in enumerate(problem.parameters):
-        rows[i, i] = 0.0 if parameter.prior else 1 / _UNKNOWN
-    return rows
 
 
 def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:

@@ -44,17 +44,13 @@ def _exchanged(observations: Observations, _: Any) -> Observations | None:
     other = {"before": "after", "after": "before"}
 
     def swapped(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        named = {n: n.rsplit("_", 1) for n in values}
+        named = {n: n.rpartition("_") for n in values}
         return {
-            f"{named[n][0]}_{other[named[n][1]]}" if named[n][-1] in other else n: v
-            for n, v in values.items()
+            f"{named[n][0]}_{other[named[n][2]]}" if named[n][2] in other else n: v for n, v in values.items()
         }
 
-    return replace(
-        observations,
-        columns=swapped(observations.columns),
-        uncertainty=swapped(observations.uncertainty),
-    )
+    columns, widths = swapped(observations.columns), swapped(observations.uncertainty)
+    return replace(observations, columns=columns, uncertainty=widths)
 
 
 def _turned(*names: str) -> Change:
@@ -73,9 +69,8 @@ def _lettered(observations: Observations, scene: Any) -> Observations | None:
     if observations.kind != "injection" or scene.disc.chambers < 4:
         return None
     letters = chamber_letters(scene.disc.chambers)
-    count = len(letters)
     numbers = [letters.index(letter) for letter in observations.chamber]
-    return replace(observations, chamber=np.array([letters[-i % count] for i in numbers]))
+    return replace(observations, chamber=np.array([letters[-i % len(letters)] for i in numbers]))
 
 
 def _amplitudes(factor: float) -> Change:
@@ -87,24 +82,24 @@ def _amplitudes(factor: float) -> Change:
     return change
 
 
-def _pressures(factor: float, *, absolute: bool = False) -> Change:
-    """Of the gas, in another unit, or less that of the surroundings."""
+def _gas(
+    name: str, convert: Callable[[FloatArray, Any], FloatArray], *, above: float, below: float
+) -> Change:
+    """A column of what the gas does, in another unit, within what an injection can have."""
 
     def change(observations: Observations, scene: Any) -> Observations | None:
         if observations.kind not in ("injection", "transfer"):
             return None
-        gauge = factor * observations.columns["pressure"]
-        gauge = gauge - scene.gas.ambient_pressure if absolute else gauge
-        return observations.with_columns(pressure=gauge) if np.all(gauge > 0) else None
+        values = convert(observations.columns[name], scene)
+        usable = np.all(values > above) and np.median(values) < below
+        return observations.with_columns(**{name: values}) if usable else None
 
     return change
 
 
-def _seconds(observations: Observations, _: Any) -> Observations | None:
-    if observations.kind not in ("injection", "transfer"):
-        return None
-    times = 1e3 * observations.columns["gas_time"]
-    return observations.with_columns(gas_time=times) if np.median(times) < _LONGEST_TIME else None
+def _pressures(code: str, words: str, convert: Callable[[FloatArray, Any], FloatArray]) -> Misreading:
+    change = _gas("pressure", convert, above=0.0, below=math.inf)
+    return Misreading(code=code, words=words, change=change, settings=True, column="pressure")
 
 
 SENSES: Final = (
@@ -116,28 +111,18 @@ SENSES: Final = (
 )
 """Of angles against the rotation, alone and together."""
 AMPLITUDES: Final = tuple(
-    Misreading(code=code, words=words, change=_amplitudes(factor), settings=False, scale=factor)
+    Misreading(
+        code=f"amplitudes_{code}",
+        words=f"amplitudes {words}",
+        change=_amplitudes(factor),
+        settings=False,
+        scale=factor,
+    )
     for code, factor, words in (
-        (
-            "amplitudes_halved",
-            0.5,
-            "amplitudes half as large, such as peak to peak stated as zero to peak",
-        ),
-        (
-            "amplitudes_doubled",
-            2.0,
-            "amplitudes twice as large, such as zero to peak stated as peak to peak",
-        ),
-        (
-            "amplitudes_over_root_two",
-            math.sqrt(0.5),
-            "amplitudes 0.71 times as large, such as zero to peak stated as rms",
-        ),
-        (
-            "amplitudes_times_root_two",
-            math.sqrt(2.0),
-            "amplitudes 1.41 times as large, such as rms stated as zero to peak",
-        ),
+        ("halved", 0.5, "half as large, such as peak to peak stated as zero to peak"),
+        ("doubled", 2.0, "twice as large, such as zero to peak stated as peak to peak"),
+        ("over_root_two", math.sqrt(0.5), "0.71 times as large, such as zero to peak stated as rms"),
+        ("times_root_two", math.sqrt(2.0), "1.41 times as large, such as rms stated as zero to peak"),
     )
 )
 """Alone and with every sense of the angles."""
@@ -149,31 +134,25 @@ _OTHERS: Final = (
         settings=False,
         together=False,
     ),
-    Misreading(
-        code="pressures_tenth",
-        words="gas pressures a tenth as large, such as bar stated as MPa",
-        change=_pressures(0.1),
-        settings=True,
-        column="pressure",
+    _pressures(
+        "pressures_tenth",
+        "gas pressures a tenth as large, such as bar stated as MPa",
+        lambda values, _: 0.1 * values,
     ),
-    Misreading(
-        code="pressures_tenfold",
-        words="gas pressures ten times as large, such as MPa stated as bar",
-        change=_pressures(10.0),
-        settings=True,
-        column="pressure",
+    _pressures(
+        "pressures_tenfold",
+        "gas pressures ten times as large, such as MPa stated as bar",
+        lambda values, _: 10.0 * values,
     ),
-    Misreading(
-        code="pressures_absolute",
-        words="gas pressures as absolute ones, less that of the surroundings",
-        change=_pressures(1.0, absolute=True),
-        settings=True,
-        column="pressure",
+    _pressures(
+        "pressures_absolute",
+        "gas pressures as absolute ones, less that of the surroundings",
+        lambda values, scene: values - scene.gas.ambient_pressure,
     ),
     Misreading(
         code="times_in_seconds",
         words="valve-open times a thousand times as long, such as seconds stated as milliseconds",
-        change=_seconds,
+        change=_gas("gas_time", lambda values, _: 1e3 * values, above=-math.inf, below=_LONGEST_TIME),
         settings=True,
         column="gas_time",
     ),

@@ -94,7 +94,11 @@ def optimum(
     same = before is not None and before.residuals.held.shape == held.shape
     pulled = before.residuals.pulled if before is not None and same else np.zeros(held.shape[1])
     residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights, pulled=pulled)
-    t = _from_starts(residuals, starts) if before is None else before.t
+    if before is None:
+        ends = [searched(residuals, point, gain=_NEARBY) for point in _start_points(problem, starts)]
+        t = min(ends, key=lambda end: float(end[1] @ end[1]))[0]
+    else:
+        t = before.t
     of_prediction = problem.slopes(t)
     for _ in range(_ROUNDS):
         t, _ = searched(residuals, t, gain=_LEAST_GAIN)
@@ -130,13 +134,6 @@ def _same(one: Residuals, other: Residuals) -> bool:
 def _first_noise(problem: Problem) -> FloatArray:
     sizes = [problem.measured[problem.group == g] for g in range(len(problem.estimated_groups))]
     return np.array([_FIRST_NOISE * max(float(np.sqrt(np.mean(y**2))), 1e-300) for y in sizes])
-
-
-def _from_starts(residuals: Residuals, starts: int) -> FloatArray:
-    """The best of where searches from the scene and from around it come to."""
-    points = _start_points(residuals.problem, starts)
-    ends = [searched(residuals, point, gain=_NEARBY) for point in points]
-    return min(ends, key=lambda end: float(end[1] @ end[1]))[0]
 
 
 def _start_points(problem: Problem, count: int) -> list[FloatArray]:
@@ -180,7 +177,12 @@ def _settled_noise(
                     f"{name}: {np.count_nonzero(mine)} numbers are too few to find both the parameters and "
                     "the noise: measure more, fit fewer parameters, or give the uncertainty in the file"
                 )
-            noise[g] *= _size(whole[mine], float(freedom[g]), loss)
+            if loss == "linear":
+                noise[g] *= math.sqrt(float(np.sum(whole[mine] ** 2)) / float(freedom[g]))
+            else:
+                # The median of a normal quantity's size is 0.6745 of its standard deviation.
+                size = float(np.median(np.abs(whole[mine]))) / 0.6745
+                noise[g] *= size * math.sqrt(np.count_nonzero(mine) / float(freedom[g]))
         floor = _LEAST_NOISE / _FIRST_NOISE * _first_noise(problem)
         noise = np.maximum(noise, floor)
         weights = residuals.weights if loss == "linear" else 1 / np.sqrt(1 + (whole / _ROBUST) ** 2)
@@ -189,13 +191,6 @@ def _settled_noise(
             return changed, freedom
         residuals = changed
     return residuals, freedom
-
-
-def _size(whole: FloatArray, freedom: float, loss: str) -> float:
-    """Standard deviation of residuals; the median of a normal quantity's size is 0.6745 of it."""
-    if loss == "linear":
-        return math.sqrt(float(np.sum(whole**2)) / freedom)
-    return float(np.median(np.abs(whole))) / 0.6745 * math.sqrt(whole.size / freedom)
 
 
 def searched(

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.device import Device
-from ringbalance.identification.likelihood import Block, Problem
+from ringbalance.identification.likelihood import Problem
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -53,50 +53,33 @@ def by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatA
     blocks = [b for b in problem.blocks if b.observations.kind in _BY_LAW]
     if not blocks:
         return
-    law, velocity = Device.of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
-    for name in _laws_to_compare(law):
-        models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
-        other = replace(problem, models=models)
-        yield (
-            name,
-            np.concatenate(
-                [b.whiten @ _predicted(b, scene, other, _EXPONENTS.get(name)) for b in problem.blocks]
-            ),
-        )
-
-
-def _predicted(block: Block, scene: Scene, problem: Problem, exponent: float | None) -> FloatArray:
-    """By the other law; flow at rest follows a power of the pressure through its middle value."""
-    own = block.predicted(scene, problem.models)
-    if block.observations.kind != "flow" or exponent is None:
-        return own
-    pressure = block.observations.columns["pressure_difference"]
-    middle = int(np.argsort(pressure)[pressure.size // 2])
-    return np.asarray(own[middle] * (pressure / pressure[middle]) ** (1 / exponent))
-
-
-def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> float:
-    """At equal fills under the middle of the data's gas pressures, m/s; 1 where nothing flows there."""
+    law, x = Device.of(scene, problem.models).law, scene.disc.initial_fill
     pressures = [b.observations.columns["pressure"] for b in blocks if "pressure" in b.observations.columns]
     pressure = float(np.median(np.concatenate(pressures))) if pressures else scene.gas.pressure
-    law, x = Device.of(scene, problem.models).law, scene.disc.initial_fill
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
-    return abs(float(flow.velocity)) or 1.0
+    velocity = abs(float(flow.velocity)) or 1.0
+    # A tube without crest has no column to break.
+    for name in (*_EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST)):
+        models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
+        predicted = []
+        for block in problem.blocks:
+            values, exponent = block.predicted(scene, models), _EXPONENTS.get(name)
+            if block.observations.kind == "flow" and exponent is not None:
+                # At rest a power of the pressure through its middle value.
+                drop = block.observations.columns["pressure_difference"]
+                middle = int(np.argsort(drop)[drop.size // 2])
+                values = values[middle] * (drop / drop[middle]) ** (1 / exponent)
+            predicted.append(block.whiten @ values)
+        yield name, np.concatenate(predicted)
 
 
 def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
     """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
     if name in _EXPONENTS:
         return replace(law, heads=law.heads.power(velocity=velocity, exponent=_EXPONENTS[name]))
-    if name == UNBROKEN:
-        return replace(law, path=replace(law.path, hump_pressure=None))
-    if name == BROKEN:
-        return replace(law, path=replace(law.path, vapour_pressure=0.0, released=0.0))
-    if name == _UNSPILT:
-        return replace(law, path=replace(law.path, froude_velocity=0.0))
-    raise ValueError(f"{name!r} is no other law")
-
-
-def _laws_to_compare(law: CalibratedLaw) -> tuple[str, ...]:
-    """Names of those that mean something for a law: a tube without crest has no column to break."""
-    return (*_EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST))
+    changed: dict[str, Any] = {
+        UNBROKEN: {"hump_pressure": None},
+        BROKEN: {"vapour_pressure": 0.0, "released": 0.0},
+        _UNSPILT: {"froude_velocity": 0.0},
+    }[name]
+    return replace(law, path=replace(law.path, **changed))

@@ -22,15 +22,15 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import stdtr
 
-from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.misreadings import Joint, Misreading
+from ringbalance.identification.misreadings import Joint
 from ringbalance.identification.optimisation import Optimum, optimum_as_stated
 from ringbalance.identification.parameters import FitError
 from ringbalance.scene.arrays import FloatArray
 
 _ROUNDS: Final = 12
 _AGREES: Final = 1e-2
+"""Relative change of the noise at which it is settled."""
 _LEAST_NOISE: Final = 1e-6
 """Of the root mean square of what a group measured."""
 _WIDE: Final = 1.0
@@ -38,7 +38,10 @@ _WIDE: Final = 1.0
 _STEPS: Final = 8
 """Of Newton, to the influence coefficient and the lag."""
 _CLOSE: Final = 1e-3
+"""Relative change of the influence coefficient at which it is settled."""
 _LEAST_CHANCE: Final = 1e-300
+_FEWEST: Final = 0.5
+"""Degrees of freedom that a group needs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,20 +86,18 @@ class Comparison:
     """-2 ln L of the files as they stand."""
     pulled: FloatArray
     """Held inputs at which predictions are made, in standard deviations."""
+    changed: dict[tuple[int, tuple[str, ...]], _Rows | None]
+    """Rows of each file, by what a reading has been set to; None where nothing can be predicted of it."""
 
     @classmethod
     def of(cls, best: Optimum) -> Comparison:
         """Predictions and slopes about the scene's values, and the fit that readings are compared with."""
         problem, start = best.residuals.problem, best.residuals.problem.start
-        raw = _unwhitened(problem, problem.at(start)[:, None])
-        slopes = _unwhitened(problem, problem.quick_slopes(start))
-        held = _unwhitened(problem, best.residuals.held)
-        rows = tuple(
-            _Rows(block=b, predicted=f[:, 0], slopes=s, held=h)
-            for b, f, s, h in zip(problem.blocks, raw, slopes, held, strict=True)
-        )
+        values = (problem.at(start)[:, None], problem.quick_slopes(start), best.residuals.held)
+        parts = zip(problem.blocks, *(_unwhitened(problem, each) for each in values), strict=True)
+        rows = tuple(_Rows(block=b, predicted=f[:, 0], slopes=s, held=h) for b, f, s, h in parts)
         pulled = best.residuals.pulled
-        return cls(problem=problem, rows=rows, given=deviance_of(best), pulled=pulled)
+        return cls(problem=problem, rows=rows, given=deviance_of(best), pulled=pulled, changed={})
 
     @cached_property
     def given_from_scene(self) -> float:
@@ -104,7 +105,7 @@ class Comparison:
         return self.gain((), ()) or 0.0
 
     def gain(self, joint: Joint, chosen: Sequence[int]) -> float | None:
-        """Of the log likelihood, by reading some files otherwise; None where nothing can be predicted."""
+        """Gain of the log likelihood by reading some files otherwise; None where nothing can be predicted."""
         rows = list(self.rows)
         for i in chosen:
             changed = self._changed(joint, i)
@@ -112,8 +113,8 @@ class Comparison:
                 return None
             rows[i] = changed
         problem = replace(self.problem, blocks=tuple(r.block for r in rows))
-        found = min(self._deviance(problem, rows, t) for t in self._starts(problem, rows))
-        gain = (self.given - found) / 2 + self.jacobian(joint, chosen)
+        least = min(self._deviance(problem, rows, t) for t in self._starts(problem, rows))
+        gain = (self.given - least) / 2 + self.jacobian(joint, chosen)
         return gain if math.isfinite(gain) else None
 
     def jacobian(self, joint: Joint, chosen: Sequence[int]) -> float:
@@ -122,7 +123,7 @@ class Comparison:
         return size * sum(math.log(each.scale) for each in joint)
 
     def refitted(self, joint: Joint, chosen: Sequence[int], scene: Any) -> float:
-        """The gain by a fit from the scene as stated; minus infinity where there is none.
+        """Gain by a fit from the scene as stated; minus infinity where there is none.
 
         The scene to which wrong readings pull held inputs is far from where another reading has them.
         """
@@ -139,37 +140,35 @@ class Comparison:
         return (self.given - deviance_of(best)) / 2 + self.jacobian(joint, chosen)
 
     @cached_property
-    def _response(self) -> tuple[int, int] | None:
-        """Places of influence coefficient and lag; None where predictions are not in proportion to them."""
+    def _response(self) -> list[int]:
+        """Places of influence coefficient and lag; empty where predictions are not in proportion to them."""
         places = [_place(self.problem, name) for name in ("influence_coefficient", "lag_angle")]
-        kappa, lag = places
-        if kappa is None or lag is None:
-            return None
-        others = [rows.slopes[:, [kappa, lag]] for rows in self.rows if not rows.vibration]
-        return None if any(map(np.any, others)) else (kappa, lag)
+        found = [place for place in places if place is not None]
+        others = (rows.slopes[:, found] for rows in self.rows if not rows.vibration)
+        return [] if len(found) < len(places) or any(map(np.any, others)) else found
 
     def _starts(self, problem: Problem, rows: Sequence[_Rows]) -> Iterator[FloatArray]:
         """t of the scene, and with the influence coefficient that explains the vibrations best."""
         yield problem.start
-        if self._response is None:
+        if not self._response:
             return
-        whole = np.concatenate([np.full(each.block.measured.size, each.vibration) for each in rows])
+        vibration = np.concatenate([np.full(each.block.measured.size, each.vibration) for each in rows])
         sides = [
             np.concatenate([each.block.whiten @ each.times(factor).predicted for each in rows])
             for factor in (1, 1j)
         ]
-        columns = np.column_stack([*sides, problem.free])[whole]
+        columns = np.column_stack([*sides, problem.free])[vibration]
         scales = np.linalg.norm(columns, axis=0)
         if np.all(scales[:2] > 0):
             scales[scales == 0] = 1.0
-            real, imaginary, *_ = np.linalg.lstsq(columns / scales, problem.measured[whole])[0] / scales
+            real, imaginary, *_ = np.linalg.lstsq(columns / scales, problem.measured[vibration])[0] / scales
             yield self._moved(problem.start, complex(real, imaginary))
 
     def _moved(self, t: FloatArray, factor: complex) -> FloatArray:
         """t at another influence coefficient."""
-        moved, places = t.copy(), self._response
-        if places is not None and factor != 0:
-            moved[list(places)] += math.log(abs(factor)), -cmath.phase(factor)
+        moved = t.copy()
+        if factor != 0:
+            moved[self._response] += math.log(abs(factor)), -cmath.phase(factor)
         return moved
 
     def _deviance(self, problem: Problem, rows: Sequence[_Rows], t: FloatArray) -> float:
@@ -177,78 +176,64 @@ class Comparison:
         deviance = math.inf
         for _ in range(_STEPS):
             factor = 1.0 + 0j
-            if self._response is not None:
-                kappa, lag = (t - problem.start)[list(self._response)]
+            if self._response:
+                kappa, lag = (t - problem.start)[self._response]
                 factor = cmath.exp(complex(kappa, -lag))
-            there = [each.times(factor) for each in rows]
-            linear = _Linear.at(
-                problem,
-                t,
-                np.concatenate([r.block.whiten @ r.predicted for r in there]),
-                np.concatenate([r.block.whiten @ r.slopes for r in there]),
-                np.concatenate([r.block.whiten @ r.held for r in there]),
-                pulled=self.pulled,
+            turned = [each.times(factor) for each in rows]
+            predicted, slopes, held = (
+                np.concatenate([each.block.whiten @ getattr(each, name) for each in turned])
+                for name in ("predicted", "slopes", "held")
             )
-            settled = linear.settled()
-            deviance = settled.deviance
-            if self._response is None or not math.isfinite(deviance):
+            deviance, step = _settled(problem, t, predicted, slopes, held, self.pulled)
+            if not self._response or not math.isfinite(deviance):
                 break
-            step = 1 + complex(*(settled.step[list(self._response)] * (1, -1)))
-            if abs(step - 1) < _CLOSE:
+            turn = 1 + complex(*(step[self._response] * (1, -1)))
+            if abs(turn - 1) < _CLOSE:
                 break
-            t = self._moved(t, step)
+            t = self._moved(t, turn)
         return deviance
 
-    @cached_property
-    def _read(self) -> dict[tuple[int, tuple[str, ...]], _Rows | None]:
-        return {}
-
     def _changed(self, joint: Joint, i: int) -> _Rows | None:
-        """Rows of a file that is read otherwise, as far as it can be."""
-        observations = self.rows[i].block.observations
-        able: list[Misreading] = []
+        """Rows of a file that is read otherwise, as far as it can be; None where nothing can be predicted."""
+        rows, problem = self.rows[i], self.problem
+        observations, settings = rows.block.observations, ()
         for each in joint:
-            changed = each.change(observations, self.problem.scene)
+            changed = each.change(observations, problem.scene)
             if changed is not None:
-                observations, able = changed, [*able, each]
-        settings = tuple(each.code for each in able if each.settings)
-        if (i, settings) not in self._read:
-            self._read[i, settings] = self._predicted(observations, self.rows[i], alike=not settings)
-        rows = self._read[i, settings]
-        return None if rows is None else replace(rows, block=Block(observations=observations))
-
-    def _predicted(self, observations: Observations, rows: _Rows, *, alike: bool) -> _Rows | None:
-        """By what the reading has been set to; None where nothing can be predicted of it."""
-        if alike:
-            return rows
-        problem, block = self.problem, Block(observations=observations)
-        alone = replace(problem, blocks=(block,))
-        try:
-            predicted = _unwhitened(alone, alone.at(problem.start)[:, None])[0][:, 0]
-            slopes = _unwhitened(alone, alone.quick_slopes(problem.start))[0]
-        except ValueError:
-            return None
-        held = _in_proportion(block, rows, predicted)
-        return _Rows(block=block, predicted=predicted, slopes=slopes, held=held)
+                observations = changed
+                settings = (*settings, each.code) if each.settings else settings
+        block = Block(observations=observations)
+        if settings and (i, settings) not in self.changed:
+            alone = replace(problem, blocks=(block,))
+            try:
+                predicted = _unwhitened(alone, alone.at(problem.start)[:, None])[0][:, 0]
+                slopes = _unwhitened(alone, alone.quick_slopes(problem.start))[0]
+            except ValueError:
+                self.changed[i, settings] = None
+            else:
+                held = _in_proportion(rows, predicted)
+                self.changed[i, settings] = _Rows(block=block, predicted=predicted, slopes=slopes, held=held)
+        other = self.changed[i, settings] if settings else rows
+        return None if other is None else replace(other, block=block)
 
 
 def deviance_of(best: Optimum) -> float:
     """-2 ln L at an optimum."""
-    problem, of = best.residuals.problem, best.of_prediction
-    there, held, pulled = problem.at(best.t), best.residuals.held, best.residuals.pulled
-    return _Linear.at(problem, best.t, there, of, held, pulled=pulled).settled().deviance
+    residuals, predicted = best.residuals, best.residuals.problem.at(best.t)
+    slopes, held, pulled = best.of_prediction, residuals.held, residuals.pulled
+    return _settled(residuals.problem, best.t, predicted, slopes, held, pulled)[0]
 
 
-def _in_proportion(block: Block, rows: _Rows, predicted: FloatArray) -> FloatArray:
+def _in_proportion(rows: _Rows, predicted: FloatArray) -> FloatArray:
     """Effects of held inputs, turned and stretched with the prediction of each row."""
-    count = len(block.observations)
-    if predicted.size == count:
-        ratio = np.divide(predicted, rows.predicted, out=np.zeros(count), where=rows.predicted != 0)
-        return np.asarray(ratio[:, None] * rows.held)
-    before, after = (v[:count] + 1j * v[count:] for v in (rows.predicted, predicted))
-    turn = np.divide(after, before, out=np.zeros(count, dtype=np.complex128), where=before != 0)
-    moved = turn[:, None] * (rows.held[:count] + 1j * rows.held[count:])
-    return np.concatenate([moved.real, moved.imag])
+    before, after, held = rows.predicted, predicted, rows.held
+    if rows.vibration:
+        before, after, held = (
+            values[: len(values) // 2] + 1j * values[len(values) // 2 :] for values in (before, after, held)
+        )
+    ratio = np.divide(after, before, out=np.zeros_like(after), where=before != 0)
+    moved = ratio[:, None] * held
+    return np.concatenate([moved.real, moved.imag]) if rows.vibration else moved
 
 
 def _unwhitened(problem: Problem, values: FloatArray) -> list[FloatArray]:
@@ -263,133 +248,65 @@ def _place(problem: Problem, name: str) -> int | None:
 
 
 def passive(lag: float) -> bool:
-    """Whether a lag, rad, is one that a passive rotor can have: from 0 to 180 degrees."""
+    """True for a lag, rad, that a passive rotor can have: from 0 to 180 degrees."""
     return lag % (2 * math.pi) <= math.pi
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Settled:
-    """A linear problem solved."""
+def _settled(
+    problem: Problem,
+    t: FloatArray,
+    predicted: FloatArray,
+    slopes: FloatArray,
+    held: FloatArray,
+    pulled: FloatArray,
+) -> tuple[float, FloatArray]:
+    """-2 ln L of the problem linearised at t, and the step to its optimum, with the noise settled.
 
-    deviance: float
-    """-2 ln L."""
-    step: FloatArray
-    """Unknowns."""
-    width: FloatArray
-    """Their standard deviations."""
-    spread: FloatArray
-    """Squares of the residuals of each estimated group."""
-    freedom: FloatArray
-    """Degrees of freedom of these."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Linear:
-    """A problem that is linear around one t."""
-
-    problem: Problem
-    apart: FloatArray
-    """L^-1 (y - f), shape (n,)."""
-    design: FloatArray
-    """Slopes by parameters, b and held inputs, shape (n, unknowns)."""
-    known: FloatArray
-    """What is known beforehand of the unknowns, one standard deviation a row; with its residuals."""
-    known_apart: FloatArray
-    t: FloatArray
-
-    @classmethod
-    def at(
-        cls,
-        problem: Problem,
-        t: FloatArray,
-        predicted: FloatArray,
-        slopes: FloatArray,
-        held: FloatArray,
-        *,
-        pulled: FloatArray,
-    ) -> _Linear:
-        design = np.hstack([slopes, problem.free, held])
-        rows = [(i, *_known(problem, i, float(t[i]))) for i in range(t.size)]
-        known = np.zeros((t.size + held.shape[1], design.shape[1]))
-        for i, slope, _ in rows:
-            known[i, i] = slope
-        known[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
-        apart = np.concatenate([[-off for _, _, off in rows], -pulled])
-        return cls(
-            problem=problem,
-            apart=problem.measured - predicted,
-            design=design,
-            known=known,
-            known_apart=apart,
-            t=t,
-        )
-
-    def settled(self) -> _Settled:
-        """The noise settled; an infinite deviance where a group has no freedom left."""
-        group, count = self.problem.group, len(self.problem.estimated_groups)
-        sizes = np.array([_size(self.problem.measured[group == g]) for g in range(count)])
-        noise = np.array([_size(self.apart[group == g]) for g in range(count)])
-        noise = np.maximum(noise, _LEAST_NOISE * sizes)
-        for _ in range(_ROUNDS):
-            found = self._solved(noise)
-            if np.any(found.freedom < 0.5):
-                return replace(found, deviance=math.inf)
-            settled = np.maximum(noise * np.sqrt(found.spread / found.freedom), _LEAST_NOISE * sizes)
-            done = np.max(np.abs(settled / noise - 1), initial=0.0) < _AGREES
-            noise = settled
-            if done:
-                break
-        whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in self.problem.blocks)
-        passive = math.log(max(self._chance_of_passive(found), _LEAST_CHANCE))
-        return replace(found, deviance=found.deviance - 2 * whitening - 2 * passive)
-
-    def _chance_of_passive(self, found: _Settled) -> float:
-        """Probability that the lag lies between 0 and 180 degrees; 1 of a lag that is not fitted, or that the
-        scene has outside."""
-        i = _place(self.problem, "lag_angle")
-        if i is None or not passive(self.problem.parameters[i].start):
-            return 1.0
-        lag = (float(self.t[i] + found.step[i]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
-        freedom = min(
-            (
-                float(found.freedom[self.problem.estimated_groups.index(b.group)])
-                for b in self.problem.blocks
-                if b.estimated and b.measured.size == 2 * len(b.observations)
-            ),
-            default=math.inf,
-        )
-        nearer = min(lag, math.pi - lag)
-        inside, beyond = stdtr(min(freedom, 1e9), np.array([nearer, nearer - math.pi]) / found.width[i])
-        return float(inside - beyond)
-
-    def _solved(self, noise: FloatArray) -> _Settled:
-        """With the noise given; the deviance without what whitening adds."""
-        group = self.problem.group
-        s = np.where(group < 0, 1.0, noise[group]) if noise.size else np.ones(group.size)
-        whole = np.concatenate([self.design / s[:, None], self.known])
-        left = np.concatenate([self.apart / s, self.known_apart])
-        base, triangle = np.linalg.qr(whole)
+    Infinite where a group has no freedom left.
+    """
+    group, groups = problem.group, range(len(problem.estimated_groups))
+    design, count = np.hstack([slopes, problem.free, held]), problem.measured.size
+    # What is known beforehand of each unknown, one standard deviation a row, and how far t is off it.
+    known = np.zeros((t.size + held.shape[1], design.shape[1]))
+    known[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
+    off = np.concatenate([(problem.start - t) / _WIDE, -pulled])
+    for i, (parameter, inner) in enumerate(zip(problem.parameters, t.tolist(), strict=True)):
+        known[i, i] = parameter.slope(inner) / parameter.prior if parameter.prior else 1 / _WIDE
+        if parameter.prior:
+            off[i] = (parameter.start - parameter.value(inner)) / parameter.prior
+    apart = problem.measured - predicted
+    least = np.array([_LEAST_NOISE * _size(problem.measured[group == g]) for g in groups])
+    settled = np.maximum([_size(apart[group == g]) for g in groups], least)
+    for _ in range(_ROUNDS):
+        noise = settled
+        s = np.where(group < 0, 1.0, noise[group]) if noise.size else np.ones(count)
+        left = np.concatenate([apart / s, off])
+        base, triangle = np.linalg.qr(np.concatenate([design / s[:, None], known]))
         along = base.T @ left
-        rest = left - base @ along
-        taken, n = np.sum(base[: group.size] ** 2, axis=1), group.size
-        sizes = np.maximum(np.abs(np.diag(triangle)), 1e-12)
-        logs = 2 * float(np.sum(np.log(s))) + 2 * float(np.sum(np.log(sizes)))
-        inverse = np.linalg.pinv(triangle)
-        return _Settled(
-            deviance=float(rest @ rest) + logs,
-            step=inverse @ along,
-            width=np.linalg.norm(inverse, axis=1),
-            spread=np.array([np.sum(rest[:n][group == g] ** 2) for g in range(noise.size)]),
-            freedom=np.array([np.sum(1 - taken[group == g]) for g in range(noise.size)]),
-        )
-
-
-def _known(problem: Problem, i: int, t: float) -> tuple[float, float]:
-    """Of one parameter: 1/standard deviation in t of what is known beforehand, and how far t is off it."""
-    parameter, start = problem.parameters[i], float(problem.start[i])
-    if parameter.prior:
-        return parameter.slope(t) / parameter.prior, (parameter.value(t) - parameter.start) / parameter.prior
-    return 1 / _WIDE, (t - start) / _WIDE
+        rest, taken = left - base @ along, np.sum(base[:count] ** 2, axis=1)
+        freedom = np.array([np.sum(1 - taken[group == g]) for g in groups])
+        if np.any(freedom < _FEWEST):
+            return math.inf, np.zeros_like(along)
+        squares = np.array([np.sum(rest[:count][group == g] ** 2) for g in groups])
+        settled = np.maximum(noise * np.sqrt(squares / freedom), least)
+        if np.max(np.abs(settled / noise - 1), initial=0.0) < _AGREES:
+            break
+    inverse = np.linalg.pinv(triangle)
+    step, widths = inverse @ along, np.linalg.norm(inverse, axis=1)
+    sizes = np.maximum(np.abs(np.diag(triangle)), 1e-12)
+    whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in problem.blocks)
+    chance, i = 1.0, _place(problem, "lag_angle")
+    # Probability that the lag lies between 0 and 180 degrees, unless the scene has it outside.
+    if i is not None and passive(problem.parameters[i].start):
+        lag = (float(t[i] + step[i]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
+        vibrations = {b.group for b in problem.blocks if b.measured.size == 2 * len(b.observations)}
+        named = zip(problem.estimated_groups, freedom.tolist(), strict=True)
+        nu = min((each for name, each in named if name in vibrations), default=math.inf)
+        nearer = min(lag, math.pi - lag)
+        inside, beyond = stdtr(min(nu, 1e9), np.array([nearer, nearer - math.pi]) / widths[i])
+        chance = max(float(inside - beyond), _LEAST_CHANCE)
+    logs = 2 * float(np.sum(np.log(s))) + 2 * float(np.sum(np.log(sizes)))
+    return float(rest @ rest) + logs - 2 * whitening - 2 * math.log(chance), step
 
 
 def _size(values: FloatArray) -> float:

@@ -16,26 +16,24 @@ A reading is named from a gain of `_DECISIVE` on: of thirty, and one file in a h
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.kinds.kind import Column
 from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.misreadings import (
     AMPLITUDES,
     SENSES,
     Joint,
-    Misreading,
     joint_misreadings,
     words_of,
 )
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.reading_likelihood import Comparison
-from ringbalance.results.rows import text_of
+from ringbalance.results.rows import Value, text_of
 
 _FAR: Final = 5.0
 """Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
@@ -60,7 +58,7 @@ class ComparedColumn:
 
 
 def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
-    """Columns against what the scene has."""
+    """Columns of the files against the ranges of the scene."""
     for block in problem.blocks:
         observations = block.observations
         ranges = block.kind.ranges(problem.scene)
@@ -72,29 +70,34 @@ def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
             middle = float(np.median(np.abs(values[values != 0])))
             ratio = middle / high if middle > high else middle / low if middle < low else 1.0
             limit = _FAR_VIBRATION if column.amplitude else _FAR
+            facts: dict[str, Value] = {
+                "column": column.head,
+                "file": Path(observations.file).name,
+                "middle": column.written(middle),
+            }
+            if ratio != 1.0:
+                facts |= {"ratio": ratio, "known": column.written(middle / ratio)}
             yield ComparedColumn(
                 file=observations.file,
                 column=column.name,
                 unit=column.unit,
                 ratio=ratio,
                 fails=not 1 / limit <= ratio <= limit,
-                text=_text(observations.file, column, middle, ratio),
+                text=text_of("column_as_in_scene" if ratio == 1.0 else "column_off_scene", **facts),
             )
-
-
-def _text(file: str, column: Column, middle: float, ratio: float) -> str:
-    here = {"column": column.head, "file": Path(file).name, "middle": column.written(middle)}
-    if ratio == 1.0:
-        return text_of("column_as_in_scene", **here)
-    return text_of("column_off_scene", **here, ratio=ratio, known=column.written(middle / ratio))
 
 
 _DECISIVE: Final = math.log(1e6)
 """Gain of the log likelihood."""
 _TELLS: Final = math.log(1e3)
 """Loss of the log likelihood from which a sense of the angles is ruled out."""
-
-
+_CODES: Final = {
+    (True, False): "read_otherwise_better",
+    (True, True): "read_one_of_several",
+    (False, True): "read_undecided",
+    (False, False): "read_otherwise",
+}
+"""Of the sentence, by whether a reading is named, and undecided."""
 _Choice = tuple[Joint, tuple[int, ...]]
 """A reading, and places of the files that are read so."""
 
@@ -135,20 +138,32 @@ def other_readings(
     gains = _without_idle_factors(compare, gains, problem.scene if stated is None else stated)
     ordered = sorted(gains.items(), key=lambda each: -each[1])
     likeliest = ordered[0][1] if ordered else 0.0
-    named = [
-        gain > likeliest - _TELLS and gain >= _asked(problem, joint, chosen, far)
-        for (joint, chosen), gain in ordered
-    ]
+    files = [[problem.blocks[i].observations.file for i in chosen] for (_, chosen), _ in ordered]
+    named = []
+    for ((joint, _), gain), where in zip(ordered, files, strict=True):
+        least_gain = 0.0 if all((file, joint[0].column) in far for file in where) else _DECISIVE
+        named.append(gain > likeliest - _TELLS and gain >= least_gain)
     # A better one that is not named hides none behind it.
     named = named if any(named[:1]) else [False] * len(named)
     # The given reading fitted as the others are, which curvature costs as much.
     least = min(compare.given_from_scene, 0.0) - _TELLS
-    undecided = [
-        sum(named) > 1 if is_named else not any(named) and gain > least and {*joint} <= {*SENSES}
-        for is_named, ((joint, _), gain) in zip(named, ordered, strict=True)
-    ]
-    each = zip(ordered, named, undecided, strict=True)
-    return tuple(_reading(problem, *of, gain, named=n, undecided=u) for (of, gain), n, u in each)
+    readings = []
+    for ((joint, _), gain), where, is_named in zip(ordered, files, named, strict=True):
+        senses_alone = not any(named) and gain > least and {*joint} <= {*SENSES}
+        undecided = sum(named) > 1 if is_named else senses_alone
+        names = " and ".join(Path(file).name for file in where)
+        words: dict[str, Value] = {"files": names, "reading": words_of(joint), "gain": f"{gain:+.3g}"}
+        readings.append(
+            Reading(
+                code="+".join(each.code for each in joint),
+                files=tuple(where),
+                gain=gain,
+                named=is_named,
+                undecided=undecided,
+                text=text_of(_CODES[is_named, undecided], **words),
+            )
+        )
+    return tuple(readings)
 
 
 def _without_idle_factors(
@@ -180,41 +195,11 @@ def _without_idle_factors(
     return kept
 
 
-def _asked(problem: Problem, joint: Joint, chosen: Sequence[int], far: Collection[tuple[str, str]]) -> float:
-    """Gain of the log likelihood from which a reading is named."""
-    changed = [(problem.blocks[i].observations.file, joint[0].column) for i in chosen]
-    return 0.0 if all(each in far for each in changed) else _DECISIVE
-
-
-def _reading(
-    problem: Problem, joint: Joint, chosen: Sequence[int], gain: float, *, named: bool, undecided: bool
-) -> Reading:
-    codes = {
-        (True, False): "read_otherwise_better",
-        (True, True): "read_one_of_several",
-        (False, True): "read_undecided",
-        (False, False): "read_otherwise",
-    }
-    files = tuple(problem.blocks[i].observations.file for i in chosen)
-    text = text_of(
-        codes[named, undecided],
-        files=" and ".join(Path(file).name for file in files),
-        reading=words_of(joint),
-        gain=f"{gain:+.3g}",
-    )
-    code = "+".join(each.code for each in joint)
-    return Reading(code=code, files=files, gain=gain, named=named, undecided=undecided, text=text)
-
-
 def _choices(problem: Problem, joint: Joint) -> Iterator[tuple[int, ...]]:
     """Places of the files that are read otherwise: each that can be, and all of them."""
-
-    def able(part: Misreading) -> set[int]:
-        given = enumerate(problem.blocks)
-        return {i for i, b in given if part.change(b.observations, problem.scene) is not None}
-
-    changed = [able(each) for each in joint]
-    yield from ((i,) for i in sorted(set.intersection(*changed)))
-    every = sorted(set.union(*changed))
-    if all(each.together for each in joint) and all(changed) and len(every) > 1:
+    blocks, scene = list(enumerate(problem.blocks)), problem.scene
+    able = [{i for i, b in blocks if part.change(b.observations, scene) is not None} for part in joint]
+    yield from ((i,) for i in sorted(set.intersection(*able)))
+    every = sorted(set.union(*able))
+    if all(each.together for each in joint) and all(able) and len(every) > 1:
         yield tuple(every)

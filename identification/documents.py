@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.criticism import Review, summaries
-from ringbalance.identification.fitting import FitResult, FittedParameter, exact_inputs
+from ringbalance.identification.fitting import FitResult, FittedParameter
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.kinds.kind import Observations
@@ -59,8 +59,7 @@ def fit_document(
         "data_over_fit": [
             _chosen(each, "kind column slope slope_uncertainty") for each in against_fit(result)
         ],
-        "exact": exact_inputs(result),
-        **_chosen(result, "loss starts evaluations log_likelihood"),
+        **_chosen(result, "exact loss starts evaluations log_likelihood"),
         **{name: dict(getattr(result, name)) for name in ("held", "pulls")},
         "criticism": {
             **_chosen(told, "describes text"),
@@ -115,7 +114,7 @@ def fit_rows(
     facts = {
         "not fitted, [uncertainty] in all intervals": ", ".join(held),
         "errors of models, in all intervals": ", ".join(causes),
-        "not fitted, taken as exact": ", ".join(exact_inputs(result)),
+        "not fitted, taken as exact": ", ".join(result.exact),
     }
     heads = ("quantity", "fitted", "from", "to", "unit", "before", "identified")
     rows = [(each.name, *_numbers(each), _WORDS[each.verdict]) for each in result.parameters]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -40,6 +41,8 @@ _FAR: Final = 3.0
 """Standard deviations by which data may disagree with what is known beforehand."""
 _TOLD: Final = 0.1
 """Of what is known beforehand, by which data must be able to move a value to disagree."""
+_LITTLE: Final = 1e-4
+"""Change of a quantity, relative, or in SI units where it is zero."""
 Source = Literal["[uncertainty]", "geometry"]
 _INTERVAL_FROM: Final[Mapping[Source | None, str]] = {
     "[uncertainty]": "interval_stated",
@@ -188,6 +191,19 @@ class FitResult:
             if abs(pull) > 1
         )
 
+    @cached_property
+    def exact(self) -> tuple[str, ...]:
+        """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
+        problem, t = self.optimum.residuals.problem, self.optimum.t
+        inputs = inputs_of(problem.scene)
+        known = {*inputs.held(()), *(parameter.name for parameter in self.parameters)}
+        found = []
+        for name, each in inputs.inputs.items():
+            nearby = inputs.changed(name, -_LITTLE * abs(each.value) if each.value else _LITTLE)
+            if name not in known and np.any(replace(problem, scene=nearby).at(t) != problem.at(t)):
+                found.append(name)
+        return tuple(found)
+
     def parameter(self, name: str) -> FittedParameter:
         """One parameter by name. Raises: KeyError: it was not fitted."""
         return {each.name: each for each in self.parameters}[name]
@@ -196,8 +212,6 @@ class FitResult:
 Loss = Literal["linear", "soft_l1"]
 _STARTS: Final = 3
 _HALF: Final = 0.5
-_LITTLE: Final = 1e-4
-"""Of a quantity, or in SI units where it is zero."""
 
 
 def fit(
@@ -239,19 +253,6 @@ def problem_of(
         parameters=inputs.parameters(names),
         blocks=tuple(Block(observations=each) for each in data),
     )
-
-
-def exact_inputs(result: FitResult) -> list[str]:
-    """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
-    problem, t = result.optimum.residuals.problem, result.optimum.t
-    inputs = inputs_of(problem.scene)
-    known = {*inputs.held(()), *(parameter.name for parameter in result.parameters)}
-    found = []
-    for name, each in inputs.inputs.items():
-        nearby = inputs.changed(name, -_LITTLE * abs(each.value) if each.value else _LITTLE)
-        if name not in known and np.any(replace(problem, scene=nearby).at(t) != problem.at(t)):
-            found.append(name)
-    return found
 
 
 def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) -> FitResult:

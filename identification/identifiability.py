@@ -139,39 +139,40 @@ def combinations(
         return ()
     # A product is what the data alone tell: the geometry bounds its part, and makes it no better known.
     data = [replace(p, prior=None) if p.by_geometry else p for p in parameters]
-    factor, allowed = max(p.factor for p in profiles), _allowed_widths(data, t)
+    factor, allowed, flat = max(p.factor for p in profiles), _allowed_widths(data, t), slopes
     weak = np.array([verdict is not Identified.IDENTIFIED for verdict in found])
-    flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
+    # J with no more information along the way to the ends of wide profiles than these show, unless that is
+    # its own but for little, or less because a prior ends the profile.
+    for profile in [p for p, is_weak in zip(profiles, weak, strict=True) if is_weak]:
+        for end in profile.ends:
+            way, scaled = (np.array(end) - t) / allowed, flat * allowed
+            length = float(np.linalg.norm(way))
+            if length > 1 / math.sqrt(2) and np.linalg.norm(scaled @ way) > _BENT * profile.factor:
+                along = way / length
+                without = scaled - np.outer(scaled @ along, along)
+                flat = np.concatenate([without, (profile.factor / length) * along[None, :]]) / allowed
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
     root = _data_root(flat)
     # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
     strong = vt[s > math.sqrt(2) * factor]
     rows = [_simple(row, root) for row in _echelon(strong / allowed)]
-    rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]
     # What rounding of the exponents lets in of directions that are not seen at all is no width.
-    seen = _data_root(slopes, unseen=math.inf)
-    widths = [factor * float(np.linalg.norm(row @ seen)) for row in rows]
-    return tuple(_combination(parameters, t, row, width) for row, width in zip(rows, widths, strict=True))
-
-
-def _flattened(
-    slopes: FloatArray, t: FloatArray, allowed: FloatArray, profiles: Sequence[Profile]
-) -> FloatArray:
-    """J with no more information along the way to the ends of wide profiles than these show.
-
-    Where it is J's own but for little, or less because a prior ends the profile, J stays as it is.
-    """
-    for profile in profiles:
-        for end in profile.ends:
-            way = (np.array(end) - t) / allowed
-            length = float(np.linalg.norm(way))
-            scaled = slopes * allowed
-            if length > 1 / math.sqrt(2) and np.linalg.norm(scaled @ way) > _BENT * profile.factor:
-                along = way / length
-                without = scaled - np.outer(scaled @ along, along)
-                slopes = np.concatenate([without, (profile.factor / length) * along[None, :]]) / allowed
-    return slopes
+    seen, products = _data_root(slopes, unseen=math.inf), []
+    for row in rows:
+        used: BoolArray = row != 0
+        if np.count_nonzero(used) > 1 and np.any(used & weak):
+            some = [p for p, is_used in zip(parameters, used, strict=True) if is_used]
+            products.append(
+                Combination(
+                    names=tuple(p.name for p in some),
+                    exponents=tuple(float(x) for x in row[used]),
+                    text=_power_text([p.symbol for p in some], row[used]),
+                    value=math.exp(float(row @ t)),
+                    relative_uncertainty=factor * float(np.linalg.norm(row @ seen)),
+                )
+            )
+    return tuple(products)
 
 
 def _echelon(rows: FloatArray) -> FloatArray:
@@ -193,41 +194,28 @@ def _echelon(rows: FloatArray) -> FloatArray:
 
 def _simple(row: FloatArray, root: FloatArray) -> FloatArray:
     """Whole exponents where they are near or the data identify them as well, else two decimals."""
-    best, row = _width(row, root), row / np.max(np.abs(row))
+
+    def width(direction: FloatArray) -> float:
+        """Standard deviation along a direction, per unit of length."""
+        return float(np.linalg.norm(direction @ root) / np.linalg.norm(direction))
+
+    best, row = width(row), row / np.max(np.abs(row))
     row = row * np.sign(row[np.flatnonzero(np.abs(row) > _SIGN)[0]])
     wholes = [(largest, np.round(row * largest)) for largest in range(1, _WHOLE + 1)]
     near = [whole for largest, whole in wholes if np.max(np.abs(whole / largest - row)) < _ROUNDED]
-    alike = [whole for _, whole in wholes if _width(whole, root) <= _ALIKE * best]
+    alike = [whole for _, whole in wholes if width(whole) <= _ALIKE * best]
     for whole in (*near, *alike):
         return np.asarray(whole / np.gcd.reduce(whole.astype(np.int64)))
     return np.asarray(np.round(row, 2))
 
 
-def _width(row: FloatArray, root: FloatArray) -> float:
-    """Standard deviation along a direction, per unit of length."""
-    return float(np.linalg.norm(row @ root) / np.linalg.norm(row))
-
-
-def _combination(
-    parameters: Sequence[Parameter], t: FloatArray, row: FloatArray, width: float
-) -> Combination:
-    used: BoolArray = row != 0
-    return Combination(
-        names=tuple(p.name for p, one in zip(parameters, used, strict=True) if one),
-        exponents=tuple(float(x) for x in row[used]),
-        text=_power_text([p.symbol for p, one in zip(parameters, used, strict=True) if one], row[used]),
-        value=math.exp(float(row @ t)),
-        relative_uncertainty=width,
-    )
-
-
 def _power_text(symbols: Sequence[str], exponents: FloatArray) -> str:
     """Product of powers, such as "lambda^2/(k + 1)"."""
-    above = [_power(s, e) for s, e in zip(symbols, exponents, strict=True) if e > 0]
-    below = [_power(s, -e) for s, e in zip(symbols, exponents, strict=True) if e < 0]
-    under = "" if not below else "/" + (below[0] if len(below) == 1 else f"({' '.join(below)})")
-    return (" ".join(above) or "1") + under
-
-
-def _power(symbol: str, exponent: float) -> str:
-    return symbol if exponent == 1 else f"{symbol}^{exponent:g}"
+    sides: dict[bool, list[str]] = {True: [], False: []}
+    for symbol, exponent in zip(symbols, exponents.tolist(), strict=True):
+        if exponent:
+            power = symbol if abs(exponent) == 1 else f"{symbol}^{abs(exponent):g}"
+            sides[exponent > 0].append(power)
+    above, below = " ".join(sides[True]) or "1", " ".join(sides[False])
+    under = f"({below})" if len(sides[False]) > 1 else below
+    return f"{above}/{under}" if under else above

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -17,7 +16,6 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.tables import (
-    Table,
     data_fault,
     decoded,
     file_name,
@@ -26,7 +24,7 @@ from ringbalance.identification.tables import (
     split_head,
 )
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.faults import SceneError
 
 _AMPLITUDES: Final = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": math.sqrt(2.0)}
 """Factor to zero-to-peak."""
@@ -117,53 +115,35 @@ def read_influence(path: Path | str) -> InfluenceTable:
     table, further = parse_table(text, file=file) if not (faults or more) else (None, ())
     if table is None or faults or more or further:
         raise SceneError([*faults, *more, *further])
-    return _influence(table)
-
-
-def _influence(table: Table) -> InfluenceTable:
     heads = {split[0]: (head, split[1]) for head in table.heads if (split := split_head(head))}
-    columns = ("speed", *(_CARTESIAN if "real" in heads else _POLAR))
-    sign_key = "convention" if "real" in heads else "angle"
-    faults = [*_head_faults(table, heads, columns), *_header_faults(table, sign_key)]
-    values: dict[str, FloatArray] = {}
-    for name in columns if not faults else ():
-        head, unit = heads[name]
-        values[name], wrong = table.values(head, unit, _DIMENSIONS[name])
-        faults += wrong
-    if faults:
-        raise SceneError(faults)
-    sign = _SIGNS[str(table.header[sign_key])]
-    if "real" in heads:
-        along, across = values["real"], sign * values["imaginary"]
-    else:
-        angle = sign * values["angle"]
-        along, across = values["amplitude"] * np.cos(angle), values["amplitude"] * np.sin(angle)
-    factor, order = _AMPLITUDES[str(table.header["vibration"])], np.argsort(values["speed"])
-    speed, coefficient = (
-        values["speed"][order],
-        np.asarray(factor * (along + 1j * across), dtype=np.complex128)[order],
-    )
-    if speed.size < 2 or np.any(np.diff(speed) <= 0.0) or speed[0] <= 0.0 or np.any(coefficient == 0.0):
-        problem = "no table of vibrations over speeds"
-        allowed = "two speeds or more, each once, none of them zero"
-        raise SceneError([data_fault(table.file, "", problem, allowed=allowed)])
-    return InfluenceTable(source=table.file, speed=speed, coefficient=coefficient)
-
-
-def _head_faults(
-    table: Table, heads: Mapping[str, tuple[str, str]], columns: tuple[str, ...]
-) -> Iterator[Fault]:
+    cartesian = "real" in heads
+    columns = ("speed", *(_CARTESIAN if cartesian else _POLAR))
+    sign_key = "convention" if cartesian else "angle"
+    signs = ("exp(+jwt)", "exp(-jwt)") if cartesian else ("lag", "lead")
+    wrong, values = [], {}
     for name in columns:
         if name not in heads:
             problem = f'there is no column "{name}"'
             allowed = "speed with amplitude and angle, or speed with real and imaginary, each with its unit"
-            yield data_fault(table.file, f"line {table.head_line}", problem, allowed=allowed)
-
-
-def _header_faults(table: Table, sign_key: str) -> Iterator[Fault]:
-    signs = ("exp(+jwt)", "exp(-jwt)") if sign_key == "convention" else ("lag", "lead")
-    for key, allowed in (("vibration", tuple(_AMPLITUDES)), (sign_key, signs)):
-        if table.header.get(key) not in allowed:
+            wrong.append(data_fault(file, f"line {table.head_line}", problem, allowed=allowed))
+    for key, words in (("vibration", tuple(_AMPLITUDES)), (sign_key, signs)):
+        if table.header.get(key) not in words:
             value = "" if key not in table.header else repr(table.header[key])
             problem = f"the file does not say what its numbers mean, such as {_EXAMPLE}"
-            yield data_fault(table.file, key, problem, value=value, allowed=" or ".join(allowed))
+            wrong.append(data_fault(file, key, problem, value=value, allowed=" or ".join(words)))
+    for name in columns if not wrong else ():
+        head, unit = heads[name]
+        values[name], bad = table.values(head, unit, _DIMENSIONS[name])
+        wrong += bad
+    if wrong:
+        raise SceneError(wrong)
+    sign, factor = _SIGNS[str(table.header[sign_key])], _AMPLITUDES[str(table.header["vibration"])]
+    first, second = (values[name] for name in columns[1:])
+    coefficient = factor * (first + 1j * sign * second if cartesian else first * np.exp(1j * sign * second))
+    order = np.argsort(values["speed"])
+    speed, coefficient = values["speed"][order], np.asarray(coefficient, dtype=np.complex128)[order]
+    if speed.size < 2 or np.any(np.diff(speed) <= 0.0) or speed[0] <= 0.0 or np.any(coefficient == 0.0):
+        problem = "no table of vibrations over speeds"
+        allowed = "two speeds or more, each once, none of them zero"
+        raise SceneError([data_fault(file, "", problem, allowed=allowed)])
+    return InfluenceTable(source=file, speed=speed, coefficient=coefficient)

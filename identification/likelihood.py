@@ -275,16 +275,14 @@ class Residuals:
         """Of numbers of the data, without what b and n can take up, shape (n + held, ...)."""
         scaled = self.scale[:, None] * columns if columns.ndim == 2 else self.scale * columns
         below = np.zeros((self.held.shape[1], *columns.shape[1:]))
-        return self._without_linear(np.concatenate([scaled, below]))
-
-    def _without_linear(self, full: FloatArray) -> FloatArray:
+        full = np.concatenate([scaled, below])
         return np.asarray(full - self.base @ (self.base.T @ full))
 
     def at(self, t: FloatArray, *, predicted: FloatArray | None = None) -> FloatArray:
         """Residuals and priors."""
         found = self.problem.at(t) if predicted is None else predicted
         full = np.concatenate([self.scale * (self.problem.measured - found), -self.pulled])
-        return np.concatenate([self._without_linear(full), self.problem.priors(t)])
+        return np.concatenate([full - self.base @ (self.base.T @ full), self.problem.priors(t)])
 
     def slopes(self, t: FloatArray, of_prediction: FloatArray) -> FloatArray:
         """d(residuals)/dt. Args: `of_prediction`: d(L^-1 f)/dt."""

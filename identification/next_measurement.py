@@ -6,7 +6,7 @@ data.  Their noise is that of the fit; a kind that was not measured has an assum
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Final
@@ -16,10 +16,10 @@ import numpy as np
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block, Problem
+from ringbalance.identification.likelihood import Block
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, kinds_of
-from ringbalance.results.rows import Value, text_of
+from ringbalance.results.rows import text_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene
 
@@ -45,13 +45,11 @@ class NextMeasurement:
     def text(self) -> str:
         """One sentence."""
         best = self.gains[0]
-        told: dict[str, Value] = {"parameter": self.parameter}
         if best.ratio > _AT_ALL:
-            return text_of("no_measurement_narrows", **told)
-        told |= {"candidate": best.candidate, "share": best.ratio}
-        if best.ratio > _WORTHWHILE:
-            return text_of("best_narrows_little", **told)
-        return text_of("measurement_narrows" if best.ratio else "measurement_bounds", **told)
+            return text_of("no_measurement_narrows", parameter=self.parameter)
+        code = "measurement_narrows" if best.ratio else "measurement_bounds"
+        code = "best_narrows_little" if best.ratio > _WORTHWHILE else code
+        return text_of(code, parameter=self.parameter, candidate=best.candidate, share=best.ratio)
 
 
 def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement:
@@ -59,29 +57,21 @@ def next_measurement(result: FitResult, parameter: str | None = None) -> NextMea
 
     Raises: KeyError: the parameter was not fitted.
     """
-    names = [each.name for each in result.parameters]
-    chosen = parameter or _least_identified(result)
-    result.parameter(chosen)
-    which, slopes = names.index(chosen), np.concatenate(result.optimum.of_all)
-    information = slopes.T @ slopes
-    gains = _expected_gains(information, parameter=which, candidates=_candidates(result))
-    return NextMeasurement(parameter=chosen, gains=gains)
-
-
-def _least_identified(result: FitResult) -> str:
-    """Not identified before identified, and the widest interval in the parameters' own scales."""
-
-    def key(which: int) -> tuple[int, float]:
-        each = result.parameters[which]
-        return list(Identified).index(each.verdict), each.profile.high - each.profile.low
-
-    return result.parameters[max(range(len(result.parameters)), key=key)].name
+    order = list(Identified)
+    # Not identified before identified, and the widest interval in the parameters' own scales.
+    least = max(result.parameters, key=lambda p: (order.index(p.verdict), p.profile.high - p.profile.low))
+    chosen = result.parameter(parameter or least.name)
+    slopes = np.concatenate(result.optimum.of_all)
+    gains = _expected_gains(
+        slopes.T @ slopes, parameter=result.parameters.index(chosen), candidates=_candidates(result)
+    )
+    return NextMeasurement(parameter=chosen.name, gains=gains)
 
 
 def _candidates(result: FitResult) -> Iterator[Candidate]:
     """Rows of every kind with derivatives in the columns of `Optimum.of_all`."""
     best = result.optimum
-    problem, t = best.residuals.problem, best.t
+    problem, residuals, t = best.residuals.problem, best.residuals, best.t
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
     offered = [
         _offered_rows(scene, kind, measured[kind].observations if kind in measured else None)
@@ -90,52 +80,31 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
     asked = replace(problem, blocks=tuple(Block(observations=each) for each in offered if len(each)))
     changed = [(problem.scene, inputs_of(problem.scene).changed(n, sd)) for n, sd in result.held.items()]
     by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
+    ends = np.cumsum([0, *(each.free.shape[1] for each in problem.blocks)])
     for block, mine in asked.rows:
-        count = len(block.observations)
-        before = measured.get(block.observations.kind)
-        free = _free(problem, before, block)
-        rows = np.hstack([by_parameters[mine], free, by_held[mine]])
-        scale = 1 / _noise(result, before, block, asked.at(t)[mine])
+        count, size = len(block.observations), block.measured.size
+        before, noise = measured.get(block.observations.kind), 1.0
+        free = np.zeros((size, problem.free.shape[1]))
+        for each, at in zip(problem.blocks, ends.tolist(), strict=False):
+            if each is before and each.free.shape[1]:
+                # Candidates join the first series of their kind.
+                first = np.unique(each.observations.series) == each.observations.series[0]
+                columns = np.kron(np.eye(2), np.tile(first.astype(np.float64), (count, 1)))
+                free[:, at : at + each.free.shape[1]] = columns
+        if before is None:
+            parts = np.reshape(asked.at(t)[mine], (-1, count))
+            noise = _ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300)
+        elif before.estimated:
+            noise = float(residuals.noise[problem.estimated_groups.index(before.group)])
+        rows = np.hstack([by_parameters[mine], free, by_held[mine]]) / noise
         assumed = "" if before is not None else f" (noise of {100 * _ASSUMED_NOISE:g} % assumed)"
         for i in range(count):
-            yield Candidate(
-                text=f"{_words_of(block.observations, i)}{assumed}",
-                derivatives=scale[i::count, None] * rows[i::count],
-            )
-
-
-def _noise(result: FitResult, measured: Block | None, block: Block, predicted: FloatArray) -> FloatArray:
-    """Standard deviation of each whitened number of the candidates."""
-    size = block.measured.size
-    residuals = result.optimum.residuals
-    if measured is None:
-        parts = np.reshape(predicted, (-1, len(block.observations)))
-        return np.full(size, _ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300))
-    if not measured.estimated:
-        return np.ones(size)
-    return np.full(size, residuals.noise[residuals.problem.estimated_groups.index(measured.group)])
-
-
-def _free(problem: Problem, measured: Block | None, block: Block) -> FloatArray:
-    """Effect of what is fitted beside the parameters: candidates join the first series of their kind."""
-    found = np.zeros((block.measured.size, problem.free.shape[1]))
-    at = 0
-    for each in problem.blocks:
-        width = each.free.shape[1]
-        if each is measured and width:
-            first = _first_series(each)
-            found[:, at : at + width] = np.kron(np.eye(2), np.tile(first, (len(block.observations), 1)))
-        at += width
-    return found
-
-
-def _first_series(block: Block) -> FloatArray:
-    names = np.unique(block.observations.series)
-    return np.asarray(names == block.observations.series[0], dtype=np.float64)
+            text = f"{_words_of(block.observations, i)}{assumed}"
+            yield Candidate(text=text, derivatives=rows[i::count])
 
 
 def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
-    """All rows of a kind's grid, each a series of its own; what is measured is that of the data's middle."""
+    """All rows of a kind's grid, each a series of its own."""
     grid = dict(KINDS[kind].offers(scene))
     if measured is not None:
         for name in ("gas_time", "pressure_difference", "unbalance", "voltage"):
@@ -146,7 +115,12 @@ def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> 
     rows = list(product(*grid.values()))
     count = len(rows)
     columns = {name: np.array([row[i] for row in rows]) for i, name in enumerate(grid)}
-    middles, widths = _middles(kind, measured)
+    # What is not set is that of the data's middle, or one where nothing was measured.
+    named = {c.name for c in KINDS[kind].columns if c.measured or c.amplitude}
+    middles, widths = dict.fromkeys(named - {"mass"}, 1.0), {}
+    if measured is not None:
+        middles = {name: float(np.median(v)) for name, v in measured.columns.items() if name in named}
+        widths = {name: float(np.median(v)) for name, v in measured.uncertainty.items()}
     return Observations(
         kind=kind,
         file="",
@@ -156,17 +130,6 @@ def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> 
         columns={name: np.full(count, value) for name, value in middles.items() if name not in columns}
         | columns,
         uncertainty={name: np.full(count, width) for name, width in widths.items()},
-    )
-
-
-def _middles(kind: str, measured: Observations | None) -> tuple[Mapping[str, float], Mapping[str, float]]:
-    """Middle of every measured column and of its uncertainty; one where nothing was measured."""
-    named = {c.name for c in KINDS[kind].columns if c.measured or c.amplitude}
-    if measured is None:
-        return dict.fromkeys(named - {"mass"}, 1.0), {}
-    return (
-        {name: float(np.median(v)) for name, v in measured.columns.items() if name in named},
-        {name: float(np.median(v)) for name, v in measured.uncertainty.items()},
     )
 
 

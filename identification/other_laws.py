@@ -27,7 +27,14 @@ BROKEN: Final = "a column that separates at ambient pressure"
 _UNSPILT: Final = "a column that runs full without spilling first"
 _EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
 """Of the loss over the velocity, of those of these laws that are powers."""
-_OF_THE_CREST: Final = (UNBROKEN, BROKEN, _UNSPILT)
+_PATHS: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType(
+    {
+        UNBROKEN: {"hump_pressure": None},
+        BROKEN: {"vapour_pressure": 0.0, "released": 0.0},
+        _UNSPILT: {"froude_velocity": 0.0},
+    }
+)
+"""Values of the path that make the others, which mean something for a tube with a crest alone."""
 
 _WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
     {
@@ -58,8 +65,7 @@ def by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatA
     pressure = float(np.median(np.concatenate(pressures))) if pressures else scene.gas.pressure
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
     velocity = abs(float(flow.velocity)) or 1.0
-    # A tube without crest has no column to break.
-    for name in (*_EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST)):
+    for name in (*_EXPONENTS, *(() if law.path.hump_pressure is None else _PATHS)):
         models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
         predicted = []
         for block in problem.blocks:
@@ -77,9 +83,4 @@ def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedL
     """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
     if name in _EXPONENTS:
         return replace(law, heads=law.heads.power(velocity=velocity, exponent=_EXPONENTS[name]))
-    changed: dict[str, Any] = {
-        UNBROKEN: {"hump_pressure": None},
-        BROKEN: {"vapour_pressure": 0.0, "released": 0.0},
-        _UNSPILT: {"froude_velocity": 0.0},
-    }[name]
-    return replace(law, path=replace(law.path, **changed))
+    return replace(law, path=replace(law.path, **_PATHS[name]))

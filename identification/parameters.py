@@ -27,8 +27,7 @@ from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.errors import Uncertainty, model_uncertainties, with_places
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.fitted import CREST_ERROR, MODEL
-from ringbalance.scene.models import Disc, Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import (
     NORMAL_95,
@@ -95,28 +94,44 @@ class Parameter:
         Raises: FitError: no such quantity, or one that the scene gives no value to start from.
         """
         if name in START:
-            return _of_start(scene, name)
+            # Of the vibration without trial weight nothing is known beforehand.
+            start, is_angle = float(getattr(scene.rotor, name)), name == "initial_phase"
+            ends = (start - math.pi, start + math.pi) if is_angle else (start / _FAR, start * _FAR)
+            return cls(
+                name=name,
+                symbol=name,
+                start=start,
+                lowest=ends[0],
+                highest=ends[1],
+                prior=None,
+                scale=1.0 if is_angle else None,
+                change=partial(_with_start, name),
+            )
         if name not in UNCERTAIN_QUANTITIES:
             raise FitError.unknown(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
-        if scene.disc.geometry is not None and name in SHAPE:
+        path, disc = path_of(name), scene.disc
+        if disc.geometry is not None and name in SHAPE:
             raise FitError(f"{name} follows from the mesh of the chamber; fit lambda_factor in its place")
         value = nominal_value(scene=scene, quantity=name)
-        start = _NATURAL.get(name) if value is None else value
-        if start is None:
-            raise FitError(
-                f"the scene has no {UNCERTAIN_QUANTITIES[name]}.{name}: give a value to start from to fit it"
-            )
-        width = half_widths(scene).get(name)
-        by_geometry = width is None and name == "lambda_factor"
-        width = start * _geometry_width(scene.disc) if by_geometry else width
-        (offset, gain), scale = _loss_scale(scene, name), _scale(scene, name)
-        if offset == 0 and scale is None and start <= 0:
-            raise FitError(f"{UNCERTAIN_QUANTITIES[name]}.{name} is zero: give a value above zero to fit it")
-        low, high = _range(scene, name, start, offset)
+        if value is None and name == "lambda_factor":
+            value = 1.0
+        if value is None:
+            raise FitError(f"the scene has no {path}: give a value to start from to fit it")
+        width, by_geometry = half_widths(scene).get(name), False
+        if width is None and name == "lambda_factor":
+            # That of a mesh has facets, too.
+            facets = drawing_shares(disc, np.array([disc.initial_fill])).moment
+            width, by_geometry = value * math.hypot(_GEOMETRY, float(facets[0])), True
+        (offset, gain), ambient = _loss_scale(scene, name), scene.gas.ambient_pressure
+        linear = {"lag_angle": 1.0, "hump_position": 1.0}
+        scale = (linear | {"vapour_pressure": ambient, "ambient_pressure": ambient}).get(name)
+        if offset == 0 and scale is None and value <= 0:
+            raise FitError(f"{path} is zero: give a value above zero to fit it")
+        low, high = _range(scene, name, value, offset)
         return cls(
             name=name,
             symbol=_SYMBOLS.get(name, name),
-            start=start,
+            start=value,
             lowest=low,
             highest=high,
             prior=None if width is None else width / NORMAL_95,
@@ -128,8 +143,6 @@ class Parameter:
         )
 
 
-_NATURAL: Final[Mapping[str, float]] = {"lambda_factor": 1.0}
-"""Start of quantities that a scene need not give."""
 _SYMBOLS: Final = {
     "lambda_factor": "lambda",
     "drag_coefficient": "(k + 1)",
@@ -151,37 +164,12 @@ that no key has, liquid in the legs of the tube, and gravity, which `calibrate` 
 discs. Tolerances of the dimensions are inputs of their own, and in all intervals."""
 
 
-def _geometry_width(disc: Disc) -> float:
-    """Relative expanded uncertainty (95 %) of lambda by the geometry; that of a mesh has facets, too."""
-    facets = drawing_shares(disc, np.array([disc.initial_fill])).moment
-    return math.hypot(_GEOMETRY, float(facets[0]))
-
-
 def _with_quantity(name: str, scene: Scene, value: float) -> Scene:
     return with_value(scene=scene, quantity=name, value=value)
 
 
 def _with_start(name: str, scene: Scene, value: float) -> Scene:
     return replace(scene, rotor=replace(scene.rotor, **{name: value}))
-
-
-def _of_start(scene: Scene, name: str) -> Parameter:
-    """Amplitude or phase of the vibration without trial weight, of which nothing is known beforehand."""
-    start = float(getattr(scene.rotor, name))
-    if name == "initial_amplitude":
-        ends, scale = (start / _FAR, start * _FAR), None
-    else:
-        ends, scale = (start - math.pi, start + math.pi), 1.0
-    return Parameter(
-        name=name,
-        symbol=name,
-        start=start,
-        lowest=ends[0],
-        highest=ends[1],
-        prior=None,
-        scale=scale,
-        change=partial(_with_start, name),
-    )
 
 
 def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
@@ -201,32 +189,15 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
     if speeds[1] <= 0 or speeds[0] <= speeds[1]:
         return 1.0, 1.0
     apart = _LOSS_STEP / (-2 * math.log(speeds[1] / speeds[0]))
-    law_loss = _driving_head(scene) * 2 / speeds[0] ** 2
-    return apart - here, law_loss / apart
-
-
-def _driving_head(scene: Scene) -> float:
-    """H at equal fills, m^2/s^2."""
-    fill = scene.disc.initial_fill
-    law = Device.of(scene, Models.of(scene)).law
+    fill, law = scene.disc.initial_fill, Device.of(scene, Models.of(scene)).law
     ends = law.ends(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure)
-    return float(driving_pressure(law.path, ends)) / scene.liquid.density
-
-
-def _scale(scene: Scene, name: str) -> float | None:
-    """Of a linear parameter."""
-    return {
-        "lag_angle": 1.0,
-        "hump_position": 1.0,
-        "vapour_pressure": scene.gas.ambient_pressure,
-        "ambient_pressure": scene.gas.ambient_pressure,
-    }.get(name)
+    head = float(driving_pressure(law.path, ends)) / scene.liquid.density
+    return apart - here, head * 2 / speeds[0] ** 2 / apart
 
 
 def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float, float]:
     """Smallest and largest value that the scene's rules allow, or within reach of the start."""
-    tube, disc = scene.tube, scene.disc
-    ambient = scene.gas.ambient_pressure
+    tube, disc, ambient = scene.tube, scene.disc, scene.gas.ambient_pressure
     fixed = {
         "lag_angle": (start - math.pi, start + math.pi),
         "hump_position": (0.02, 0.98),
@@ -310,27 +281,18 @@ class _SceneInputs:
         return {name: sd for name, sd in widths.items() if sd} | dict.fromkeys(self.errors, 1.0)
 
     def changed(self, name: str, change: float) -> SceneFile:
-        """The scene with one uncertain quantity changed, SI, or a model's error, in deviations."""
-        if name in self.errors:
-            return self.errors[name].moved(liquid_ring_scene(self.scene), change)
-        return self._moved(name, change)
+        """The scene with one uncertain quantity changed, SI, as far as a device can have it.
 
-    def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
-        """The scene with one of these lower and higher by a change, as far as a device can have it."""
-        error = self.errors.get(name)
-        # Errors of models are nearly linear, and there are many, but a crest's arc has two different ends.
-        if error is None or error.group == f"{MODEL}{CREST_ERROR}":
-            return self.changed(name, -change), self.changed(name, change)
-        # All have the places of all, so that they differ in numbers alone.
-        scene = with_places(liquid_ring_scene(self.scene), self.errors.values())
-        return self.scene, error.moved(scene, change)
-
-    def _moved(self, name: str, change: float) -> SceneFile:
-        """The scene with one uncertain quantity changed, SI, as far as a device can have it."""
+        Of a model's error in its standard deviations.
+        """
         given = self.inputs[name]
         lowest = -math.inf if given.unit == _ANGLE else 0.1 * given.value
         moved: SceneFile = with_values_at(self.scene, {name: max(given.value + change, lowest)})
         return moved
+
+    def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
+        """The scene with one of these lower and higher by a change; or as it is, where one side will do."""
+        return self.changed(name, -change), self.changed(name, change)
 
 
 class _LiquidRing(_SceneInputs):
@@ -360,8 +322,18 @@ class _LiquidRing(_SceneInputs):
     def parameter(self, name: str) -> Parameter:
         return Parameter.of(self.scene, name)
 
-    def _moved(self, name: str, change: float) -> SceneFile:
+    def changed(self, name: str, change: float) -> SceneFile:
+        if name in self.errors:
+            return self.errors[name].moved(self.scene, change)
         return shifted(scene=self.scene, quantity=name, change=change)
+
+    def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
+        error = self.errors.get(name)
+        # Errors of models are nearly linear, and there are many, but a crest's arc has two different ends.
+        if error is None or error.group == f"{MODEL}{CREST_ERROR}":
+            return super().both_sides(name, change)
+        # All have the places of all, so that they differ in numbers alone.
+        return self.scene, error.moved(with_places(self.scene, self.errors.values()), change)
 
 
 _INPUTS: Final[Mapping[str, type[_SceneInputs]]] = {Scene.balancer: _LiquidRing}

@@ -8,7 +8,6 @@ new kind is one entry in the module of its balancer, or of test benches.
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -55,34 +54,29 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -
     Raises: SceneError: all that is wrong with any of the files, each error with line and column.
     """
     faults: list[Fault] = []
-    found = []
+    found: list[Observations] = []
     for path in paths:
         content, wrong = read_content(path)
         if not wrong:
             observations, wrong = observations_of(content, file=file_name(path), scene=scene)
             found += [observations] if observations else []
         faults += in_order(wrong)
-    faults += [*_given_twice(found), *_known_already(found, scene)]
-    if faults:
-        raise SceneError(faults)
-    return tuple(found)
-
-
-def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
     first: dict[str, str] = {}
     for each in found:
         if each.sha256 in first:
-            yield data_fault(each.file, "", f"it has the same content as {first[each.sha256]}; give it once")
+            problem = f"it has the same content as {first[each.sha256]}; give it once"
+            faults.append(data_fault(each.file, "", problem))
         first.setdefault(each.sha256, each.file)
-
-
-def _known_already(found: Iterable[Observations], scene: AnyScene | None) -> Iterator[Fault]:
-    """Files that the scene was fitted to: its [uncertainty] has what they say."""
+    # The [uncertainty] of a scene that was fitted to a file has what it says.
+    known = set() if scene is None else {file.sha256 for file in scene.measured.files}
     for each in found:
-        if scene is not None and each.sha256 in {known.sha256 for known in scene.measured.files}:
+        if scene is not None and each.sha256 in known:
             problem = f"{scene.file} was fitted to this file already, so that it would count twice"
             allowed = "the scene as it was before, with all files together"
-            yield data_fault(each.file, "", problem, allowed=allowed)
+            faults.append(data_fault(each.file, "", problem, allowed=allowed))
+    if faults:
+        raise SceneError(faults)
+    return tuple(found)
 
 
 def observations_of(
@@ -164,34 +158,28 @@ def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
 def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
     known = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
     yield from table.name_faults(known)
+    names = set()
     for head in table.heads:
         name, unit = split_head(head) or ("", "")
-        yield from _one_head(table, head, name, unit, kind, known)
-    names = {(split_head(head) or ("", ""))[0] for head in table.heads}
+        names.add(name)
+        column = kind.column(name)
+        try:
+            if column is None and name in kind.texts and unit:
+                raise FieldError("a column of text has no unit", name)
+            if column is None and name not in kind.texts and name.replace("_", "").islower():
+                problem = f"a file of this kind has no such column{did_you_mean(name, known)}"
+                raise FieldError(problem, ", ".join(known))
+            if column is not None and column.dimension is not None:
+                parse_quantity(f"1 {unit}", column.dimension)
+            elif column is not None and unit and unit != "%":
+                raise FieldError("this column has no unit", f"{name}, or {name} [%]")
+        except FieldError as error:
+            yield table.head_fault(head, error.problem, error.allowed)
     yield from _missing(table, kind, names)
 
 
-def _one_head(
-    table: Table, head: str, name: str, unit: str, kind: Kind, known: Iterable[str]
-) -> Iterator[Fault]:
-    column = kind.column(name)
-    if column is None:
-        if name not in kind.texts and name.replace("_", "").islower():
-            problem = f"a file of this kind has no such column{did_you_mean(name, known)}"
-            yield table.head_fault(head, problem, ", ".join(known))
-        elif name in kind.texts and unit:
-            yield table.head_fault(head, "a column of text has no unit", name)
-        return
-    try:
-        if column.dimension is not None:
-            parse_quantity(f"1 {unit}", column.dimension)
-        elif unit and unit != "%":
-            raise FieldError("this column has no unit", f"{name}, or {name} [%]")
-    except FieldError as error:
-        yield table.head_fault(head, error.problem, error.allowed)
-
-
 def _missing(table: Table, kind: Kind, names: set[str]) -> Iterator[Fault]:
+    """Columns that a file of a kind needs and has not."""
     place = f"line {table.head_line}"
     needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
     for column in needed:
@@ -216,20 +204,15 @@ def _columns(table: Table, kind: Kind) -> tuple[dict[str, FloatArray], list[Faul
             continue
         dimension = "share" if unit == "%" and column.dimension is None else column.dimension
         columns[name], wrong = table.values(head, unit, dimension)
-        bad = {fault.key for fault in wrong}
-        faults += wrong + [
-            fault for fault in _range_faults(table, head, column, columns[name]) if fault.key not in bad
-        ]
+        faults += wrong
+        bad, rows = {fault.key for fault in wrong}, zip(table.lines, table.texts(head), strict=True)
+        for (line, cell), value in zip(rows, columns[name].tolist(), strict=True):
+            try:
+                column.check(value)
+            except FieldError as error:
+                fault = table.fault(line, head, cell, error.problem, error.allowed)
+                faults += [] if fault.key in bad else [fault]
     return columns, faults
-
-
-def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -> Iterator[Fault]:
-    cells = table.texts(head)
-    for line, cell, value in zip(table.lines, cells, values.tolist(), strict=True):
-        try:
-            column.check(value)
-        except FieldError as error:
-            yield table.fault(line, head, cell, error.problem, error.allowed)
 
 
 def _faults_of_scene(
@@ -255,10 +238,9 @@ def _faults_of_scene(
 
 def _repeated(table: Table) -> Iterator[Fault]:
     """Rows that stand twice: as evidence they would count twice."""
-    counted = Counter(table.rows)
     first: dict[tuple[str, ...], int] = {}
     for line, row in zip(table.lines, table.rows, strict=True):
-        if counted[row] > 1 and first.setdefault(row, line) != line:
+        if first.setdefault(row, line) != line:
             problem = (
                 f"the row is the same as line {first[row]}; remove it, or tell the two apart in a column "
                 '"note" where it was measured again'
@@ -279,45 +261,46 @@ def _stated_uncertainty(
     A column `uncertainty_<name>` comes before a column `uncertainty`, that before the key of the first lines.
     A relative uncertainty of a vibration is that of both its components, so that its phase has it in radians.
     """
-    measured = [column for column in kind.measured if column.name in columns]
+    measured = {column.name: column for column in kind.measured if column.name in columns}
     result, faults = _of_header(table, kind, columns, measured)
     if _UNCERTAINTY in columns:
-        result = {
-            column.name: columns[_UNCERTAINTY] * _size(kind, columns, column.name) for column in measured
-        }
-    own = {column.name: columns.get(f"{_UNCERTAINTY}_{column.name}") for column in measured}
-    result |= {name: width for name, width in own.items() if width is not None}
-    return result, [*faults, *_of_zero(table, columns, result), *_partial(table, kind, result)]
+        result = {name: columns[_UNCERTAINTY] * _size(kind, columns, name) for name in measured}
+    stated = {name: columns.get(f"{_UNCERTAINTY}_{name}") for name in measured}
+    result |= {name: width for name, width in stated.items() if width is not None}
+    # A relative uncertainty of a value of zero says that the value is exact.
+    for name, width in result.items():
+        for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
+            if value == 0 and each == 0:
+                problem = f"{name} is 0 there, so its uncertainty cannot be relative"
+                allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
+                faults.append(data_fault(table.file, f"line {line}", problem, allowed=allowed))
+    # The noise of vibrations is given or estimated, all amplitudes of a file alike.
+    missing = [column.name for column in kind.measured if column.amplitude and column.name not in result]
+    if result and missing:
+        problem = f"stated of {', '.join(result)} and not of {', '.join(missing)}"
+        allowed = "of every amplitude, or of nothing"
+        faults.append(data_fault(table.file, _UNCERTAINTY, problem, allowed=allowed))
+    return result, faults
 
 
 def _of_header(
-    table: Table, kind: Kind, columns: Mapping[str, FloatArray], measured: Iterable[Column]
+    table: Table, kind: Kind, columns: Mapping[str, FloatArray], measured: Mapping[str, Column]
 ) -> tuple[dict[str, FloatArray], list[Fault]]:
-    stated = table.header.get(_UNCERTAINTY)
+    """What the first lines state: one share for all measured columns, or of each its own."""
+    stated, result, faults = table.header.get(_UNCERTAINTY), {}, []
     if stated is None:
         return {}, []
-    if isinstance(stated, Mapping):
-        return _by_column(table, stated, columns, {column.name: column for column in measured})
-    try:
-        width = _RELATIVE.read(stated)
-    except FieldError as error:
-        allowed = (
-            'a share of the measured values such as "2 %" or 0.02 (95 %), or by column: '
-            '{ amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
-        )
-        value = toml_text(stated)
-        return {}, [data_fault(table.file, _UNCERTAINTY, error.problem, value=value, allowed=allowed)]
-    return {column.name: width * _size(kind, columns, column.name) for column in measured}, []
-
-
-def _by_column(
-    table: Table,
-    stated: Mapping[str, object],
-    columns: Mapping[str, FloatArray],
-    measured: Mapping[str, Column],
-) -> tuple[dict[str, FloatArray], list[Fault]]:
-    result: dict[str, FloatArray] = {}
-    faults = []
+    if not isinstance(stated, Mapping):
+        try:
+            share_of_all = _RELATIVE.read(stated)
+        except FieldError as error:
+            allowed = (
+                'a share of the measured values such as "2 %" or 0.02 (95 %), or by column: '
+                '{ amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
+            )
+            value = toml_text(stated)
+            return {}, [data_fault(table.file, _UNCERTAINTY, error.problem, value=value, allowed=allowed)]
+        return {name: share_of_all * _size(kind, columns, name) for name in measured}, []
     for name, value in stated.items():
         try:
             if name not in measured:
@@ -329,10 +312,8 @@ def _by_column(
             if not width > 0:
                 raise FieldError("an uncertainty is above zero", "leave it out where it is to be estimated")
         except FieldError as error:
-            place = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}"
-            faults.append(
-                data_fault(table.file, place, error.problem, value=toml_text(value), allowed=error.allowed)
-            )
+            place, text = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}", toml_text(value)
+            faults.append(data_fault(table.file, place, error.problem, value=text, allowed=error.allowed))
             continue
         result[name] = width * (np.abs(columns[name]) if relative else np.ones_like(columns[name]))
     return result, faults
@@ -342,26 +323,6 @@ def _size(kind: Kind, columns: Mapping[str, FloatArray], name: str) -> FloatArra
     """What a relative uncertainty refers to: the value, or one radian for the phase of a vibration."""
     of_vibration = name.startswith("phase") and kind.has_amplitudes
     return np.ones_like(columns[name]) if of_vibration else np.abs(columns[name])
-
-
-def _of_zero(
-    table: Table, columns: Mapping[str, FloatArray], uncertainty: Mapping[str, FloatArray]
-) -> Iterator[Fault]:
-    """A relative uncertainty of a value of zero says that the value is exact."""
-    for name, width in uncertainty.items():
-        for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
-            if value == 0 and each == 0:
-                problem = f"{name} is 0 there, so its uncertainty cannot be relative"
-                allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
-                yield data_fault(table.file, f"line {line}", problem, allowed=allowed)
-
-
-def _partial(table: Table, kind: Kind, uncertainty: Mapping[str, FloatArray]) -> Iterator[Fault]:
-    """The noise of vibrations is given or estimated, all amplitudes of a file alike."""
-    missing = [column.name for column in kind.measured if column.amplitude and column.name not in uncertainty]
-    if uncertainty and missing:
-        problem = f"stated of {', '.join(uncertainty)} and not of {', '.join(missing)}"
-        yield data_fault(table.file, _UNCERTAINTY, problem, allowed="of every amplitude, or of nothing")
 
 
 AMPLITUDES: Final[Mapping[str, float]] = MappingProxyType(
@@ -386,38 +347,33 @@ def template(name: str) -> str:
         problem, allowed = f"there is no such kind of data{did_you_mean(name, KINDS)}", ", ".join(KINDS)
         raise SceneError.of_option(option="--template", value=name, problem=problem, allowed=allowed)
     kind = KINDS[name]
-    needed = [column for column in kind.columns if not column.optional and not _is_other(column, kind)]
-    heads = [*(["chamber"] if kind.has_chamber else []), *(column.head for column in needed), "series"]
-    return "\n".join([*_first_lines(name, kind), "##", *_explained(kind), ",".join(heads)]) + "\n"
-
-
-def _is_other(column: Column, kind: Kind) -> bool:
-    """Whether it may stand in place of a column that the template has."""
-    return column.name in kind.one_of[1:]
-
-
-def _first_lines(name: str, kind: Kind) -> Iterator[str]:
-    yield f'# kind = "{name}"  # {kind.title}'
-    yield '# source = ""  # rig, run and date'
-    if not kind.balancer:
-        yield "# uncertainty = 0.02  # expanded (95 %), relative to the measured values"
-        return
+    # Of columns of which a file has one, the template has the first.
+    others = kind.one_of[1:]
+    lines = [f'# kind = "{name}"  # {kind.title}', '# source = ""  # rig, run and date']
     amplitudes = [column for column in kind.measured if column.amplitude]
-    if amplitudes:
-        yield f'# amplitude = ""  # {", ".join(AMPLITUDES)}: how every amplitude in the file is counted'
-    measured = amplitudes or [column for column in kind.measured if not _is_other(column, kind)]
-    stated = ", ".join(f'{column.name} = "1 {column.unit}"' for column in measured)
-    yield f"## uncertainty = {{ {stated} }}  # expanded (95 %), or relative such as 0.02; absent: estimated"
-
-
-def _explained(kind: Kind) -> Iterator[str]:
-    """A line for each column that the file may have."""
+    if not kind.balancer:
+        lines.append("# uncertainty = 0.02  # expanded (95 %), relative to the measured values")
+    else:
+        if amplitudes:
+            words = ", ".join(AMPLITUDES)
+            lines.append(f'# amplitude = ""  # {words}: how every amplitude in the file is counted')
+        measured = amplitudes or [column for column in kind.measured if column.name not in others]
+        stated = ", ".join(f'{column.name} = "1 {column.unit}"' for column in measured)
+        meaning = "expanded (95 %), or relative such as 0.02; absent: estimated"
+        lines.append(f"## uncertainty = {{ {stated} }}  # {meaning}")
+    lines.append("##")
     if kind.has_chamber:
-        yield "## chamber: letter of the driven chamber, A for the first"
+        lines.append("## chamber: letter of the driven chamber, A for the first")
     for column in kind.columns:
-        word = "or " if _is_other(column, kind) else "optional " if column.optional else ""
-        yield f"## {word}{column.head}: {column.meaning}"
+        word = "or " if column.name in others else "optional " if column.optional else ""
+        lines.append(f"## {word}{column.head}: {column.meaning}")
     widths = ", ".join(column.name for column in kind.uncertainties() if column.dimension)
-    yield f"## optional {widths or 'uncertainty'}: expanded uncertainty (95 %) of each row"
-    yield "## series: run, rig or day that a row belongs to; rows in the order in which they were measured"
-    yield "## optional note: any remark; tells apart rows that are otherwise the same"
+    needed = [column for column in kind.columns if not column.optional and column.name not in others]
+    heads = [*(["chamber"] if kind.has_chamber else []), *(column.head for column in needed), "series"]
+    lines += [
+        f"## optional {widths or 'uncertainty'}: expanded uncertainty (95 %) of each row",
+        "## series: run, rig or day that a row belongs to; rows in the order in which they were measured",
+        "## optional note: any remark; tells apart rows that are otherwise the same",
+        ",".join(heads),
+    ]
+    return "\n".join(lines) + "\n"

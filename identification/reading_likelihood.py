@@ -196,7 +196,8 @@ class Comparison:
     def _changed(self, joint: Joint, i: int) -> _Rows | None:
         """Rows of a file that is read otherwise, as far as it can be; None where nothing can be predicted."""
         rows, problem = self.rows[i], self.problem
-        observations, settings = rows.block.observations, ()
+        observations = rows.block.observations
+        settings: tuple[str, ...] = ()
         for each in joint:
             changed = each.change(observations, problem.scene)
             if changed is not None:
@@ -295,15 +296,15 @@ def _settled(
     step, widths = inverse @ along, np.linalg.norm(inverse, axis=1)
     sizes = np.maximum(np.abs(np.diag(triangle)), 1e-12)
     whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in problem.blocks)
-    chance, i = 1.0, _place(problem, "lag_angle")
+    chance, place = 1.0, _place(problem, "lag_angle")
     # Probability that the lag lies between 0 and 180 degrees, unless the scene has it outside.
-    if i is not None and passive(problem.parameters[i].start):
-        lag = (float(t[i] + step[i]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
+    if place is not None and passive(problem.parameters[place].start):
+        lag = (float(t[place] + step[place]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
         vibrations = {b.group for b in problem.blocks if b.measured.size == 2 * len(b.observations)}
         named = zip(problem.estimated_groups, freedom.tolist(), strict=True)
         nu = min((each for name, each in named if name in vibrations), default=math.inf)
         nearer = min(lag, math.pi - lag)
-        inside, beyond = stdtr(min(nu, 1e9), np.array([nearer, nearer - math.pi]) / widths[i])
+        inside, beyond = stdtr(min(nu, 1e9), np.array([nearer, nearer - math.pi]) / widths[place])
         chance = max(float(inside - beyond), _LEAST_CHANCE)
     logs = 2 * float(np.sum(np.log(s))) + 2 * float(np.sum(np.log(sizes)))
     return float(rest @ rest) + logs - 2 * whitening - 2 * math.log(chance), step

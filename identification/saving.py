@@ -7,7 +7,7 @@ models of the tube; and, in [fitted], how uncertain all of these are together.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path, PurePath
@@ -16,12 +16,12 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.fitting import FitResult, FittedParameter
-from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.parameters import START, inputs_of, path_of
 from ringbalance.results.rows import text_of
 from ringbalance.scene.changes import document_of, file_text
 from ringbalance.scene.describe import usual_unit
+from ringbalance.scene.errors import MODEL_ERRORS, MODEL_KINDS
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT
 from ringbalance.scene.keys.schema import ORIGIN
@@ -65,21 +65,23 @@ def save_result(
         MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
         for each in data
     ]
-    texts = [
-        *(("residuals", each) for each in said),
-        *(("value", f"{each.name}: {doubt}") for each in result.parameters for doubt in each.doubts),
-        *(("value", each.text) for each in result.pulled),
-        *(("combination", _combination(each)) for each in result.combinations),
-        *(("correlation", each) for each in _correlations(result)),
+    texts = [("residuals", text) for text in said]
+    texts += [("value", f"{each.name}: {doubt}") for each in result.parameters for doubt in each.doubts]
+    texts += [("value", each.text) for each in result.pulled]
+    for product in result.combinations:
+        words = text_of("product_identified", product=product.text, uncertainty=product.relative_uncertainty)
+        texts.append(("combination", words))
+    for (i, first), (j, second) in combinations(enumerate(result.parameters), 2):
+        value = float(result.correlations[i, j])
+        if abs(value) > _TOGETHER:
+            words = text_of("errors_correlated", first=first.name, second=second.name, correlation=value)
+            texts.append(("correlation", words))
+    findings = [
+        MeasuredFinding(about=about, text=text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ...")
+        for about, text in texts
     ]
-    saved = _fitted_scene(
-        scene,
-        fitted=[each for each in result.parameters if each.name not in START],
-        files=files,
-        findings=[MeasuredFinding(about=about, text=_short(text)) for about, text in texts],
-        joint=_joint_entries(result),
-        found=result.scene,
-    )
+    fitted = [each for each in result.parameters if each.name not in START]
+    saved = _fitted_scene(scene, fitted=fitted, files=files, findings=findings, result=result)
     return write_whole(path, file_text(saved, to=path.parent))
 
 
@@ -89,21 +91,21 @@ def _fitted_scene(
     fitted: Sequence[FittedParameter],
     files: Sequence[MeasuredFile],
     findings: Sequence[MeasuredFinding] = (),
-    joint: Sequence[_JointEntry] = (),
-    found: AnyScene | None = None,
+    result: FitResult | None = None,
 ) -> AnyScene:
     """A scene with fitted values, their uncertainties and origins, checked as a file is.
 
-    Held inputs stay as stated where their fitted values make no scene, such as a wall inside the port.
-    Args: `joint`: what was fitted together. `found`: the scene that has the values of its held inputs.
+    Held inputs stay as stated where their fitted values make no scene, such as a wall inside the port: those
+    that the error names, else those of the disc, else all.
+    Args: `result`: with what was fitted together, and the scene that has the values of its held inputs.
     Raises: SceneError: the fitted values make no scene, such as a crest outside the port. ValueError: a path
         that no scene file has.
     """
-    pulled = list(joint)
+    pulled = {} if result is None else {name: _key(name) for name in result.held if name not in MODEL_ERRORS}
     while True:
         changes = _Changes(scene)
-        if found is not None and joint:
-            _put_joint(changes, joint, pulled, found)
+        if result is not None and result.joint.names:
+            _put_joint(changes, result, pulled)
         placed = [(changes.place(each.path), each) for each in fitted]
         for place, each in placed:
             changes.put(place, each.value, origin=each.origin)
@@ -114,16 +116,17 @@ def _fitted_scene(
         try:
             return scene.with_values(changes.whole())
         except SceneError as error:
-            pulled = _fewer(pulled, error)
+            keys = set(pulled.values())
+            suspects = ({fault.key for fault in error.faults}, set(SHAPE), keys)
+            suspected = next((each & keys for each in suspects if each & keys), None)
+            if suspected is None:
+                raise
+            pulled = {name: key for name, key in pulled.items() if key not in suspected}
 
 
-def _fewer(pulled: Sequence[_JointEntry], error: SceneError) -> list[_JointEntry]:
-    """Without those that the error names, else those of the disc, else all held ones. Raises: SceneError."""
-    everything = {each.key for each in pulled}
-    for suspected in ({fault.key for fault in error.faults}, set(SHAPE), everything):
-        if suspected & everything:
-            return [each for each in pulled if each.key not in suspected]
-    raise error
+def _key(name: str) -> str:
+    """Key of a quantity in its table."""
+    return path_of(name).split(".")[-1].split("[")[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,8 +150,7 @@ class _Place:
 
     def written(self, value: float) -> str | float:
         """A value, SI, as it stands in the file."""
-        number = self.number(value)
-        return number if self.dimension is None else f"{number!r} {self.unit}"
+        return self.number(value) if self.dimension is None else f"{self.number(value)!r} {self.unit}"
 
     def number(self, value: float) -> float:
         """A value, SI, in the unit."""
@@ -177,7 +179,7 @@ class _Changes:
         return value
 
     def place(self, path: str) -> _Place:
-        """The place of a path such as "tube.bore" or "masses.friction_arm[0]".
+        """Place of a path such as "tube.bore" or "masses.friction_arm[0]".
 
         Raises: ValueError: a scene file has no such value.
         """
@@ -188,13 +190,19 @@ class _Changes:
         table, key, entry = match.groups()
         dimension = schema.key_at((table, key)).takes.dimension
         by_table = table in schema.tables["uncertainty"].keys
+        here, unit = self.before(f"{table}.{key}"), ""
+        if dimension is not None:
+            # The unit that the file has there, else the one in which such a value is described.
+            first = here[0] if isinstance(here, list) and here else here
+            stated = unit_of(first) if isinstance(first, str) else ""
+            unit = stated or usual_unit(path) or DIMENSIONS[dimension].si_unit
         return _Place(
             table=table,
             key=key,
             entry=None if entry is None else int(entry),
             width=f"uncertainty.{table}.{key}" if by_table else f"uncertainty.{key}",
             dimension=dimension,
-            unit=_unit(self.before(f"{table}.{key}"), path, dimension),
+            unit=unit,
         )
 
     def put(self, place: _Place, value: float, *, origin: Origin) -> None:
@@ -217,129 +225,62 @@ class _Changes:
         return {**self.values, **origins}
 
 
-def _unit(here: object, path: str, dimension: str | None) -> str:
-    """The unit that the file has there, else the one in which such a value is described, else the SI unit."""
-    if dimension is None:
-        return ""
-    one = here[0] if isinstance(here, list) and here else here
-    stated = unit_of(one) if isinstance(one, str) else ""
-    return stated or usual_unit(path) or DIMENSIONS[dimension].si_unit
+def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) -> None:
+    """Write values of held inputs, corrections of models and the joint distribution.
 
-
-@dataclass(frozen=True, kw_only=True)
-class _JointEntry:
-    """One quantity that was fitted together with others."""
-
-    name: str
-    """As the fit names it."""
-    held: bool
-    """Whether it was not a parameter."""
-    standard_deviation: float
-    """SI; of an error of a model in its stated standard deviations."""
-    correlations: tuple[float, ...]
-    """With all of them, in their order."""
-
-    @property
-    def is_model(self) -> bool:
-        """Whether it is an error of a model and not a value."""
-        return self.name.startswith(MODEL)
-
-    @property
-    def path(self) -> str:
-        """As a scene file names it."""
-        return self.name if self.is_model else path_of(self.name)
-
-    @property
-    def key(self) -> str:
-        """In its table."""
-        return self.path.split(".")[-1].split("[")[0]
-
-
-def _joint_entries(result: FitResult) -> list[_JointEntry]:
-    """All that was fitted together and that a scene file has; both parts of every error of k.
-
-    A part that the data do not depend on is as uncertain as it was, and independent.
+    Of every error of k it holds both parts: one that the data do not depend on is as uncertain as it was, and
+    independent.
+    Args: `pulled`: held inputs whose values are written.
     """
-    names, size = result.joint.names, result.joint.deviations
+    names, size, found, values = result.joint.names, result.joint.deviations, result.scene, changes.values
     kept = [i for i, name in enumerate(names) if name not in START]
-    pairs = {
-        f"{MODEL}{match[1]}, {part}": None
-        for name in names
-        if (match := ERROR_NAME.fullmatch(name)) and match[2]
-        for part in _PARTS
-    }
+    causes = {match[1] for name in names if (match := ERROR_NAME.fullmatch(name)) and match[2]}
+    pairs = [f"{MODEL}{cause}, {part}" for cause in MODEL_KINDS if cause in causes for part in _PARTS]
     lacking = [name for name in pairs if name not in names]
-    whole = np.eye(len(kept) + len(lacking))
-    correlations = result.joint.covariance[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
-    whole[: len(kept), : len(kept)] = np.clip((correlations + correlations.T) / 2, -1.0, 1.0)
-    np.fill_diagonal(whole, 1.0)
-    everything = [*((names[i], float(size[i])) for i in kept), *((name, 1.0) for name in lacking)]
-    return [
-        _JointEntry(
-            name=name,
-            held=name in result.held or name in lacking,
-            standard_deviation=sd,
-            correlations=tuple(round(float(r), _DIGITS) for r in row),
+    deviations = {names[i]: float(size[i]) for i in kept} | dict.fromkeys(lacking, 1.0)
+    correlations = np.eye(len(deviations))
+    known = result.joint.covariance[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
+    correlations[: len(kept), : len(kept)] = np.clip((known + known.T) / 2, -1.0, 1.0)
+    np.fill_diagonal(correlations, 1.0)
+    quantities, inputs = [], inputs_of(found).inputs
+    for (name, sd), row in zip(deviations.items(), correlations.tolist(), strict=True):
+        path, unit, deviation = name, "", _rounded(sd)
+        if name not in MODEL_ERRORS:
+            path, place = path_of(name), changes.place(path_of(name))
+            unit, deviation = place.unit, place.difference(sd)
+            if name in pulled:
+                _put_held(changes, place, inputs[name].value, NORMAL_95 * sd)
+        quantities.append(
+            {
+                "quantity": path,
+                "unit": unit or NO_UNIT,
+                "standard_deviation": deviation,
+                "correlations": [round(each, _DIGITS) for each in row],
+            }
         )
-        for (name, sd), row in zip(everything, whole, strict=True)
-    ]
-
-
-def _put_joint(
-    changes: _Changes, joint: Sequence[_JointEntry], pulled: Sequence[_JointEntry], found: AnyScene
-) -> None:
-    """Values of held inputs, corrections and the joint distribution.
-
-    Args: `pulled`: those whose values are written. `found`: the scene that has them.
-    """
-    known = inputs_of(found).inputs
-    for each in pulled:
-        if each.held and not each.is_model:
-            _put_held(changes, changes.place(each.path), known[each.name].value, each.standard_deviation)
-    if any(each.is_model for each in joint):
-        _put_errors(changes, found)
-    if any(each.name == "pressure" for each in (*pulled, *(one for one in joint if not one.held))):
+    if any(name in MODEL_ERRORS for name in deviations):
+        sums: dict[str, dict[str, Any]] = {}
+        for error in liquid_ring_scene(found).tube.model_errors:
+            parts = sums.setdefault(error.cause, {"cause": error.cause, "even": 0.0, "odd": 0.0})
+            parts |= {"even": parts["even"] + error.even, "odd": parts["odd"] + error.odd}
+        if sums:
+            rounded = [each | {part: _rounded(each[part]) for part in _PARTS} for each in sums.values()]
+            values["tube.model_errors"] = rounded
+            changes.origins.setdefault("tube", {})["model_errors"] = "inferred"
+    if "pressure" in deviations and ("pressure" in pulled or "pressure" not in result.held):
         place = changes.place("gas.gauge_correction")
-        changes.values[place.path] = place.written(liquid_ring_scene(found).gas.gauge_correction)
-    places = [None if each.is_model else changes.place(each.path) for each in joint]
-    changes.values["fitted.quantities"] = [
-        {
-            "quantity": each.path,
-            "unit": NO_UNIT if place is None or not place.unit else place.unit,
-            "standard_deviation": place.difference(each.standard_deviation)
-            if place is not None
-            else _rounded(each.standard_deviation),
-            "correlations": list(each.correlations),
-        }
-        for place, each in zip(places, joint, strict=True)
-    ]
+        values[place.path] = place.written(liquid_ring_scene(found).gas.gauge_correction)
+    values["fitted.quantities"] = quantities
 
 
-def _put_held(changes: _Changes, place: _Place, value: float, size: float) -> None:
-    """A value that a fit has moved, and what is left of its uncertainty for whoever looks at it alone."""
+def _put_held(changes: _Changes, place: _Place, value: float, width: float) -> None:
+    """Write a value that a fit has moved, and the width that is left of it for whoever looks at it alone."""
     before = changes.before(place.path)
     here = before[place.entry] if place.entry is not None and isinstance(before, list) else before
     if here != place.written(value):
         changes.put(place, value, origin="inferred")
     if place.entry is None:
-        width = min(NORMAL_95 * size, abs(value)) if value else NORMAL_95 * size
-        changes.values[place.width] = place.written(width)
-
-
-def _put_errors(changes: _Changes, found: AnyScene) -> None:
-    """Corrections of models, one entry a cause."""
-    errors = liquid_ring_scene(found).tube.model_errors
-    sums = [
-        {
-            "cause": cause,
-            "even": _rounded(sum(each.even for each in errors if each.cause == cause)),
-            "odd": _rounded(sum(each.odd for each in errors if each.cause == cause)),
-        }
-        for cause in dict.fromkeys(each.cause for each in errors)
-    ]
-    if sums:
-        changes.values["tube.model_errors"] = sums
-        changes.origins.setdefault("tube", {})["model_errors"] = "inferred"
+        changes.values[place.width] = place.written(min(width, abs(value)) if value else width)
 
 
 def _put_widths(
@@ -367,23 +308,6 @@ def _put_widths(
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
-
-
-def _combination(found: Combination) -> str:
-    return text_of("product_identified", product=found.text, uncertainty=found.relative_uncertainty)
-
-
-def _correlations(result: FitResult) -> Iterator[str]:
-    names = [each.name for each in result.parameters]
-    for i, j in combinations(range(len(names)), 2):
-        value = float(result.correlations[i, j])
-        if abs(value) > _TOGETHER:
-            yield text_of("errors_correlated", first=names[i], second=names[j], correlation=value)
-
-
-def _short(text: str) -> str:
-    """Text that a scene file takes."""
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
 
 
 def _record(place: _Place, fitted: FittedParameter) -> dict[str, Any]:

@@ -78,12 +78,17 @@ class Table:
 
     def values(self, head: str, unit: str, dimension: str | None) -> tuple[FloatArray, list[Fault]]:
         """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
-        at, values, faults = self.heads.index(head), np.zeros(len(self.rows)), []
-        for row, (line, cells) in enumerate(zip(self.lines, self.rows, strict=True)):
+        values, faults = np.zeros(len(self.rows)), []
+        for row, (line, cell) in enumerate(zip(self.lines, self.texts(head), strict=True)):
             try:
-                values[row] = _cell_value(cells[at], unit, dimension)
+                if not cell:
+                    raise FieldError("the cell is empty", "a number in every row, or no such column")
+                value = parse_number(cell)
+                if value and not _SIZES[0] <= abs(value) <= _SIZES[1]:
+                    raise FieldError("no measurement has a number of this size", "0, or 1e-15 to 1e15")
+                values[row] = value if dimension is None else parse_quantity(f"{cell} {unit}", dimension)
             except FieldError as error:
-                faults.append(self.fault(line, head, cells[at], error.problem, error.allowed))
+                faults.append(self.fault(line, head, cell, error.problem, error.allowed))
         return values, faults
 
     @property
@@ -123,54 +128,57 @@ def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
     if content.startswith(_WORKBOOKS):
         problem = 'this is a workbook, not text; save the sheet as "CSV UTF-8"'
         return "", (data_fault(file, "", problem),)
+    problem, at = "", -1
     try:
         text = content.decode("utf-8-sig")
+        if "\0" in text:
+            problem, at = "this is not text but binary data", content.index(b"\0")
     except UnicodeDecodeError as error:
-        line, column = _place(content, error.start)
-        problem = 'this is not UTF-8 text; save the file as "CSV UTF-8"'
-        return "", (data_fault(file, f"line {line}, character {column}", problem),)
-    if "\0" in text:
-        line, column = _place(content, content.index(b"\0"))
-        problem = 'this is not text but binary data; save the file as "CSV UTF-8"'
-        return "", (data_fault(file, f"line {line}, character {column}", problem),)
-    return text, ()
-
-
-def _place(content: bytes, at: int) -> tuple[int, int]:
-    """Line and character of a byte, both from 1."""
+        problem, at = "this is not UTF-8 text", error.start
+    if not problem:
+        return text, ()
     before = content[:at]
-    start = before.rfind(b"\n") + 1
-    return before.count(b"\n") + 1, len(before[start:].decode("utf-8-sig", "replace")) + 1
+    line, start = before.count(b"\n") + 1, before.rfind(b"\n") + 1
+    place = f"line {line}, character {len(before[start:].decode('utf-8-sig', 'replace')) + 1}"
+    return "", (data_fault(file, place, f'{problem}; save the file as "CSV UTF-8"'),)
 
 
 def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table | None, tuple[Fault, ...]]:
     """The table of a text, or all that is wrong with its form. Args: `most`: rows that it may have."""
     numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
     head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
-    header, faults = _header(numbered[: head_at - 1], file)
-    faults = (*faults, *_late_keys(numbered[head_at:], file))
+    header, faults = _header([line for _, line in numbered[: head_at - 1]], file)
+    for at, line in numbered[head_at:]:
+        # As where files were joined: such a line would count for no row.
+        if _SETS_A_KEY.match(line):
+            problem = "this stands below the names of the columns; a file has one kind of data and one header"
+            faults.append(data_fault(file, f"line {at}", problem))
     data = [(at, line) for at, line in numbered[head_at - 1 :] if _is_data(line)]
     if len(data) < 2:
-        problem = "there is no row of data below the names of the columns"
-        if not data:
-            problem = "the file has no line with the names of the columns"
+        below = "there is no row of data below the names of the columns"
+        problem = below if data else "the file has no line with the names of the columns"
         return None, (*faults, data_fault(file, "", problem))
     if len(data) - 1 > most:
         problem = f"{len(data) - 1} rows; a row is one measurement, so average or thin out a recording"
         return None, (*faults, data_fault(file, "", problem, allowed=f"up to {most} rows"))
     if header is None:
-        return None, faults
+        return None, tuple(faults)
     separator = _separator(data[0][1])
     try:
-        heads = tuple(map(_lower_name, _without_empty_end(_cells(data[0][1], separator))))
+        names = list(_cells(data[0][1], separator))
     except csv.Error as error:
         return None, (*faults, _cell_fault(head_at, error, file))
-    rows, bad_rows = _rows(data[1:], len(heads), separator, file)
+    # Cells that a spreadsheet adds behind the names are empty.
+    while len(names) > 1 and not names[-1]:
+        names.pop()
+    rows, bad_rows = _rows(data[1:], len(names), separator, file)
+    # Spreadsheets make capitals of names; capitals of a unit have a meaning.
+    parts = [name.partition("[") for name in names]
     table = Table(
         file=file,
         header=header,
         head_line=head_at,
-        heads=heads,
+        heads=tuple(name.lower() + bracket + unit for name, bracket, unit in parts),
         lines=tuple(rows),
         rows=tuple(rows.values()),
     )
@@ -178,29 +186,40 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table |
 
 
 def _is_data(line: str) -> bool:
-    """Neither empty, nor marked, nor a spreadsheet's line that names the separator."""
+    """False for a line that is empty or marked, or a spreadsheet's that names the separator."""
     start = line.lstrip(f'" {_SEPARATORS}')
     return bool(start) and not start.startswith(_MARK) and not _NAMED_SEPARATOR.fullmatch(line.strip())
 
 
-def _header(
-    lines: Sequence[tuple[int, str]], file: str
-) -> tuple[Mapping[str, object] | None, tuple[Fault, ...]]:
+def _header(lines: Sequence[str], file: str) -> tuple[Mapping[str, object] | None, list[Fault]]:
     """The TOML of the first lines; the mark becomes a space, so that its errors have the file's places."""
     try:
-        return read_toml("\n".join(_unmarked(line) for _, line in lines)), ()
+        return read_toml("\n".join(map(_unmarked, lines))), []
     except (ValueError, csv.Error, RecursionError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
-        return None, (data_fault(file, "", problem),)
+        return None, [data_fault(file, "", problem)]
 
 
-def _late_keys(lines: Sequence[tuple[int, str]], file: str) -> Iterator[Fault]:
-    """First lines that stand below the columns, as where files were joined: they would count for no row."""
-    for at, line in lines:
-        if _SETS_A_KEY.match(line):
-            problem = "this stands below the names of the columns; a file has one kind of data and one header"
-            yield data_fault(file, f"line {at}", problem)
+def _rows(
+    data: Sequence[tuple[int, str]], length: int, separator: str, file: str
+) -> tuple[dict[int, tuple[str, ...]], list[Fault]]:
+    """The rows of the right length by line, and the errors of the others."""
+    rows, faults = {}, []
+    for at, line in data:
+        try:
+            cells = _cells(line, separator)
+        except csv.Error as error:
+            faults.append(_cell_fault(at, error, file))
+            continue
+        if len(cells) < length or any(cells[length:]):
+            problem = f"{len(cells)} values, and the columns are {length}"
+            if len(cells) > length and separator == ",":
+                problem += "; a decimal comma would do this: write points"
+            faults.append(data_fault(file, f"line {at}", problem))
+        else:
+            rows[at] = cells[:length]
+    return rows, faults
 
 
 def _unmarked(line: str) -> str:
@@ -226,43 +245,9 @@ def _cell_fault(line: int, error: csv.Error, file: str) -> Fault:
     return data_fault(file, f"line {line}", "a cell is longer than any number or name" if too_long else marks)
 
 
-def _without_empty_end(row: tuple[str, ...]) -> tuple[str, ...]:
-    """A line of names without the empty cells that a spreadsheet adds behind it."""
-    while len(row) > 1 and not row[-1]:
-        row = row[:-1]
-    return row
-
-
-def _rows(
-    data: Sequence[tuple[int, str]], length: int, separator: str, file: str
-) -> tuple[dict[int, tuple[str, ...]], list[Fault]]:
-    """The rows of the right length by line, and the errors of the others."""
-    rows, faults = {}, []
-    for at, line in data:
-        try:
-            cells = _cells(line, separator)
-        except csv.Error as error:
-            faults.append(_cell_fault(at, error, file))
-            continue
-        if len(cells) < length or any(cells[length:]):
-            problem = f"{len(cells)} values, and the columns are {length}"
-            if len(cells) > length and separator == ",":
-                problem += "; a decimal comma would do this: write points"
-            faults.append(data_fault(file, f"line {at}", problem))
-        else:
-            rows[at] = cells[:length]
-    return rows, faults
-
-
 def in_order(faults: Iterable[Fault]) -> list[Fault]:
     """Errors of one file in the order of its lines, those of the whole file first."""
     return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
-
-
-def _lower_name(head: str) -> str:
-    """A head whose name may have capitals, as spreadsheets make them; capitals of a unit have a meaning."""
-    name, bracket, unit = head.partition("[")
-    return name.lower() + bracket + unit
 
 
 def split_head(head: str) -> tuple[str, str] | None:
@@ -274,27 +259,12 @@ def split_head(head: str) -> tuple[str, str] | None:
     return match[1].strip(), "" if unit == _NO_UNIT else unit
 
 
-def _check_unit(unit: str, dimension: str) -> None:
-    """Raises: FieldError: no unit of that dimension; the error has those that are."""
-    parse_quantity(f"1 {unit}", dimension)
-
-
 def dimension_of(unit: str) -> str | None:
     """The first dimension that has a unit; None where none has it."""
     for dimension in DIMENSIONS:
         try:
-            _check_unit(unit, dimension)
+            parse_quantity(f"1 {unit}", dimension)
         except FieldError:
             continue
         return dimension
     return None
-
-
-def _cell_value(cell: str, unit: str, dimension: str | None) -> float:
-    """The number of a cell, SI. Raises: FieldError: no number, or one of a size that nobody measures."""
-    if not cell:
-        raise FieldError("the cell is empty", "a number in every row, or no such column")
-    value = parse_number(cell)
-    if value and not _SIZES[0] <= abs(value) <= _SIZES[1]:
-        raise FieldError("no measurement has a number of this size", "0, or 1e-15 to 1e15")
-    return value if dimension is None else parse_quantity(f"{cell} {unit}", dimension)

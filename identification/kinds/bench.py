@@ -169,21 +169,16 @@ def _limits(
         critical_ratio=b,
         process="isothermal",
     )
+    gamma = HEAT_CAPACITY_RATIO
     if filling:
         time = float(line.filling_time(pressure, volume=volume))
-        return time, time / HEAT_CAPACITY_RATIO
+        return time, time / gamma
     whole, rest = line.venting_time(np.array([start, pressure]), volume=volume)
-    tau = line.time_constant(volume=volume)
-    return float(whole - rest), tau * _adiabatic_venting(pressure / start, far / start, b)
-
-
-def _adiabatic_venting(ratio: float, far: float, b: float) -> float:
-    """Time over tau until the pressure is a ratio of its start."""
-    gamma = HEAT_CAPACITY_RATIO
-    falling: FloatArray = np.geomspace(1.0, ratio, _STEPS)
-    phi = np.sqrt(np.maximum(1 - (np.maximum(far / falling - b, 0.0) / (1 - b)) ** 2, 0.0))
+    falling: FloatArray = np.geomspace(1.0, pressure / start, _STEPS)
+    phi = np.sqrt(np.maximum(1 - (np.maximum(far / start / falling - b, 0.0) / (1 - b)) ** 2, 0.0))
     cooled = falling ** ((gamma - 1) / (2 * gamma))
-    return float(-np.trapezoid(1 / (gamma * falling * cooled * phi), falling))
+    adiabatic = float(-np.trapezoid(1 / (gamma * falling * cooled * phi), falling))
+    return float(whole - rest), line.time_constant(volume=volume) * adiabatic
 
 
 def _frequency(data: Observations) -> Stated:

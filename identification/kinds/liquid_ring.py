@@ -107,22 +107,18 @@ def _chamber_numbers(scene: Scene, observations: Observations) -> IntArray:
 def _fills(device: Device, observations: Observations) -> FloatArray:
     """Fill of the positive chamber of each row's pair before and after, shape (2, n)."""
     disc, columns = device.scene.disc, observations.columns
-    chambers = _chamber_numbers(device.scene, observations)
     half, total = disc.chambers // 2, 2 * disc.initial_fill
     now: dict[tuple[str, int], float] = {}
-    found = np.empty((2, len(observations)))
-    stated = columns.get("fill_ratio")
-    for i, number in enumerate(chambers.tolist()):
+    found, stated = np.empty((2, len(observations))), columns.get("fill_ratio")
+    for i, number in enumerate(_chamber_numbers(device.scene, observations).tolist()):
         place = str(observations.series[i]), number % half
         if stated is not None:
             x = min(float(stated[i]), total)
             now[place] = x if number < half else total - x
         found[0, i] = now.get(place, disc.initial_fill)
+        pressure, gas_time = float(columns["pressure"][i]), float(columns["gas_time"][i])
         found[1, i] = now[place] = device.injected(
-            fill=found[0, i],
-            chamber=number // half,
-            pressure=float(columns["pressure"][i]),
-            gas_time=float(columns["gas_time"][i]),
+            fill=found[0, i], chamber=number // half, pressure=pressure, gas_time=gas_time
         )
     return found
 
@@ -150,19 +146,15 @@ def _flow_rates(scene: Scene, observations: Observations, models: Models) -> Flo
 
 
 def _flow_rate(device: Device, observations: Observations) -> FloatArray:
-    scene = device.scene
-    head = observations.columns["pressure_difference"] / scene.liquid.density
-    log_u = np.log(np.sqrt(2 * head / (_loss(scene, np.sqrt(head)) + 1)))
+    still = replace(device.scene, rotor=replace(device.scene.rotor, speed=0.0))
+    head = observations.columns["pressure_difference"] / still.liquid.density
+    log_u = np.log(np.sqrt(2 * head / (corrected_state(still, np.sqrt(head)).k + 1)))
 
     def lacking(log_u: FloatArray) -> FloatArray:
-        return np.asarray(np.log(_loss(scene, np.exp(log_u)) + 1) + 2 * log_u - np.log(2 * head))
+        k = corrected_state(still, np.exp(log_u)).k
+        return np.asarray(np.log(k + 1) + 2 * log_u - np.log(2 * head))
 
-    return np.asarray(scene.tube.area * np.exp(newton(lacking, log_u, tol=_DONE)))
-
-
-def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
-    """k of the tube at rest."""
-    return corrected_state(replace(scene, rotor=replace(scene.rotor, speed=0.0)), velocity).k
+    return np.asarray(still.tube.area * np.exp(newton(lacking, log_u, tol=_DONE)))
 
 
 def _pressures(scene: Scene, observations: Observations, _: object) -> FloatArray:

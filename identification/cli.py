@@ -53,12 +53,15 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
     names = None if asked.parameters is None else _names(asked.parameters)
     try:
         fitted = [each.name for each in problem_of(given, observations, names).parameters]
-        chosen = _fitted_name(asked.next, fitted)
+        if asked.next is not None and asked.next not in fitted:
+            problem = f"this parameter is not fitted{did_you_mean(asked.next, fitted)}"
+            listed = ", ".join(fitted)
+            raise SceneError.of_option(option="--next", value=asked.next, problem=problem, allowed=listed)
         with activity("fit", "several starts, profiles of the likelihood ..."):
             result = fit_scene(given, data=observations, parameters=names, loss=asked.loss)
     except FitError as error:
         raise SceneError.of_file(given.file, str(error)) from error
-    told, following = Review.of(result), next_measurement(result, chosen)
+    told, following = Review.of(result), next_measurement(result, asked.next)
     if asked.json:
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
@@ -69,13 +72,6 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
         save_result(asked.save, scene=given, result=result, data=observations, said=told.sentences)
         print_message(f"fitted scene written to {asked.save}")
     return (DONE if told.holds else FAILED), result
-
-
-def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
-    if name is not None and name not in fitted:
-        problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
-        raise SceneError.of_option(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
-    return name
 
 
 def keep_inputs(save: Path, inputs: Sequence[Path]) -> None:

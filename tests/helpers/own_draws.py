@@ -1,7 +1,9 @@
 """Devices that a scene may be, drawn by plain random numbers, for the plant of `own_plant`.
 
 Nothing of the product but the scene's values is used. Friction and bends are correlations of textbooks, the
-sector's area and moment are integrated here, and the widths that a scene leaves open are set here.
+sector's area and moment are integrated here, and the widths that a scene leaves open are set here.  What
+models may be off by has the causes and distributions that the documentation declares: those of the loss are
+random functions of Re, each of its own term.
 """
 
 from __future__ import annotations
@@ -20,10 +22,14 @@ FILLS: Final = 513
 SPEEDS: Final = np.linspace(0.0, 1.0, 513) ** 2 * 80.0
 """m/s, of the table of losses; even in the root."""
 GAS_CONSTANT: Final = 287.05
-_MODEL_LOSS, _MODEL_MOMENT, _DEPTH, _ROUGHNESS, _AMPLITUDE = 0.12, 0.005, 0.3, 0.5, 0.05
+_WAVES, _MODEL_MOMENT, _DEPTH, _ROUGHNESS, _AMPLITUDE = 0.002, 0.005, 0.3, 0.5, 0.05
 _INFLUENCE, _LAG = 0.05, math.radians(3.0)
-"""Expanded (95 %), relative but for the lag: of k + 1, of a moment by waves, of the depth over a port, of a
-wall's roughness, of the first amplitude, of the rotor."""
+"""Expanded (95 %), relative but for the lag: of a chamber's pressure and of its moment by waves, of the depth
+over a port, of a wall's roughness, of the first amplitude, of the rotor."""
+_CAUSES: Final = ("friction", "rotation", "entry", "ends", "bends")
+"""Of the errors of the loss."""
+_CLEARING: Final = 0.25 / 0.85
+"""Expanded (95 %), relative: Froude numbers 0.6 to 1.1 clear a crest of gas."""
 _TABLES: Final = ("disc", "liquid", "tube", "gas", "rotor")
 
 
@@ -89,8 +95,9 @@ def _values(scene: Scene) -> dict[str, Any]:
 
 
 def drawn(scene: Scene, *, number: int, seed: int, phase: float | None = None) -> Drawn:
-    """A device by its number; all inputs normal, direction and cavity uniform. Number -1: the scene's own.
+    """A device by its number; all inputs normal, direction, cavity and the crest's place uniform.
 
+    Number -1 is the scene's own.
     Args: `phase`: of the vibration before balancing, rad; None: drawn.
     """
     random = np.random.default_rng([seed, number + 1])
@@ -100,10 +107,13 @@ def drawn(scene: Scene, *, number: int, seed: int, phase: float | None = None) -
         z = 0.0 if nominal else float(random.standard_normal()) / 1.96
         low = 0.0 if name == "lag_angle" else 0.1 * v[name]
         v[name] = max(v[name] + z * width, low) if v[name] is not None else None
-    extra = [0.0 if nominal else float(random.standard_normal()) / 1.96 for _ in range(3)]
+    extra = np.zeros(3) if nominal else random.standard_normal(3) / 1.96
     cavity, angle = (0.5, 0.0) if nominal else random.uniform(size=2)
-    v["model_loss"] = math.exp(math.log1p(_MODEL_LOSS) * extra[0])
-    v["model_moment"] = 1 + _MODEL_MOMENT * extra[1]
+    parts = np.zeros((len(_CAUSES), 2)) if nominal else random.standard_normal((len(_CAUSES), 2)) / 1.96
+    v["loss_errors"] = dict(zip(_CAUSES, parts.tolist(), strict=True))
+    v["model_moment"], v["waves"] = 1 + _MODEL_MOMENT * extra[1], _WAVES * extra[0]
+    v["clearing"] = 1.0 if nominal else 1 + _CLEARING * float(random.standard_normal()) / 1.96
+    v["slack_before"] = None if nominal else float(random.uniform())
     amplitude = scene.rotor.initial_amplitude * (1 + _AMPLITUDE * extra[2])
     phase = 2 * math.pi * float(angle) if phase is None else phase
     return _device(v, start=amplitude * np.exp(1j * phase), released=float(cavity))
@@ -128,8 +138,8 @@ def _device(v: dict[str, Any], *, start: complex, released: float) -> Drawn:
         crest=crest,
         crest_start=begin,
         crest_end=end,
-        entry=1.56 * v["model_loss"],
-        froude=omega * math.sqrt(crest * v["bore"]),
+        entry=1.56,
+        froude=v["clearing"] * omega * math.sqrt(crest * v["bore"]),
         cavity=vapour * (1 - released) if v["dissolved_gas"] == "saturated" else vapour,
         pressure=v["pressure"],
         ambient=v["ambient_pressure"],
@@ -162,11 +172,16 @@ def _sector(v: dict[str, Any]) -> tuple[Floats, Floats, float]:
     moment = v["density"] * v["axial_width"] * inwards(2 * r**2 * np.sin(half))
     fills = np.linspace(0.0, 2 * v["initial_fill"], FILLS)
     x = volume / volume[-1]
-    return np.interp(fills, x, r**2), np.interp(fills, x, moment), float(volume[-1])
+    # Waves change the pressure of the liquid, whose surface they leave where it is.
+    square = r[0] ** 2 - (r[0] ** 2 - r**2) * (1 + v["waves"])
+    return np.interp(fills, x, square), np.interp(fills, x, moment), float(volume[-1])
 
 
 def _path(v: dict[str, Any], crest: float) -> tuple[float, float, float]:
-    """Shares of the path at which the arc of the crest begins and ends, and the length; a taut string."""
+    """Shares of the path at which the arc of the crest begins and ends, and the length; a taut string.
+
+    What the tube is longer than that lies before an arc or behind.
+    """
     port = v["port_radius"]
     touch = math.acos(min(crest / port, 1.0))
     arc = crest * (math.pi - 2 * touch)
@@ -174,7 +189,11 @@ def _path(v: dict[str, Any], crest: float) -> tuple[float, float, float]:
     length = max(v["length"], shortest)
     share = arc / shortest if v["hump_shape"] == "arc" else 0.0
     legs = min(max(v["hump_position"], 0.0), 1.0) * (1 - share)
-    return legs, legs + share, length
+    if v["slack_before"] is None or share == 0.0:
+        return legs, legs + share, length
+    taut = shortest / length
+    begin = legs * taut + v["slack_before"] * (1 - taut)
+    return begin, begin + share * taut, length
 
 
 def _losses(
@@ -195,16 +214,33 @@ def _losses(
     fast = np.where(kt > 500, 0.942 * kt**0.05, 0.942 + 0.058 * np.maximum(kt, 1.0) ** 0.282)
     turbulent = haaland * np.where(kt > 1, np.maximum(fast, 1.0), 1.0)
     share = 1 / (1 + np.exp(np.clip((laminar - turbulent) / (0.05 * turbulent), -50, 50)))
-    arcs = sum(b.angle * b.radius for b in v["bends"])
-    bends, friction = 0 * u, np.maximum(laminar, turbulent) * (length - arcs) / d
+    straight = (length - sum(b.angle * b.radius for b in v["bends"])) / d
+    friction = np.maximum(laminar, turbulent) * straight
+    plain = np.where(laminar > turbulent, 64 / re, haaland) * straight
+    rotation, bends = friction - plain, 0 * u
     for b in v["bends"]:
         ratio = b.radius / d
         bends += 0.388 * (0.95 + 4.42 * ratio**-1.96) * ratio**0.84 * re**-0.17 * b.angle / (math.pi / 2)
     entrance = share * 0.5
     kinetic = share * 1.06 + (1 - share) * (1.2 + 0.8 * np.maximum(slow, 1.0) ** -1.5)
-    ends = share * (entrance + 1.0) + (1 - share) * 2.3
-    scale = v["model_loss"] * u / 2
-    whole = (friction + bends + ends + v["extra_loss"]) * scale
+    outlet = share * (entrance + 1.0) + (1 - share) * 2.3 - entrance
+    # Expanded (95 %): spread of the correlations, all that rotation adds to turbulent friction, what an inlet
+    # may add before rotating laminar flow has developed, and edges and bends of handbooks.
+    way = (0.2 + re / (57 * np.maximum(slow, 1.0)) + math.sqrt(spin) / 47) * d / length
+    known = {
+        "friction": (0.01 + 0.035 * share) * plain,
+        "rotation": (0.02 + 0.98 * share) * rotation,
+        "entry": (1 - share) * rotation * way * -np.expm1(-1 / way),
+        "ends": 0.3 * (1 - share) + 0.08 * share,
+        "bends": (0.6 - 0.35 * share) * bends,
+    }
+    error = {
+        cause: known[cause] * (even * np.cos(np.log(re)) + odd * np.sin(np.log(re)))
+        for cause, (even, odd) in v["loss_errors"].items()
+    }
+    friction = friction + error["friction"] + error["rotation"] + error["entry"]
+    entrance, bends, scale = entrance + error["ends"], bends + error["bends"], u / 2
+    whole = (friction + bends + entrance + outlet + v["extra_loss"]) * scale
     up, down = ((kinetic + entrance + bends / 2 + friction * s) * scale for s in (near, far))
     return whole, up, down
 

@@ -107,7 +107,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     turning, laminar, critical = _rotation(re, rotation, rough)
     bends = _bends(tube, re, rotation, critical, straight)
     if tube.drag_coefficient is not None:
-        terms = {"decree": np.full(re.shape, tube.drag_coefficient)}
+        terms = {"decree": np.zeros(re.shape) + tube.drag_coefficient}
     else:
         # The arcs turn too: rotation acts on the whole length, friction without it on the straights alone.
         terms = {
@@ -116,7 +116,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
             "rotation": tube.length / tube.bore * (turning - straight),
             "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
             "exit": exit_loss(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
-            "extra": np.full(re.shape, tube.extra_loss),
+            "extra": np.zeros(re.shape) + tube.extra_loss,
         }
     return TubeState(
         reynolds=re,

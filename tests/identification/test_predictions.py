@@ -25,7 +25,7 @@ from ringbalance.reduced_model.terms import HELD, INERTIA
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import with_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
 
 
 def predicted(scene: Scene, data: Observations) -> FloatArray:
@@ -128,6 +128,31 @@ def test_laws_made_together_are_those_made_alone_with_one_chamber_for_all(
     for each, found in zip(scenes, together, strict=True):
         alone = KINDS["injection"].predict(each, data, Models.of(paper_scene))
         np.testing.assert_allclose(found, alone, rtol=1e-11)
+
+
+@pytest.mark.parametrize("drag", [None, 50.0])
+def test_laws_made_together_may_differ_in_any_number_alone(paper_scene: Scene, drag: float | None) -> None:
+    """Where only k or the extra loss differed, many laws could not be made at once."""
+    scene = (
+        paper_scene
+        if drag is None
+        else with_value(scene=paper_scene, quantity="drag_coefficient", value=drag)
+    )
+
+    def left(device: Device) -> float:
+        return device.injected(fill=0.25, chamber=0, pressure=scene.gas.pressure, gas_time=0.1)
+
+    for name in UNCERTAIN_QUANTITIES:
+        value = nominal_value(scene=scene, quantity=name)
+        if value is None:
+            continue
+        moved = [value * (1 + part) if value else part for part in (1e-4, 2e-4)]
+        scenes = [with_value(scene=scene, quantity=name, value=each) for each in moved]
+        together = Models.of(scene)
+        together.expect(scenes)
+        for each in scenes:
+            one, other = (left(Device.of(each, models)) for models in (together, Models.of(scene)))
+            assert one == pytest.approx(other, rel=1e-11), name
 
 
 def test_a_stated_fill_begins_again(paper_scene: Scene) -> None:

@@ -35,11 +35,10 @@ from ringbalance.controller.algorithms.law_steps import (
 )
 from ringbalance.controller.algorithms.valve_steps import (
     GREATEST,
-    INSTANT,
     OPEN_TIME,
     PER_CHAMBER,
-    cut_short,
     longest_open,
+    waits,
 )
 from ringbalance.export.chamber import moment
 from ringbalance.export.disc import (
@@ -321,31 +320,18 @@ def sample(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     aim(c, k, p, q, w)
 
 
-def set_wait(c: Law, w: Query) -> None:
-    """Until one period after the last valve has closed."""
-    longest = longest_open(w, chamber_of(c, 0), 2 * int(c[int(c[BLOCK]) + PAIRS]))
-    w[beside(c) + WAIT] = longest + c[settings(c) + PERIOD]
-
-
-def pass_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
-    """Liquid moves, and valves stay open for less."""
+def control(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
+    """Let a time pass, s, and sample the vibration if it is time to."""
     half = int(c[int(c[BLOCK]) + PAIRS])
-    r = beside(c)
-    w[r + WAIT] = w[r + WAIT] - time
     pair = 0
     while pair < half:
         pass_pair(c, k, p, q, w, FIRST_PAIR + PER_PAIR * pair, time)
         pair = pair + 1
-    if cut_short(w, chamber_of(c, 0), 2 * half, time):
-        set_wait(c, w)
-
-
-def control(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
-    """Let a time pass, s, and sample the vibration if it is time to."""
-    pass_time(c, k, p, q, w, time)
     r = beside(c)
-    if w[r + WAIT] > INSTANT:
+    first = chamber_of(c, 0)
+    period = c[settings(c) + PERIOD]
+    if waits(w, r + WAIT, first, 2 * half, period, time):
         return
     w[r + SAMPLES] = w[r + SAMPLES] + 1.0
     sample(c, k, p, q, w)
-    set_wait(c, w)
+    w[r + WAIT] = longest_open(w, first, 2 * half) + period

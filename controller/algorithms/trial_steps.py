@@ -8,11 +8,10 @@ from math import sqrt
 
 from ringbalance.controller.algorithms.valve_steps import (
     GREATEST,
-    INSTANT,
     OPEN_TIME,
     PER_CHAMBER,
-    cut_short,
     longest_open,
+    waits,
 )
 from ringbalance.reduced_model.pieces.point import Law, Query, smaller
 from ringbalance.scene.platform.both_ways import both_ways
@@ -58,19 +57,11 @@ def sample(c: Law, w: Query) -> None:
 
 
 @both_ways
-def set_wait(c: Law, w: Query) -> None:
-    """Until one period after the valve has closed."""
-    w[WAIT] = longest_open(w, FIRST_CHAMBER, int(c[CHAMBERS])) + c[PERIOD]
-
-
-@both_ways
 def step(c: Law, w: Query, time: float) -> None:
     """Let a time pass, s, and sample the vibration if it is time to."""
-    w[WAIT] = w[WAIT] - time
-    if cut_short(w, FIRST_CHAMBER, int(c[CHAMBERS]), time):
-        set_wait(c, w)
-    if w[WAIT] > INSTANT:
+    count = int(c[CHAMBERS])
+    if waits(w, WAIT, FIRST_CHAMBER, count, c[PERIOD], time):
         return
     w[SAMPLES] = w[SAMPLES] + 1.0
     sample(c, w)
-    set_wait(c, w)
+    w[WAIT] = longest_open(w, FIRST_CHAMBER, count) + c[PERIOD]

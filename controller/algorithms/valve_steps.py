@@ -39,3 +39,12 @@ def cut_short(w: Query, first: int, chambers: int, time: float) -> bool:
             w[at + OPEN_TIME] = 0.0
         chamber = chamber + 1
     return cut
+
+
+@both_ways
+def waits(w: Query, wait: int, first: int, chambers: int, period: float, time: float) -> bool:
+    """Let a time pass, s; whether the next sample is still to come, one period after the last valve."""
+    w[wait] = w[wait] - time
+    if cut_short(w, first, chambers, time):
+        w[wait] = longest_open(w, first, chambers) + period
+    return w[wait] > INSTANT

@@ -8,43 +8,31 @@ devices choose between them.  What is chosen on these devices is judged on other
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import Balancer, Draws, Settings
+from ringbalance.controller.judging.candidates import DEVICES, Candidate, Tried, chosen, is_decided, is_worse
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.trials import Axis, Trials
-from ringbalance.results.requirements import Paired
-from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.origins import value_at
 
 Progress = Callable[[str], None]
 
-_HEATS: Final = ((0, 8), (8, 16), (16, 32))
+_HEATS: Final = ((0, 8), (8, 16), (16, DEVICES))
 """Devices of the heats of a race, by first and last number."""
-DEVICES: Final = _HEATS[-1][1]
-"""On which settings are chosen."""
 _FINAL: Final = (DEVICES, 4 * DEVICES)
 """Devices that choose between the last few settings, by first and last number."""
 _FINALISTS: Final = 8
 _FEW: Final = 3
 """Of these where the best serve enough of the first devices: to tell a plateau's middle from its edge."""
-_BEHIND: Final = 0.2
-"""Level of the paired test by which a setting is worse than the best and does not run in the next heat."""
-_MORE: Final = 2 / DEVICES
-"""Fraction of the devices that another kind of controller serves beyond the scene's to be better."""
 _ENOUGH: Final = 0.9
 """Fraction of the devices from which on the best settings need not be looked for more widely."""
-_AS_FAST: Final = 1.3
-"""Times the least settling time: as fast as the fastest."""
-_SETTLED: Final = 0.9
-"""Of the devices that the best settings serve: by when these have settled decides between equals."""
 _ROUNDS: Final = 6
 """In which neighbours are tried."""
 _ALONG: Final = 3
@@ -52,89 +40,6 @@ _ALONG: Final = 3
 _CURVE: Final = tuple(Draws.block(256 + first, count, whole=False) for first, count in ((0, 16), (16, 48)))
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
 none of the first settle is answered by them."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
-    """A point of what a balancer offers to try."""
-
-    trials: Trials
-    places: tuple[int, ...]
-    """Of its levels on the axes."""
-    along: float | None
-    """Level on the axis along which the answer is drawn; None: the scene's."""
-
-    @cached_property
-    def settings(self) -> Settings | None:
-        """By path; None: there are none."""
-        levels = {axis.name: axis.levels[at] for axis, at in zip(self.trials.axes, self.places, strict=True)}
-        if self.along is not None and self.trials.along is not None:
-            levels[self.trials.along.name] = self.along
-        return self.trials.settings(levels)
-
-    @property
-    def key(self) -> tuple[str, tuple[int, ...], float | None]:
-        """Of this point."""
-        return self.trials.kind, self.places, self.along
-
-    def neighbours(self) -> list[Candidate]:
-        """One level away on one axis."""
-        return [
-            self._moved(axis, by) for axis in range(len(self.places)) for by in (-1, 1) if self._has(axis, by)
-        ]
-
-    def _has(self, axis: int, by: int) -> bool:
-        return 0 <= self.places[axis] + by < len(self.trials.axes[axis].levels)
-
-    def _moved(self, axis: int, by: int) -> Candidate:
-        places = tuple(at + by * (axis == i) for i, at in enumerate(self.places))
-        return Candidate(trials=self.trials, places=places, along=self.along)
-
-    def at(self, along: float) -> Candidate:
-        """The same at another level of that axis."""
-        return Candidate(trials=self.trials, places=self.places, along=along)
-
-    def is_beside(self, other: Candidate) -> bool:
-        """Whether one step, on each axis at most, leads there."""
-        alike = self.trials.kind == other.trials.kind and self.along == other.along
-        return alike and all(abs(a - b) <= 1 for a, b in zip(self.places, other.places, strict=True))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Tried:
-    """A candidate and what became of it."""
-
-    candidate: Candidate
-    judgement: Judgement
-
-    @property
-    def count(self) -> int:
-        """Of devices that meet every demand."""
-        return self.judgement.fraction.count
-
-    @property
-    def fraction(self) -> float:
-        """Of devices that do."""
-        return self.judgement.fraction.value
-
-    def joined(self, outcomes: Outcomes) -> Tried:
-        """With the outcomes of further devices."""
-        whole = self.judgement.outcomes.joined(outcomes)
-        return replace(self, judgement=replace(self.judgement, outcomes=whole))
-
-    def time(self, count: int) -> float:
-        """By which so many devices have settled, s."""
-        return float(np.sort(self.judgement.outcomes.settling_time)[max(count, 1) - 1])
-
-    def replaces(self, scenes: Tried) -> bool:
-        """Whether it is taken in place of the best of the scene's kind of controller.
-
-        It serves `_MORE` more of the devices, or no fewer, `_AS_FAST` times as fast, beside a kind that the
-        scene does not give.
-        """
-        more, most = self.fraction - scenes.fraction, math.ceil(_SETTLED * scenes.count)
-        faster = _AS_FAST * self.time(most) < scenes.time(most)
-        return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kept)
 
 
 _Ran = dict[object, Tried | None]
@@ -247,24 +152,6 @@ def _finalists(tried: Sequence[Tried], best: Tried) -> list[Tried]:
     return last
 
 
-def chosen(tried: Iterable[Tried]) -> Tried | None:
-    """Most devices; of these as fast as the fastest; of these the one amid most others that are as good."""
-    whole = list(tried)
-    most = max((each.count for each in whole), default=0)
-    if most == 0:
-        return whole[0] if whole else None
-    at = math.ceil(_SETTLED * most)
-    best = [each for each in whole if each.count == most]
-    fastest = min(each.time(at) for each in best)
-    plateau = [each for each in whole if each.count >= most - 1 and each.time(at) <= _AS_FAST**2 * fastest]
-
-    def amid(each: Tried) -> int:
-        return sum(each.candidate.is_beside(other.candidate) for other in plateau)
-
-    fast = [each for each in best if each.time(at) <= _AS_FAST * fastest]
-    return max(fast, key=lambda each: (amid(each), -each.time(at)))
-
-
 def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | None = None) -> list[Tried]:
     """Those that are not surely worse than the best after each heat. Args: `leading`: the best before."""
     asked, demands = balancer.asked_fraction(), balancer.demands()
@@ -285,18 +172,8 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | N
         if not best.any():
             # None settles: one of them says why.
             return [each for each in running.values() if each][:1]
-        running = {i: each for i, each in running.items() if each and not _worse(each, best)}
+        running = {i: each for i, each in running.items() if each and not is_worse(each, best)}
     return [each for each in running.values() if each]
-
-
-def _worse(each: Tried, best: BoolArray) -> bool:
-    return Paired.of(best, each.judgement.meets).better(_BEHIND) == 0
-
-
-def _decided(tried: Iterable[Tried]) -> bool:
-    """Whether all but the best are surely worse than it."""
-    best = sorted(tried, key=lambda each: -each.fraction)
-    return all(_worse(each, best[0].judgement.meets) for each in best[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -464,7 +341,7 @@ class _Levels:
     def _compared(self, at: int) -> dict[str, Tried]:
         """What serves at a level; on more devices where those of the search do not decide between kinds."""
         serving = self._serving(at)
-        if at not in self.searched and not _decided(serving.values()):
+        if at not in self.searched and not is_decided(serving.values()):
             near = [each for each in serving.values() if each.candidate.key not in self.more]
             self.more.update((each.candidate.key, each) for each in _on_more(self.balancer, near))
             return {kind: self.more[each.candidate.key] for kind, each in serving.items()}

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Final
 
 from ringbalance.controller.balancer import Balancer, Settings
+from ringbalance.controller.judging.candidates import Tried
 from ringbalance.controller.judging.judge import Judgement, best_of, judged, judged_all
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
@@ -15,7 +16,6 @@ from ringbalance.controller.judging.search import (
     Along,
     Curve,
     Progress,
-    Tried,
     search,
     searched,
     searched_along,

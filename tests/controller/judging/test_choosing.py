@@ -182,7 +182,7 @@ class TwoKinds(Machine):
     alike: bool = False
     """Whether both serve the same devices."""
     faster: float = 1.0
-    """Times as fast as the first is the second."""
+    """Times as fast as the first is the second; 0: it serves no device."""
     kept: bool = False
 
     def trials(self) -> tuple[Trials, ...]:
@@ -198,8 +198,11 @@ class TwoKinds(Machine):
         outcomes, numbers = super()._outcomes(settings, draws), np.array(draws.numbers)
         second = settings.get("controller.kind") == "second"
         served = (numbers < 32) | (numbers % 2 == 0) | second | self.alike
-        time = np.where(served, outcomes.settling_time, math.inf)
-        return replace(outcomes, settling_time=time / (self.faster if second else 1.0))
+        pace = self.faster if second else 1.0
+        return replace(
+            outcomes,
+            settling_time=np.where(served & (pace > 0), outcomes.settling_time, math.inf) / (pace or 1.0),
+        )
 
 
 def test_kinds_of_controller_that_few_devices_do_not_tell_apart_run_on_more(paper_scene: Scene) -> None:
@@ -208,6 +211,14 @@ def test_kinds_of_controller_that_few_devices_do_not_tell_apart_run_on_more(pape
     serving = [each.judgement for each in curve if each.judgement.fraction.count]
     assert len(serving) >= 6
     assert all(each.settings["controller.kind"] == "second" for each in serving)
+
+
+def test_a_kind_that_serves_no_device_stands_behind_one_that_does(paper_scene: Scene) -> None:
+    """Of it fewer devices have run."""
+    machine = cast("Any", TwoKinds(at(paper_scene, 0.56), alike=True, faster=0.0))
+    best = search(machine, machine.trials(), progress=lambda _: None)
+    assert [each.candidate.trials.kind for each in best] == ["toy", "second"]
+    assert [each.count > 0 for each in best] == [True, False]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,142 @@
+"""Candidates of a search for settings, and which of them is better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import Outcomes, Settings
+from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.trials import Trials
+from ringbalance.results.requirements import Paired
+from ringbalance.scene.arrays import BoolArray
+
+DEVICES: Final = 32
+"""On which settings are chosen."""
+_BEHIND: Final = 0.2
+"""Level of the paired test by which a setting is worse than the best and does not run in the next heat."""
+_MORE: Final = 2 / DEVICES
+"""Fraction of the devices that another kind of controller serves beyond the scene's to be better."""
+_AS_FAST: Final = 1.3
+"""Times the least settling time: as fast as the fastest."""
+_SETTLED: Final = 0.9
+"""Of the devices that the best settings serve: by when these have settled decides between equals."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A point of what a balancer offers to try."""
+
+    trials: Trials
+    places: tuple[int, ...]
+    """Of its levels on the axes."""
+    along: float | None
+    """Level on the axis along which the answer is drawn; None: the scene's."""
+
+    @cached_property
+    def settings(self) -> Settings | None:
+        """By path; None: there are none."""
+        levels = {axis.name: axis.levels[at] for axis, at in zip(self.trials.axes, self.places, strict=True)}
+        if self.along is not None and self.trials.along is not None:
+            levels[self.trials.along.name] = self.along
+        return self.trials.settings(levels)
+
+    @property
+    def key(self) -> tuple[str, tuple[int, ...], float | None]:
+        """Of this point."""
+        return self.trials.kind, self.places, self.along
+
+    def neighbours(self) -> list[Candidate]:
+        """One level away on one axis."""
+        return [
+            self._moved(axis, by) for axis in range(len(self.places)) for by in (-1, 1) if self._has(axis, by)
+        ]
+
+    def _has(self, axis: int, by: int) -> bool:
+        return 0 <= self.places[axis] + by < len(self.trials.axes[axis].levels)
+
+    def _moved(self, axis: int, by: int) -> Candidate:
+        places = tuple(at + by * (axis == i) for i, at in enumerate(self.places))
+        return Candidate(trials=self.trials, places=places, along=self.along)
+
+    def at(self, along: float) -> Candidate:
+        """The same at another level of that axis."""
+        return Candidate(trials=self.trials, places=self.places, along=along)
+
+    def is_beside(self, other: Candidate) -> bool:
+        """Whether one step, on each axis at most, leads there."""
+        alike = self.trials.kind == other.trials.kind and self.along == other.along
+        return alike and all(abs(a - b) <= 1 for a, b in zip(self.places, other.places, strict=True))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tried:
+    """A candidate and what became of it."""
+
+    candidate: Candidate
+    judgement: Judgement
+
+    @property
+    def count(self) -> int:
+        """Of devices that meet every demand."""
+        return self.judgement.fraction.count
+
+    @property
+    def fraction(self) -> float:
+        """Of devices that do."""
+        return self.judgement.fraction.value
+
+    def joined(self, outcomes: Outcomes) -> Tried:
+        """With the outcomes of further devices."""
+        whole = self.judgement.outcomes.joined(outcomes)
+        return replace(self, judgement=replace(self.judgement, outcomes=whole))
+
+    def time(self, share: float) -> float:
+        """By which so large a share of the devices has settled, s."""
+        times = np.sort(self.judgement.outcomes.settling_time)
+        return float(times[max(math.ceil(share * times.size * (1 - 1e-12)), 1) - 1])
+
+    def replaces(self, scenes: Tried) -> bool:
+        """Whether it is taken in place of the best of the scene's kind of controller.
+
+        It serves `_MORE` more of the devices, or no fewer, `_AS_FAST` times as fast, beside a kind that the
+        scene does not give.
+        """
+        # By shares: of a kind that serves no device fewer have run.
+        more, share = self.fraction - scenes.fraction, _SETTLED * scenes.fraction
+        faster = _AS_FAST * self.time(share) < scenes.time(share)
+        return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kept)
+
+
+def chosen(tried: Iterable[Tried]) -> Tried | None:
+    """Most devices; of these as fast as the fastest; of these the one amid most others that are as good."""
+    whole = list(tried)
+    most = max((each.count for each in whole), default=0)
+    if most == 0:
+        return whole[0] if whole else None
+    best = [each for each in whole if each.count == most]
+    share = _SETTLED * best[0].fraction
+    fastest = min(each.time(share) for each in best)
+    plateau = [each for each in whole if each.count >= most - 1 and each.time(share) <= _AS_FAST**2 * fastest]
+
+    def amid(each: Tried) -> int:
+        return sum(each.candidate.is_beside(other.candidate) for other in plateau)
+
+    fast = [each for each in best if each.time(share) <= _AS_FAST * fastest]
+    return max(fast, key=lambda each: (amid(each), -each.time(share)))
+
+
+def is_worse(each: Tried, best: BoolArray) -> bool:
+    """Whether it surely serves fewer than the best does of the same devices."""
+    return Paired.of(best, each.judgement.meets).better(_BEHIND) == 0
+
+
+def is_decided(tried: Iterable[Tried]) -> bool:
+    """Whether all but the best are surely worse than it."""
+    best = sorted(tried, key=lambda each: -each.fraction)
+    return all(is_worse(each, best[0].judgement.meets) for each in best[1:])

@@ -79,7 +79,9 @@ class Designs:
 def _fields(kind: type[Any]) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
     """Names of a record's fields, none where it is no record, and what gives all their values."""
     names = tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
-    return names, attrgetter(*names) if len(names) > 1 else lambda record: tuple(vars(record).values())
+    return names, attrgetter(*names) if len(names) > 1 else lambda record: tuple(
+        getattr(record, n) for n in names
+    )
 
 
 def _stacked(values: Sequence[Any], each: int) -> Any:

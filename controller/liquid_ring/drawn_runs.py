@@ -103,6 +103,8 @@ class DrawnRuns:
         Raises: SceneError: a rotor too slow to form a ring.
         """
         check_ring(self.scene)
+        if not settings:
+            return ()
         scenes = [with_values_at(self.scene, each) for each in settings]
         alike: dict[tuple[float, str], list[int]] = {}
         for place, each in enumerate(scenes):

@@ -152,6 +152,7 @@ def test_runs_of_many_settings_and_devices_are_those_of_each_alone(balancer: Liq
     ]
     numbers = (1, 2, 5, 17)
     together = balancer.run_all(settings, Draws(numbers=numbers, whole=False))
+    assert balancer.run_all([], Draws(numbers=numbers, whole=False)) == ()
     for each, outcomes in zip(settings, together, strict=True):
         for place, number in enumerate(numbers):
             (alone,) = balancer.run_all([each], Draws(numbers=(number,), whole=False))

@@ -167,7 +167,7 @@ class Answers:
             stalled_fill_ratio=stalled,
             least_fill_ratio=least,
             largest_fill_ratio=top - least,
-            residual_depth=np.where(residual > 0, depth, 0.0),
+            residual_depth=np.where(residual > 0, np.maximum(depth, 0.0), 0.0),
             usable_volume=(top - 2 * least) * volume,
             usable_moment=usable,
             reach=usable / np.tan(np.pi / np.asarray(scene.disc.chambers)),

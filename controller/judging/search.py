@@ -137,7 +137,7 @@ def _on_more(balancer: Balancer, tried: Sequence[Tried]) -> list[Tried]:
     """On the devices that choose between the last few, too."""
     first, end = _FINAL
     settings = [each.judgement.settings for each in tried]
-    ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False)) if tried else ()
+    ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False))
     return [each.joined(outcomes) for each, outcomes in zip(tried, ran, strict=True)]
 
 

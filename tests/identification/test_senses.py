@@ -19,8 +19,10 @@ from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import problem_of
 from ringbalance.identification.intervals import about_pulls
 from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.misreadings import Joint
 from ringbalance.identification.optimisation import optimum, optimum_as_stated
 from ringbalance.identification.reading import KINDS
+from ringbalance.identification.reading_likelihood import Comparison
 from ringbalance.identification.readings import Reading, other_readings
 from ringbalance.scene import load_scene
 from ringbalance.scene.models import Scene
@@ -139,6 +141,23 @@ def test_eight_senses_are_named_or_called_undecided(
             alike |= {code((*senses[:2], not senses[2]))}
         assert named == (set() if "" in alike else alike)
         assert undecided == (alike - {""} if unseen else set())
+
+
+def test_senses_that_gain_about_as_much_are_told_apart_by_fits(
+    rig_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Far from the scene the linear gain of the senses that mirror the right ones may be the larger."""
+    made = rig(rig_scene, math.radians(40), "ABCDAB", weights=WEIGHTS)
+    linear = Comparison.gain
+
+    def curved(compare: Comparison, joint: Joint, chosen: Sequence[int]) -> float | None:
+        gain = linear(compare, joint, chosen)
+        mirror = [each.code for each in joint] == [*TURNED[:2]] and len(chosen) == 2
+        return gain * 1.02 + 100 if gain is not None and mirror else gain
+
+    monkeypatch.setattr(Comparison, "gain", curved)
+    turned = [counted(each, (False, False, True)) for each in made]
+    assert told(readings(rig_scene, turned)) == ({TURNED[2]}, set())
 
 
 @pytest.mark.parametrize("lag", [0.05, 179.95])

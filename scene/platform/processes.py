@@ -7,7 +7,14 @@ import logging
 import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import (
+    BrokenExecutor,
+    Executor,
+    Future,
+    InvalidStateError,
+    ProcessPoolExecutor,
+    as_completed,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
@@ -33,6 +40,22 @@ _BROKEN: Final[WeakSet[Executor]] = WeakSet()
 _ALONE: Final = "ringbalance: no further process can be used here (%s); one process does all the work"
 
 
+class _Cancellable(Future[_R]):
+    """A future that stays cancelled when the pool breaks, as from Python 3.12 on.
+
+    Before, the error of a lost worker ends the pool's thread at the first cancelled future, with a traceback,
+    and futures behind it are waited for without end.
+    """
+
+    def set_exception(self, exception: BaseException | None) -> None:
+        """See `Future`."""
+        try:
+            super().set_exception(exception)
+        except InvalidStateError:
+            if not self.cancelled():
+                raise
+
+
 class Workers(ProcessPoolExecutor):
     """A pool of fresh processes, one thread each, that are ended at once when its `with` block is left.
 
@@ -48,11 +71,13 @@ class Workers(ProcessPoolExecutor):
         """Have a worker call a function of an importable module; without a worker left, BrokenProcessPool."""
         with _quiet_start():
             try:
-                return super().submit(fn, *args, **kwargs)
+                future = super().submit(fn, *args, **kwargs)
             except (BrokenProcessPool, OSError) as error:
                 lost: Future[_R] = Future()
                 lost.set_exception(BrokenProcessPool(str(error)))
                 return lost
+        future.__class__ = _Cancellable
+        return future
 
     def result(self, future: Future[_R], again: Callable[[], _R]) -> _R:
         """What a worker returned, or, when the system ended it, what this process finds itself.

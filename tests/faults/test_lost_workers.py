@@ -54,7 +54,8 @@ def words_of(command: str, folder: Path) -> list[str]:
         options = ["--runs", "16", "--check", "0", "--no-figures", "--no-intervals"]
         return [PAPER, "--vary", *axes, "--out", str(folder / "sweep"), *options]
     if command == "verify":
-        return ["measured_smooth_tubes", "manufactured_2d", "manufactured_3d", "gravity_circle_2d"]
+        flows = ["rotating_section", "manufactured_flow", "developing_flow"]
+        return ["measured_smooth_tubes", "manufactured_2d", "manufactured_3d", "gravity_circle_2d", *flows]
     scene = rb.load_scene(rb.bundled_scene("spindle_design"))
     space = {"outer_radius": None, "axial_width": None, "pressure": None, "valves": None}
     widths = ["disc.axial_width=14mm,26mm,38mm", "tube.bore=0.9mm", "gas.pressure=0.4MPa"]

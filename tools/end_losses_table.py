@@ -177,6 +177,6 @@ def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
     with Workers(2) as executor:
         generate(folder=folder, settings=settings, executor=executor)
     yield (
-        ROOT / "physics" / "data" / "end_losses.csv",
+        ROOT / "ringbalance" / "physics" / "data" / "end_losses.csv",
         table_text(folder=folder, settings=settings).encode(),
     )

@@ -295,4 +295,4 @@ def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
     with Workers(2) as executor:
         generate(folder=folder, settings=settings, executor=executor)
     table = table_text(folder=folder, settings=settings)
-    yield ROOT / "physics" / "data" / "rotating_friction.csv", table.encode()
+    yield ROOT / "ringbalance" / "physics" / "data" / "rotating_friction.csv", table.encode()

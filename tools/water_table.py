@@ -12,7 +12,7 @@ from chemicals.viscosity import mu_IAPWS
 from numpy.polynomial import chebyshev
 
 COLDEST, HOTTEST, PRESSURE, DEGREE = 273.15, 373.05, 101325.0, 20
-TARGET = Path(__file__).resolve().parent.parent / "scene" / "data" / "water.csv"
+TARGET = Path(__file__).resolve().parent.parent / "ringbalance" / "scene" / "data" / "water.csv"
 HEAD = """\
 # Water at 101325 Pa, 273.15 to 373.05 K: coefficients of Chebyshev series in x = 2 (T - 273.15) / 99.9 - 1.
 # Density and vapour pressure: IAPWS-95, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387;

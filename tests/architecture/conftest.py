@@ -21,6 +21,8 @@ ROOM_ORDER = (
     "verification",
     "reports",
 )
+LINKED = ("mesh", "reduced_model", "verification", "reports", "scenes")
+"""Folders at the root, each a package of `ringbalance/` by a link there."""
 
 
 @pytest.fixture(scope="session")
@@ -36,12 +38,19 @@ def room_order() -> tuple[str, ...]:
 
 
 @pytest.fixture(scope="session")
+def linked() -> tuple[str, ...]:
+    """Folders at the root that are linked into the package."""
+    return LINKED
+
+
+@pytest.fixture(scope="session")
 def modules() -> Mapping[str, Path]:
     """Dotted name to file, for every module of every room."""
     found: dict[str, Path] = {}
     for room in ROOM_ORDER:
-        for path in sorted((ROOT / room).rglob("*.py")):
-            parts = path.relative_to(ROOT).with_suffix("").parts
+        place = ROOT if room in LINKED else ROOT / "ringbalance"
+        for path in sorted((place / room).rglob("*.py")):
+            parts = path.relative_to(place).with_suffix("").parts
             name = ".".join(("ringbalance", *(part for part in parts if part != "__init__")))
             found[name] = path
     return found

@@ -28,11 +28,12 @@ def project(root: Path) -> Mapping[str, Any]:
     return tomllib.loads((root / "pyproject.toml").read_text())
 
 
-def folders_with_code(root: Path, room: str) -> set[str]:
-    """Dotted package names below one top folder: its folders with an `__init__.py`."""
+def packages_below(folder: Path, *, place: Path) -> set[str]:
+    """Dotted package names below a folder: its folders with an `__init__.py`, named from the place given."""
     return {
-        ".".join(("ringbalance", *path.parent.relative_to(root).parts))
-        for path in (root / room).rglob("__init__.py")
+        ".".join(("ringbalance", *path.parent.relative_to(place).parts))
+        for path in folder.rglob("__init__.py")
+        if not any(above.is_symlink() for above in path.relative_to(place).parents)
     }
 
 
@@ -88,28 +89,29 @@ def pin_errors(text: str, version: str, requirements: list[str]) -> list[str]:
 
 
 def test_the_package_list_is_the_folders(
-    project: Mapping[str, Any], root: Path, room_order: tuple[str, ...]
+    project: Mapping[str, Any], root: Path, linked: tuple[str, ...]
 ) -> None:
-    folders = {"ringbalance"}.union(*(folders_with_code(root, room) for room in (*room_order, "scenes")))
+    within = packages_below(root / "ringbalance", place=root / "ringbalance")
+    folders = within.union(*(packages_below(root / name, place=root) for name in linked))
     assert sorted(project["tool"]["setuptools"]["packages"]) == sorted(folders)
 
 
-def test_every_room_is_mapped_and_linked(
-    project: Mapping[str, Any], root: Path, room_order: tuple[str, ...]
+def test_every_folder_at_the_root_is_mapped_and_linked(
+    project: Mapping[str, Any], root: Path, linked: tuple[str, ...]
 ) -> None:
-    mapped = project["tool"]["setuptools"]["package-dir"]
-    for room in (*room_order, "scenes"):
-        assert mapped[f"ringbalance.{room}"] == room
-        # A source distribution has no links: pip follows the map alone.
-        if (root / ".git").exists():
-            assert (root / "ringbalance" / room).readlink() == Path("..") / room
+    assert project["tool"]["setuptools"]["package-dir"] == {f"ringbalance.{name}": name for name in linked}
+    # A source distribution has no links: pip follows the map alone.
+    if (root / ".git").exists():
+        links = {path.name: path.readlink() for path in (root / "ringbalance").iterdir() if path.is_symlink()}
+        assert links == {name: Path("..") / name for name in linked}
 
 
-def test_every_data_file_is_packaged(project: Mapping[str, Any], root: Path) -> None:
+def test_every_data_file_is_packaged(project: Mapping[str, Any], root: Path, linked: tuple[str, ...]) -> None:
     settings = project["tool"]["setuptools"]
     for package in settings["packages"]:
         if package != "ringbalance":
-            folder = root.joinpath(*package.split(".")[1:])
+            parts = package.split(".")
+            folder = root.joinpath(*parts[1:] if parts[1] in linked else parts)
             patterns = settings["package-data"].get(package, []) + settings["package-data"].get("*", [])
             assert missing_data(folder, patterns) == [], package
 
@@ -201,7 +203,7 @@ def test_the_line_to_run_says_sudo_only_where_it_exists(root: Path, tmp_path: Pa
     assert "apt-get install -y --no-install-recommends some-package" in result.stdout
 
 
-def test_no_room_is_imported_by_its_folder_s_name(root: Path, room_order: tuple[str, ...]) -> None:
+def test_no_room_is_imported_by_its_folder_s_name(root: Path, linked: tuple[str, ...]) -> None:
     code = """
 import importlib, sys
 for room in sys.argv[1:]:
@@ -212,7 +214,6 @@ for room in sys.argv[1:]:
     else:
         raise AssertionError(room)
 """
-    rooms = (*room_order, "scenes")
-    command = [sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(root)!r})\n{code}", *rooms]
+    command = [sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(root)!r})\n{code}", *linked]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr

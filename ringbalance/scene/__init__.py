@@ -6,11 +6,6 @@ The names below are loaded when they are first used, so that registering a kind 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-if not __name__.startswith("ringbalance."):
-    raise ImportError(
-        f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
-    )
-
 if TYPE_CHECKING:
     from ringbalance.scene.describe import Row as Row
     from ringbalance.scene.describe import scene_fault as scene_fault

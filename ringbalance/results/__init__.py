@@ -7,8 +7,3 @@ numbers and the change of the scene that would mend it; the sentences are in `se
 notebook, a CSV file and JSON.
 A new quantity is one `Quantity` where it is computed; a new finding one code, with one sentence.
 """
-
-if not __name__.startswith("ringbalance."):
-    raise ImportError(
-        f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
-    )

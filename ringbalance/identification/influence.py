@@ -139,9 +139,9 @@ def read_influence(path: Path | str) -> InfluenceTable:
         raise SceneError(wrong)
     sign, factor = _SIGNS[str(table.header[sign_key])], _AMPLITUDES[str(table.header["vibration"])]
     first, second = (values[name] for name in columns[1:])
-    coefficient = factor * (first + 1j * sign * second if cartesian else first * np.exp(1j * sign * second))
+    phasor = first + 1j * sign * second if cartesian else first * np.exp(1j * sign * second)
     order = np.argsort(values["speed"])
-    speed, coefficient = values["speed"][order], np.asarray(coefficient, dtype=np.complex128)[order]
+    speed, coefficient = values["speed"][order], np.asarray(factor * phasor, dtype=np.complex128)[order]
     if speed.size < 2 or np.any(np.diff(speed) <= 0.0) or speed[0] <= 0.0 or np.any(coefficient == 0.0):
         problem = "no table of vibrations over speeds"
         allowed = "two speeds or more, each once, none of them zero"

@@ -5,8 +5,3 @@ beside it; `disc.py` and `controller.py` go
 on in time, `blocks.py` has what a host sees, `translate.py` writes them in other languages; `hosts.py`
 and `fmu.py` put frames around them.
 """
-
-if not __name__.startswith("ringbalance."):
-    raise ImportError(
-        f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
-    )

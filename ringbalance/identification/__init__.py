@@ -3,8 +3,3 @@
 `data/` reads the files of measurements; `predict/` predicts each kind of them through the
 program's own laws; likelihood, intervals, verdicts and criticism of the model stand beside them.
 """
-
-if not __name__.startswith("ringbalance."):
-    raise ImportError(
-        f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
-    )

@@ -1,0 +1,1 @@
+"""The closed loop: rotor, liquid-ring disc, control algorithms and the integration of injections in time."""

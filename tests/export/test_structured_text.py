@@ -117,7 +117,7 @@ class Machine:
     def _places(self, node: Any, names: dict[str, Any]) -> list[int]:
         return [self._value(each, names) for each in node.elements[0].subscripts]
 
-    def _value(self, node: Any, names: dict[str, Any]) -> Any:  # noqa: C901
+    def _value(self, node: Any, names: dict[str, Any]) -> Any:
         match type(node).__name__:
             case "Integer":
                 return int(node.value)

@@ -19,10 +19,9 @@ import numpy.typing as npt
 
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X, empty_plants
-from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE, empty_plants
 from ringbalance.reduced_model.injection.limits import hold_liquid
-from ringbalance.reduced_model.injection.march import advance
+from ringbalance.reduced_model.injection.march import inject_each
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -127,10 +126,11 @@ class Device:
         gravity = self.scene.environment.gravity > 0
         laws = nominal_laws(scenes, gravity=gravity, rings=self.models.rings)
         for device, law in zip(devices, laws, strict=True):
-            velocity = _primed_velocity(law, device.scene)
+            # No velocity of a primed tube depends on which flows carry gas out of the crest.
+            bare = replace(law, path=replace(law.path, froude_velocity=0.0))
+            velocity = _primed_velocity(bare, device.scene)
             if velocity > 0 and self.models.velocity > 0:
-                froude = law.path.froude_velocity * velocity / self.models.velocity
-                law = law.cleared_at(froude)
+                law = bare.cleared_at(law.path.froude_velocity * velocity / self.models.velocity)
             vars(device)["law"] = law if self.models.other is None else self.models.other(law)
         own: CalibratedLaw = vars(self)["law"]
         return own
@@ -170,22 +170,40 @@ class Device:
             self._kept[id(observations)] = observations, find(self, observations)
         return self._kept[id(observations)][1]
 
-    def injected(self, *, fill: float, chamber: int, pressure: float, gas_time: float) -> float:
-        """Fill of chamber 0 of a pair at rest after gas into one of its chambers, and all that follows.
+    def injected(
+        self,
+        *,
+        fill: npt.ArrayLike,
+        follows: Sequence[int] | None = None,
+        chamber: npt.ArrayLike,
+        pressure: npt.ArrayLike,
+        gas_time: npt.ArrayLike,
+    ) -> FloatArray:
+        """Fill of chamber 0 of a pair at rest before and after each of n injections, shape (2, n).
 
-        Args: `fill`: x of chamber 0 before. `chamber`: 0 or 1. `pressure`: of the supply, as the gauge shows
-            it, Pa.
-            `gas_time`: from the command to open to the command to close, s.
+        Args: `fill`: x of chamber 0 before. `follows`: number of the injection whose end each begins with, or
+            its own to begin with `fill`; None: all of them. `chamber`: 0 or 1, that the gas enters.
+            `pressure`: of the supply, as the gauge shows it, Pa. `gas_time`: from the command to open to the
+            command to close, s.
         """
-        plant, work = self._plant, np.zeros(WORKSPACE)
-        plant["gas_pressure"] = pressure + self.scene.gas.pressure - self.models.gas_pressure
-        motion = at_rest(plant, fill=fill)
-        # Of a shorter time the model would have nothing left to start.
-        left = max(gas_time - self._delay, _LEAST_LEFT * gas_time)
-        command(plant[0], motion[0], chamber, left)
-        lag = float(plant["valve_lag"][0])
-        advance(plant[0], motion[0], lag + left + _SETTLED, work, 0, 0, work)
-        return float(motion["state"][0, X])
+        off, times = self.scene.gas.pressure - self.models.gas_pressure, np.atleast_1d(gas_time)
+        count, plant = times.size, self._plant
+        fills = np.zeros((2, count))
+        fills[0] = fill
+        motions = np.repeat(at_rest(plant, fill=self.scene.disc.initial_fill), 2)
+        inject_each(
+            plant[0],
+            motions,
+            np.arange(count) if follows is None else np.array(follows, dtype=np.int64),
+            np.broadcast_to(np.asarray(chamber, dtype=np.int64), count).copy(),
+            np.broadcast_to(np.asarray(pressure, dtype=np.float64) + off, count).copy(),
+            # Of a shorter time the model would have nothing left to start.
+            np.maximum(times - self._delay, _LEAST_LEFT * times),
+            _SETTLED,
+            fills,
+            np.zeros(WORKSPACE),
+        )
+        return fills
 
     @classmethod
     def of(cls, scene: Scene, models: Models) -> Device:

@@ -88,6 +88,8 @@ class Comparison:
     """Held inputs at which predictions are made, in standard deviations."""
     changed: dict[tuple[int, tuple[str, ...]], _Rows | None]
     """Rows of each file, by what a reading has been set to; None where nothing can be predicted of it."""
+    refits: dict[tuple[Joint, tuple[int, ...]], float]
+    """Gains by fits that were made before."""
 
     @classmethod
     def of(cls, best: Optimum) -> Comparison:
@@ -97,7 +99,7 @@ class Comparison:
         parts = zip(problem.blocks, *(_unwhitened(problem, each) for each in values), strict=True)
         rows = tuple(_Rows(block=b, predicted=f[:, 0], slopes=s, held=h) for b, f, s, h in parts)
         pulled = best.residuals.pulled
-        return cls(problem=problem, rows=rows, given=deviance_of(best), pulled=pulled, changed={})
+        return cls(problem=problem, rows=rows, given=deviance_of(best), pulled=pulled, changed={}, refits={})
 
     @cached_property
     def given_from_scene(self) -> float:
@@ -122,11 +124,16 @@ class Comparison:
         size = sum(self.rows[i].block.measured.size for i in chosen)
         return size * sum(math.log(each.scale) for each in joint)
 
-    def refitted(self, joint: Joint, chosen: Sequence[int], scene: Any) -> float:
+    def refitted(self, joint: Joint, chosen: tuple[int, ...], scene: Any) -> float:
         """Gain by a fit from the scene as stated; minus infinity where there is none.
 
         The scene to which wrong readings pull held inputs is far from where another reading has them.
         """
+        if (joint, chosen) not in self.refits:
+            self.refits[joint, chosen] = self._refitted(joint, chosen, scene)
+        return self.refits[joint, chosen]
+
+    def _refitted(self, joint: Joint, chosen: tuple[int, ...], scene: Any) -> float:
         blocks = list(self.problem.blocks)
         for i in chosen:
             for each in joint:

@@ -140,7 +140,8 @@ def test_laws_made_together_may_differ_in_any_number_alone(paper_scene: Scene, d
     )
 
     def left(device: Device) -> float:
-        return device.injected(fill=0.25, chamber=0, pressure=scene.gas.pressure, gas_time=0.1)
+        before_and_after = device.injected(fill=0.25, chamber=0, pressure=scene.gas.pressure, gas_time=0.1)
+        return float(before_and_after[1, 0])
 
     for name in UNCERTAIN_QUANTITIES:
         value = nominal_value(scene=scene, quantity=name)

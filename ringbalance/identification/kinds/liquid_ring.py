@@ -108,19 +108,26 @@ def _fills(device: Device, observations: Observations) -> FloatArray:
     """Fill of the positive chamber of each row's pair before and after, shape (2, n)."""
     disc, columns = device.scene.disc, observations.columns
     half, total = disc.chambers // 2, 2 * disc.initial_fill
-    now: dict[tuple[str, int], float] = {}
-    found, stated = np.empty((2, len(observations))), columns.get("fill_ratio")
-    for i, number in enumerate(_chamber_numbers(device.scene, observations).tolist()):
-        place = str(observations.series[i]), number % half
-        if stated is not None:
-            x = min(float(stated[i]), total)
-            now[place] = x if number < half else total - x
-        found[0, i] = now.get(place, disc.initial_fill)
-        pressure, gas_time = float(columns["pressure"][i]), float(columns["gas_time"][i])
-        found[1, i] = now[place] = device.injected(
-            fill=found[0, i], chamber=number // half, pressure=pressure, gas_time=gas_time
-        )
-    return found
+    numbers, fill = (
+        _chamber_numbers(device.scene, observations),
+        np.full(len(observations), disc.initial_fill),
+    )
+    follows = list(range(len(observations)))
+    if "fill_ratio" in columns:
+        stated = np.minimum(columns["fill_ratio"], total)
+        fill = np.where(numbers < half, stated, total - stated)
+    else:
+        last: dict[tuple[str, int], int] = {}
+        for i, pair in enumerate(zip(observations.series.tolist(), (numbers % half).tolist(), strict=True)):
+            follows[i] = last.get(pair, i)
+            last[pair] = i
+    return device.injected(
+        fill=fill,
+        follows=follows,
+        chamber=numbers // half,
+        pressure=columns["pressure"],
+        gas_time=columns["gas_time"],
+    )
 
 
 def _transferred(scene: Scene, observations: Observations, models: Models) -> FloatArray:
@@ -132,9 +139,13 @@ def _transferred(scene: Scene, observations: Observations, models: Models) -> Fl
 
 def _moved(device: Device, observations: Observations) -> FloatArray:
     columns = observations.columns
-    before = np.minimum(columns["fill_ratio"], 2 * device.scene.disc.initial_fill)
-    rows = zip(before.tolist(), columns["pressure"].tolist(), columns["gas_time"].tolist(), strict=True)
-    return before - [device.injected(fill=x, chamber=0, pressure=p, gas_time=t) for x, p, t in rows]
+    before, after = device.injected(
+        fill=np.minimum(columns["fill_ratio"], 2 * device.scene.disc.initial_fill),
+        chamber=0,
+        pressure=columns["pressure"],
+        gas_time=columns["gas_time"],
+    )
+    return np.asarray(before - after)
 
 
 def _flow_rates(scene: Scene, observations: Observations, models: Models) -> FloatArray:

@@ -6,7 +6,7 @@ Beside it the moment of a pair of chambers, from the same chamber.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -142,24 +142,12 @@ class CalibratedLaw:
     @cached_property
     def constants(self) -> tuple[FloatArray, FloatArray]:
         """Numbers and pieces, all that `point` needs to answer a query."""
-        (siphon, *ways), density = self.heads.tables, self.density
-        rows = LawRows.of(len(self.heads.tables))
-        rows.add_levels(self.levels)
-        error, pieces = self.heads.interpolation_error, siphon.knots.size - 1
-        rows.add_way(
-            point.SIPHON, siphon, density, error=error, more=(pieces, *self.carrying_pressures(siphon))
-        )
-        if ways:
-            rows.add_shares(siphon, density)
-        for at, way in enumerate(ways, start=point.THERE):
-            rows.add_way(at, way, density, error=error, more=(0.0, *self.carrying_pressures(way)))
-        return rows.arrays(self.scalars())
+        numbers, pieces = constants_of([self])
+        return numbers[0], pieces[0]
 
     def carrying_pressures(self, table: Table) -> FloatArray:
         """Under which a flow carries half of the gas over the crest out, none and all, Pa."""
-        low, high = CLEARING
-        velocities = self.path.froude_velocity * np.array([(low + high) / 2, low, high])
-        return self.density * roots_of(table, velocities) ** 8 if self.path.froude_velocity else velocities
+        return _carrying_pressures(table, self.density, self.path.froude_velocity)
 
     def cleared_at(self, froude_velocity: float) -> CalibratedLaw:
         """The law with another velocity of the path that carries gas out of the crest, m/s."""
@@ -406,6 +394,33 @@ class CalibratedLaw:
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
+
+
+def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]:
+    """`CalibratedLaw.constants` of laws with equally many ways and knots, each with a first axis of laws."""
+    siphon, *ways = (Table.stacked(each) for each in zip(*(law.heads.tables for law in laws), strict=True))
+    density = np.array([law.density for law in laws])
+    froude = np.array([law.path.froude_velocity for law in laws])
+    error = np.array([law.heads.interpolation_error for law in laws])
+    rows = LawRows.of(1 + len(ways), stack=(len(laws),))
+    rows.add_levels(Table.stacked([law.levels for law in laws]))
+    beside = siphon.knots.shape[-1] - 1
+    for at, way in enumerate((siphon, *ways)):
+        more = (0 if at else beside, *_carrying_pressures(way, density, froude).T)
+        rows.add_way(at, way, density, error=error, more=more)
+        if ways and at == point.SIPHON:
+            rows.add_shares(siphon, density)
+    scalars = [law.scalars() for law in laws]
+    return rows.arrays({place: [each[place] for each in scalars] for place in scalars[0]})
+
+
+def _carrying_pressures(table: Table, density: npt.ArrayLike, froude: npt.ArrayLike) -> FloatArray:
+    """Under which flows carry half of the gas over the crest out, none and all, Pa; of a stack, too."""
+    low, high = CLEARING
+    velocities = np.multiply.outer(froude, [(low + high) / 2, low, high])
+    if not np.any(velocities):
+        return velocities
+    return np.asarray(np.asarray(density)[..., None] * roots_of(table, velocities) ** 8)
 
 
 class _Rows(dict[int, list[float]]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator, MutableMapping, Sequence
+from collections.abc import Hashable, MutableMapping, Sequence
 from dataclasses import replace
 from typing import Final, TypeAlias
 
@@ -24,6 +24,7 @@ from ringbalance.reduced_model.law.calibrated_law import (
     CalibratedLaw,
     CalibratedMoment,
     DriveUncertainty,
+    constants_of,
 )
 from ringbalance.reduced_model.law.flow_law import (
     CALIBRATED,
@@ -146,8 +147,8 @@ def nominal_laws(
 
 def _nominal(
     scenes: Sequence[Scene], kept: Rings, *, gravity: bool, waves: Sequence[float] | None
-) -> Iterator[CalibratedLaw]:
-    """Of scenes that are alike."""
+) -> list[CalibratedLaw]:
+    """Laws of scenes that are alike, with their constants, which are found faster together."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
     heads = TubeHeads.nominal(designs)
     pressures, moments = _chambers(designs, scenes, fills, kept, gravity=gravity)
@@ -156,14 +157,19 @@ def _nominal(
         pressures = [level * (1 + each * share) for level, each in zip(pressures, waves, strict=True)]
     levels = pressure_tables(scenes, fills, pressures)
     curves = smooth_tables(fills, designs.scene.disc.moment_factor * moments)
-    for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):
-        yield _put_together(
+    laws = [
+        _put_together(
             scene,
             heads=head,
             levels=level.with_column(WIDTH, 0.0),
             inputs=DriveUncertainty(),
             moment=CalibratedMoment(along=moment.with_column(WIDTH, 0.0), across=_across_table(scene, fills)),
         )
+        for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True)
+    ]
+    for law, *constants in zip(laws, *constants_of(laws), strict=True):
+        vars(law)["constants"] = tuple(constants)
+    return laws
 
 
 def _chambers(

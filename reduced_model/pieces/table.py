@@ -16,25 +16,36 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, clipped
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Table:
-    """Columns over knots: values with slopes and curvatures, or values that are straight between knots."""
+    """Columns over knots: values with slopes and curvatures, or values that are straight between knots.
+
+    A stack of tables has its tables on a first axis; of such, columns and coefficients alone are asked for.
+    """
 
     knots: FloatArray
-    """The argument, shape (n,), n at least 2, growing; read-only."""
+    """The argument, shape (n,) or (tables, n), n at least 2, growing; read-only."""
     columns: FloatArray
-    """Shape (columns n,), one column behind the other; read-only."""
+    """Shape (columns n,) or (tables, columns n), one column behind the other; read-only."""
 
     def __post_init__(self) -> None:
         """Copy the arrays, so that nothing outside can change the table."""
         for name in ("knots", "columns"):
             array = np.array(getattr(self, name), dtype=np.float64)
-            if array.ndim != 1 or not np.all(np.isfinite(array)):
-                raise ValueError(f"{name} must be one row of finite numbers")
+            if array.ndim not in (1, 2) or not np.all(np.isfinite(array)):
+                raise ValueError(f"{name} must be rows of finite numbers")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        if self.knots.size < 2 or not np.all(np.diff(self.knots) > 0):
+        if self.knots.shape[-1] < 2 or not np.all(np.diff(self.knots) > 0):
             raise ValueError("a table needs two knots or more, which grow")
         if self.columns.size == 0 or self.columns.size % self.knots.size:
             raise ValueError("a table needs whole columns, with a number for every knot")
+
+    @classmethod
+    def stacked(cls, tables: Sequence[Table]) -> Table:
+        """The stack of tables with equally many knots and columns."""
+        return cls(
+            knots=np.stack([each.knots for each in tables]),
+            columns=np.stack([each.columns for each in tables]),
+        )
 
     @property
     def count(self) -> int:
@@ -42,8 +53,9 @@ class Table:
         return self.columns.size // self.knots.size
 
     def column(self, number: int) -> FloatArray:
-        """Values of a column at the knots, shape (n,)."""
-        return self.columns[number * self.knots.size : (number + 1) * self.knots.size]
+        """Values of a column at the knots, of their shape."""
+        n = self.knots.shape[-1]
+        return self.columns[..., number * n : (number + 1) * n]
 
     def with_column(self, number: int, values: npt.ArrayLike) -> Table:
         """The table with other values in a column, or one more behind the last."""
@@ -53,26 +65,29 @@ class Table:
 
     @cached_property
     def quintics(self) -> FloatArray:
-        """The first column, with its slopes and curvatures, in powers of x - end, shape (6, n - 1)."""
-        h = np.diff(self.knots)
-        ends = [(column[:-1], column[1:]) for column in map(self.column, range(3))]
-        return np.array(_polynomial(h, *ends)) / h ** np.arange(6)[:, None]
+        """The first column, with its slopes and curvatures, in powers of x - end, shape (..., 6, n - 1)."""
+        return self._powers(range(3))
 
     def cubics(self, number: int) -> FloatArray:
-        """A column with its slopes in powers of x - end, shape (4, n - 1)."""
+        """A column with its slopes in powers of x - end, shape (..., 4, n - 1)."""
+        return self._powers((number, number + 1))
+
+    def _powers(self, numbers: Sequence[int]) -> FloatArray:
+        """Coefficients of the pieces by a column and its derivatives in further ones."""
         h = np.diff(self.knots)
-        ends = [(column[:-1], column[1:]) for column in map(self.column, (number, number + 1))]
-        return np.array(_polynomial(h, *ends)) / h ** np.arange(4)[:, None]
+        ends = [(column[..., :-1], column[..., 1:]) for column in map(self.column, numbers)]
+        powers = np.stack(_polynomial(h, *ends), axis=-2)
+        return np.asarray(powers / h[..., None, :] ** np.arange(powers.shape[-2])[:, None])
 
     def lines(self, values: FloatArray) -> FloatArray:
-        """Values at the knots, straight between them, in powers of x - end, shape (2, n - 1)."""
-        return np.array([values[1:], np.diff(values) / np.diff(self.knots)])
+        """Values at the knots, straight between them, in powers of x - end, shape (..., 2, n - 1)."""
+        return np.stack([values[..., 1:], np.diff(values) / np.diff(self.knots)], axis=-2)
 
     def place(self, x: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
         """The piece of any x, or the nearest one, and the distance from its end."""
         inside = clipped(x, self.knots[0], self.knots[-1])
-        piece = np.searchsorted(self.knots[1:-1], inside, side="left")
-        return np.asarray(piece), np.asarray(inside - self.knots[piece + 1])
+        piece = pieces_of(self.knots, inside)
+        return piece, np.asarray(inside - self.knots[piece + 1])
 
     def quintic(self, x: npt.ArrayLike) -> FloatArray:
         """The first column at any x, level beyond the ends."""
@@ -95,6 +110,13 @@ class Table:
     def straight(self, x: npt.ArrayLike, number: int) -> FloatArray:
         """A column at any x, level beyond the ends."""
         return np.asarray(np.interp(np.asarray(x, dtype=np.float64), self.knots, self.column(number)))
+
+
+def pieces_of(knots: FloatArray, x: npt.ArrayLike) -> IntArray:
+    """Pieces that hold some x, each with its end; of a stack of knots, the x of each on a first axis."""
+    if knots.ndim == 1:
+        return np.asarray(np.searchsorted(knots[1:-1], x))
+    return np.stack([np.searchsorted(*each) for each in zip(knots[:, 1:-1], np.asarray(x), strict=True)])
 
 
 def _polynomial(h: Any, value: tuple[Any, Any], *derivatives: tuple[Any, Any]) -> list[Any]:

@@ -15,14 +15,14 @@ from ringbalance.physics.tube.loss import (
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, spline, table_at
+from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, pieces_of, spline, table_at
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_head,
     crest_span,
     reversed_tube,
 )
-from ringbalance.scene.arrays import FloatArray, clipped, plain
+from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import Fault, SceneError
@@ -249,24 +249,41 @@ def _places(count: int) -> FloatArray:
 
 
 def velocities_of(table: Table) -> FloatArray:
-    """At the knots of a table of heads, m/s."""
+    """Velocities at the knots of a table of heads, m/s."""
     return np.asarray(table.knots**4 * table.column(0))
 
 
 def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
-    """Eighth roots of the heads that velocities above zero lose, m/s."""
-    u, at = np.asarray(velocity, dtype=np.float64), velocities_of(table)
-    inside, knots = clipped(u, at[0], at[-1]), table.knots
-    piece = np.searchsorted(at[1:-1], inside)
-    low, high = knots[piece], knots[piece + 1]
-    root = low + (high - low) * (inside - at[piece]) / (at[piece + 1] - at[piece])
+    """Eighth roots of the heads that velocities above zero lose, m/s.
+
+    Args: `velocity`: of a stack of tables those of each, shape (tables, n).
+    """
+    velocity = np.asarray(velocity, dtype=np.float64)
+    knots, at = np.atleast_2d(table.knots), np.atleast_2d(velocities_of(table))
+    u = velocity.reshape(len(knots), -1)
+    tables, coefficients = np.arange(len(knots))[:, None], table.quintics.reshape(len(knots), 6, -1)
+    slowest, fastest = at[:, :1], at[:, -1:]
+    inside = np.minimum(np.maximum(u, slowest), fastest)
+    piece = pieces_of(at, inside)
+    low, high = knots[tables, piece], knots[tables, piece + 1]
+    start, end = at[tables, piece], at[tables, piece + 1]
+    root = low + (high - low) * (inside - start) / (end - start)
+    near = np.ones((len(knots), 1), dtype=np.bool_)
     for _ in range(_NEWTON_STEPS):
-        ratio, slope = table.quintic(root), table.quintic_slope(root)
+        # A piece holds its end, the first one its start, too.
+        row = piece - ((root == low) & (piece > 0))
+        c, t = coefficients[tables, :, row], root - knots[tables, row + 1]
+        c0, c1, c2, c3, c4, c5 = np.moveaxis(c, -1, 0)
+        ratio = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
+        slope = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * (5.0 * c5))))
         change = (inside - root**4 * ratio) / (root**3 * (4 * ratio + root * slope))
-        root = np.minimum(np.maximum(root + change, low), high)
-        if np.all(np.abs(change) <= _ROUND_OFF * root):
+        # Each table ends its own steps, whatever stands beside it.
+        root = np.where(near, np.minimum(np.maximum(root + change, low), high), root)
+        near &= np.any(np.abs(change) > _ROUND_OFF * root, axis=1, keepdims=True)
+        if not near.any():
             break
-    return np.asarray(root * np.minimum(u / at[0], 1.0) ** 0.125 * np.maximum(u / at[-1], 1.0) ** 0.25)
+    root = root * np.minimum(u / slowest, 1.0) ** 0.125 * np.maximum(u / fastest, 1.0) ** 0.25
+    return np.asarray(root.reshape(velocity.shape))
 
 
 def _inconsistent(scene: Scene) -> SceneError:

@@ -280,7 +280,7 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -
         error[first + (first > 0) : last + 1] = np.max(np.abs(level.errors(x, first, last)))
     rows.numbers[0][point.LEVEL_SCALE] = rows.add_cells(x[ends], cells=_LEVEL_CELLS)[0]
     widened = replace(width, value=np.hypot(width.value, error))
-    rows.add(x[ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
+    rows.add(x[None, ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
     return float(np.max(error))
 
 
@@ -297,7 +297,7 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float, 
     columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
     rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends], cells=cells)
-    rows.add(x[ends[1:]], *(each.pieces(x, ends) for each in columns))
+    rows.add(x[None, ends[1:]], *(each.pieces(x, ends) for each in columns))
 
 
 def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float, ease: float) -> None:

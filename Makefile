@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-units test-versions lint format bench bench-cfd pages docs dist lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-units test-versions lint style format bench bench-cfd pages docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -29,8 +29,12 @@ env: ## make .venv from requirements/lock.txt and see to off-screen OpenGL; noth
 report: env ## the report on SCENE (the paper's disc) into OUT (out/)
 	$(VENV)/bin/ringbalance report $(SCENE) --out $(OUT)
 
-test: lint ## lint, types and every test but the heavy ones and the faults
-	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS)
+test: style ## lint, types and every test but the heavy ones and the faults
+	@# mypy takes a minute of one processor: beside the tests, not before them.
+	@mkdir -p build
+	@$(VENV)/bin/mypy >build/types.txt 2>&1 & types=$$!; \
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS); tests=$$?; \
+	wait $$types || { cat build/types.txt; exit 1; }; exit $$tests
 
 test-faults: env ## kills, damaged caches, odd environments: a few minutes, part of .ci/run
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults
@@ -39,7 +43,7 @@ test-units: env ## units of `export` under FMPy, fmutool and the cross-compiler,
 	$(VENV)/bin/uv run --no-project --python $(PYTHON_IN_VENV) --with fmpy --with fmu-manipulation-toolbox --with ziglang -- \
 		python -m pytest tests/export/test_fmu.py
 
-test-short: lint ## lint, types and a short selection of the tests
+test-short: env ## a short selection of the tests
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) $(SHORT_TESTS)
 
 test-versions: env ## the tests under every further supported Python of this machine, each in .venv-3.X
@@ -48,10 +52,12 @@ test-versions: env ## the tests under every further supported Python of this mac
 test-heavy: env ## the tests that take long
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m heavy
 
-lint: env ## ruff and mypy
+lint: style ## style and types: ruff, the length of functions, mypy
+	$(VENV)/bin/mypy
+
+style: env ## ruff and the length of functions
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
-	$(VENV)/bin/mypy
 	$(PYTHON_IN_VENV) tools/long_functions.py $(CODE)
 
 format: env ## let ruff write what `make lint` asks for

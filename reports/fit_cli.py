@@ -39,7 +39,7 @@ def fit(
         template: print an empty file of measurements of this kind, with explanations, and do nothing else.
 
     Returns:
-        Exit code: 1 when the fit does not describe the data, or another law does so better.
+        Exit code: 1 when the fit does not describe the data.
 
     Raises:
         SceneError: a scene, a file of measurements or a parameter that cannot be used.

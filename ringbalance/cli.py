@@ -116,7 +116,7 @@ COMMANDS = {
         "ringbalance.reports.fit_cli:fit",
         "Parameters of a built disc from measurements, with intervals and what the data identify.",
         "SCENE rig.csv --save fitted.toml",
-        "the fit does not describe its data, or they prefer another law",
+        "the fit does not describe its data",
     ),
     "verify": (
         "ringbalance.verification.cli:verify",

@@ -59,8 +59,8 @@ class Fit(Result):
 
     @property
     def succeeded(self) -> bool:
-        """Whether the fit describes the data, and no other law does so better."""
-        return self.review.holds
+        """Whether the fit describes the data, as they are read."""
+        return self.review.describes
 
     def to_dict(self) -> dict[str, Any]:
         """What `ringbalance fit --json` prints."""

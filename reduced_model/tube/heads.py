@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -158,26 +158,6 @@ class TubeHeads:
     def uncertainty(self, velocity: npt.ArrayLike) -> FloatArray:
         """Expanded uncertainty (95 %) of k over k + 1 at velocities above zero, m/s."""
         return self.siphon.straight(roots_of(self.siphon, velocity), LOSS)
-
-    def power(self, *, velocity: float, exponent: float) -> TubeHeads:
-        """Heads in proportion to a power of the velocity, those of the tube at one velocity, m/s."""
-
-        def power(table: Table) -> Table:
-            u, at = velocities_of(table), roots_of(table, velocity)
-            root, n = float(at) * (u / velocity) ** (exponent / 8), 8 / exponent - 4
-            ratio = u / root**4
-            columns = [ratio, n * ratio / root, n * (n - 1) * ratio / root**2]
-            columns += [table.column(number) for number in range(LOSS, min(table.count, SHARE))]
-            for number in range(SHARE, table.count, 2):
-                columns += [np.full_like(u, table.cubic(at, number)), np.zeros_like(u)]
-            return Table(knots=root, columns=np.concatenate(columns))
-
-        return self._changed(power)
-
-    def _changed(self, change: Callable[[Table], Table]) -> TubeHeads:
-        ways = (None if table is None else change(table) for table in (self.hump, self.return_hump))
-        hump, back = ways
-        return replace(self, siphon=change(self.siphon), hump=hump, return_hump=back)
 
 
 @dataclass(frozen=True, kw_only=True)

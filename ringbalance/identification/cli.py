@@ -69,9 +69,9 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
         rows = fit_rows(result, data=observations, told=told, following=following)
         print_rows(rows, headline=False)
     if asked.save is not None:
-        save_result(asked.save, scene=given, result=result, data=observations, said=told.sentences)
+        save_result(asked.save, scene=given, result=result, data=observations, said=told.text)
         print_message(f"fitted scene written to {asked.save}")
-    return (DONE if told.holds else FAILED), result
+    return (DONE if told.describes else FAILED), result
 
 
 def keep_inputs(save: Path, inputs: Sequence[Path]) -> None:

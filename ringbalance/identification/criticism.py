@@ -1,4 +1,4 @@
-"""What a fit's residuals say of its laws: whether they describe the data, and which others would not.
+"""Tests of a fit: lack of fit by its residuals, and the share of each file that it explains.
 
 Lack of fit: the sum of squares of residuals whose noise was stated is chi-square distributed, with the
 degrees of freedom that the parameters leave the block.  Order: signs in the order of measurement change as
@@ -21,19 +21,17 @@ Source: adjusted coefficient of determination.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
-from scipy.special import chdtrc, chdtri, ndtri
+from scipy.special import chdtrc
 
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.likelihood import basis_of
 from ringbalance.identification.optimisation import Optimum
-from ringbalance.identification.other_laws import by_other_machines, by_other_tubes
 from ringbalance.identification.readings import ComparedColumn, Reading, compared_columns, other_readings
 from ringbalance.results.rows import text_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
@@ -44,6 +42,9 @@ FEWEST: Final = 5
 """Rows of a block that is tested."""
 _MOST_NAMED: Final = 3
 """Findings that the sentence names."""
+_LEAST_SHARE: Final = 0.5
+_HIDDEN: Final = 4.0
+"""Variance of the noise over that of the effect which the scene predicts, from which none is to be seen."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,28 +56,40 @@ class _LinearFit:
     derivatives: FloatArray
     """Of the predictions by the parameters, over sigma, shape (n, p)."""
     block: StringArray
-    """What a row is of, such as "run.csv", shape (n,), empty for a prior; in the order of measurement."""
+    """File of each row, such as "run.csv", shape (n,), empty for a prior; in the order of measurement."""
     known_noise: BoolArray
-    """Whether its sigma was given; else it was estimated from the residuals of its block."""
-    turn: FloatArray
-    """Rotation of a fit's first rows into these: of vibrations into parts along their change and across."""
+    """Rows whose sigma was given; that of the others was estimated from the residuals of their block."""
 
-    @cached_property
-    def _basis(self) -> FloatArray:
-        """Orthonormal basis of what the parameters can do to the predictions."""
-        return basis_of(self.derivatives)
+    @classmethod
+    def of(cls, best: Optimum) -> _LinearFit:
+        """Linearise a fit at its optimum; what is no parameter but was fitted too counts as one.
 
-    def beyond_parameters(self, rows: FloatArray) -> FloatArray:
-        """What no change of the parameters can describe of changes of the predictions, shape (n, ...)."""
-        return np.asarray(rows - self._basis @ (self._basis.T @ rows))
-
-    def turned(self, rows: FloatArray) -> FloatArray:
-        """Rows of all files, then of held inputs and priors, with those of vibrations along and across."""
-        return np.concatenate([self.turn @ rows[: len(self.turn)], rows[len(self.turn) :]])
-
-    def freedom(self, chosen: BoolArray) -> float:
-        """Degrees of freedom that some rows have left: their number less the parameters they determine."""
-        return float(np.count_nonzero(chosen) - np.sum(self._basis[chosen] ** 2))
+        Real and imaginary parts of a vibration are turned into those along its predicted change and across.
+        """
+        problem, residuals = best.residuals.problem, best.residuals
+        size = problem.measured.size
+        predicted, turn, titles = problem.at(best.t), np.eye(size), []
+        for block, mine in problem.rows:
+            rows, title = len(block.observations), Path(block.observations.file).name
+            if block.measured.size == rows:
+                titles += [title] * rows
+                continue
+            for part in ("along the predicted change", "across the predicted change"):
+                titles += [f"{title} {part}"] * rows
+            change = block.observations.rows_of(predicted[mine])
+            angle = np.arctan2(change[:, 1], change[:, 0])
+            i = mine.start + np.arange(rows)
+            turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
+            turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
+        priors = best.at.size - size
+        more = np.zeros((best.at.size - residuals.base.shape[0], residuals.base.shape[1]))
+        derivatives = np.hstack([-best.slopes, np.concatenate([residuals.base, more])])
+        return cls(
+            residuals=np.concatenate([turn @ best.at[:size], best.at[size:]]),
+            derivatives=np.concatenate([turn @ derivatives[:size], derivatives[size:]]),
+            block=np.array([*titles, *[""] * priors]),
+            known_noise=np.concatenate([problem.group < 0, np.zeros(priors, dtype=np.bool_)]),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +106,7 @@ class _ResidualTest:
 
     @property
     def fails(self) -> bool:
-        """Whether the model is rejected for it."""
+        """True where the model is rejected for it."""
         return self.corrected < LEVEL
 
 
@@ -105,7 +118,7 @@ class _Criticism:
 
     @property
     def describes(self) -> bool:
-        """Whether the fit describes the data, as far as these can tell."""
+        """True where the fit describes the data, as far as these can tell."""
         return not any(each.fails for each in self.findings)
 
     @property
@@ -123,10 +136,11 @@ class _Criticism:
     @classmethod
     def of(cls, fit: _LinearFit) -> _Criticism:
         """Test the residuals of a fit, block by block."""
-        tests = []
+        tests, basis = [], basis_of(fit.derivatives)
         for block in filter(None, dict.fromkeys(map(str, fit.block))):
             rows = fit.block == block
-            count, freedom, residuals = int(np.count_nonzero(rows)), fit.freedom(rows), fit.residuals[rows]
+            count, residuals = int(np.count_nonzero(rows)), fit.residuals[rows]
+            freedom = float(count - np.sum(basis[rows] ** 2))
             if count < FEWEST or freedom <= 1:
                 continue
             if np.all(fit.known_noise[rows]):
@@ -162,70 +176,6 @@ def _runs_probability(plus: int, minus: int, runs: int) -> float:
             ways += math.comb(plus - 1, half) * math.comb(minus - 1, half - 1)
             ways += math.comb(plus - 1, half - 1) * math.comb(minus - 1, half)
     return ways / math.comb(plus + minus, plus)
-
-
-NEEDED: Final = float((ndtri(0.9) - ndtri(LEVEL / 2)) ** 2)
-"""Separation of laws that are told apart: 9 of 10 normal statistics show it at the 5 % level."""
-Outcome = Literal["other", "between", "fitted", "undecided"]
-_CODES: Final[Mapping[Outcome, str]] = {
-    "other": "other_law_preferred",
-    "between": "between_laws",
-    "fitted": "fitted_law_preferred",
-    "undecided": "laws_not_told_apart",
-}
-"""Of what is said, the gravest first; of the other law, or of all those of one outcome."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _LawComparison:
-    """The fitted law against another one."""
-
-    other: str
-    separation: float
-    """Square of what separates their predictions beyond all parameters, in variances of the data."""
-    preference: float
-    """Sum of squares of the other law's residuals, its parameters fitted too, less that of the fitted law."""
-
-    @property
-    def outcome(self) -> Outcome:
-        """Which of both the data prefer."""
-        if self.separation < NEEDED:
-            return "undecided"
-        if abs(self.preference) < float(chdtri(1, LEVEL)):
-            return "between"
-        return "fitted" if self.preference > 0 else "other"
-
-    @property
-    def text(self) -> str:
-        """What the data say."""
-        return text_of(_CODES[self.outcome], law=self.other)
-
-    @classmethod
-    def of(cls, fit: _LinearFit, *, other: str, residuals: FloatArray) -> _LawComparison:
-        """Compare by linear re-fits from the solution.
-
-        Args: `other`: the other law in words. `residuals`: with its predictions at the fitted parameters,
-            over sigma, shape (n,).
-        """
-        own, others = fit.beyond_parameters(fit.residuals), fit.beyond_parameters(residuals)
-        return cls(
-            other=other,
-            separation=float(np.sum((others - own) ** 2)),
-            preference=float(others @ others - own @ own),
-        )
-
-
-def summaries(comparisons: Sequence[_LawComparison]) -> Iterator[tuple[Outcome, str]]:
-    """What the data say of all of them, one sentence for each outcome, the gravest first."""
-    for outcome, code in _CODES.items():
-        others = [each.other for each in comparisons if each.outcome == outcome]
-        if others:
-            yield outcome, text_of(code, law=" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
-
-
-_LEAST_SHARE: Final = 0.5
-_HIDDEN: Final = 4.0
-"""Variance of the noise over that of the effect which the scene predicts, from which none is to be seen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,8 +226,6 @@ class Review:
     """Criticism of a fit."""
 
     criticism: _Criticism
-    laws: tuple[_LawComparison, ...]
-    """The fitted law against others; empty where no data depend on one."""
     explained: tuple[_Explained, ...] = ()
     """Of each file, what the fit explains of it."""
     readings: tuple[Reading, ...] = ()
@@ -304,11 +252,6 @@ class Review:
         return self.criticism.describes and not self._read_wrongly
 
     @property
-    def holds(self) -> bool:
-        """Whether the fit describes the data, and no other law does so better."""
-        return self.describes and all(each.outcome != "other" for each in self.laws)
-
-    @property
     def text(self) -> str:
         """The verdict on the fit; sound residuals say nothing of data that are read wrongly."""
         if not self._read_wrongly:
@@ -316,59 +259,14 @@ class Review:
         residuals = [] if self.criticism.describes else [self.criticism.text]
         return text_of("read_against_fit", findings="; ".join([*self._read_wrongly, *residuals]))
 
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """All that is to be said, the verdict on the fit first."""
-        return (self.text, *(each.text for each in self.laws))
-
     @classmethod
     def of(cls, result: FitResult) -> Review:
-        """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
+        """Test the residuals of a fit, and read its data otherwise."""
         best = result.optimum
-        problem, fit = best.residuals.problem, _at_solution(best)
-        ranges, scene = tuple(compared_columns(problem)), problem.scene_at(best.t)
-        # Each yields nothing without data of the kinds that it is about.
-        others = (*by_other_tubes(problem, scene), *by_other_machines(problem, scene))
+        ranges = tuple(compared_columns(best.residuals.problem))
         return cls(
-            criticism=_Criticism.of(fit),
-            laws=tuple(
-                _LawComparison.of(
-                    fit, other=name, residuals=fit.turned(best.residuals.at(best.t, predicted=predicted))
-                )
-                for name, predicted in others
-            ),
+            criticism=_Criticism.of(_LinearFit.of(best)),
             explained=tuple(_shares_explained(best)),
             readings=other_readings(best, ranges, stated=result.stated),
             ranges=ranges,
         )
-
-
-def _at_solution(best: Optimum) -> _LinearFit:
-    """The fit linearised at its optimum; what is no parameter but was fitted too counts as one.
-
-    Real and imaginary parts of a vibration are turned into those along its predicted change and across.
-    """
-    problem, residuals = best.residuals.problem, best.residuals
-    predicted, turn, titles = problem.at(best.t), np.eye(problem.measured.size), []
-    for block, mine in problem.rows:
-        rows, title = len(block.observations), Path(block.observations.file).name
-        if block.measured.size == rows:
-            titles += [title] * rows
-            continue
-        for part in ("along the predicted change", "across the predicted change"):
-            titles += [f"{title} {part}"] * rows
-        along = block.observations.rows_of(predicted[mine])
-        angle = np.arctan2(along[:, 1], along[:, 0])
-        i = mine.start + np.arange(rows)
-        turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
-        turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
-    known = best.at.size - len(titles)
-    more = np.zeros((best.at.size - residuals.base.shape[0], residuals.base.shape[1]))
-    fit = _LinearFit(
-        residuals=best.at,
-        derivatives=np.hstack([-best.slopes, np.concatenate([residuals.base, more])]),
-        block=np.array([*titles, *[""] * known]),
-        known_noise=np.concatenate([problem.group < 0, np.zeros(known, dtype=np.bool_)]),
-        turn=turn,
-    )
-    return replace(fit, residuals=fit.turned(fit.residuals), derivatives=fit.turned(fit.derivatives))

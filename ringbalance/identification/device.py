@@ -60,8 +60,6 @@ class Models:
     """Of a primed tube at equal fills, m/s."""
     gas_pressure: float
     """Of the scene that is fitted, gauge, Pa: by what another one's differs the gauge of the data is off."""
-    other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
-    """Makes another law of the scene's, to be compared with it."""
     devices: dict[Scene, Device] = field(default_factory=_Kept, init=False, repr=False, compare=False)
     """The last `_KEPT` that were asked for."""
     rings: Rings = field(default_factory=_Kept, init=False, repr=False, compare=False)
@@ -131,7 +129,7 @@ class Device:
             velocity = _primed_velocity(bare, device.scene)
             if velocity > 0 and self.models.velocity > 0:
                 law = bare.cleared_at(law.path.froude_velocity * velocity / self.models.velocity)
-            vars(device)["law"] = law if self.models.other is None else self.models.other(law)
+            vars(device)["law"] = law
         own: CalibratedLaw = vars(self)["law"]
         return own
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.criticism import Review, summaries
+from ringbalance.identification.criticism import Review
 from ringbalance.identification.fitting import FitResult, FittedParameter
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import covariance
@@ -67,9 +67,6 @@ def fit_document(
                 _chosen(each, "test p_value fails")
                 | {"residuals_of": each.block, "corrected_p_value": each.corrected}
                 for each in told.criticism.findings
-            ],
-            "laws": [
-                {"other_law": each.other} | _chosen(each, "separation preference text") for each in told.laws
             ],
             **{
                 name: [asdict(each) for each in getattr(told, name)]
@@ -149,9 +146,6 @@ def fit_rows(
 
 def _review(told: Review) -> Iterator[Finding]:
     yield Finding(code="fit_describes" if told.describes else "fit_contradicted", values={"text": told.text})
-    for outcome, text in summaries(told.laws):
-        code = "other_law_fits_better" if outcome == "other" else "laws_compared"
-        yield Finding(code=code, values={"text": text})
     yield from (Finding(code="sense_undecided", values={"text": text}) for text in told.undecided)
 
 

@@ -202,8 +202,7 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
         models = inputs_of(there.scene_at(t)).models
         if models is not None:
             # What the gauge of the data is off by stays that against the scene that is fitted.
-            gauge, other = problem.models.gas_pressure, problem.models.other
-            there = replace(there, models=replace(models, gas_pressure=gauge, other=other))
+            there = replace(there, models=replace(models, gas_pressure=problem.models.gas_pressure))
         linear = problem.at(t) + residuals.held @ (pulls - residuals.pulled)
         if np.max(residuals.scale * np.abs(there.at(t) - linear), initial=0.0) < _LINEAR:
             break

@@ -54,18 +54,18 @@ def save_result(
     scene: AnyScene,
     result: FitResult,
     data: Sequence[Observations],
-    said: Sequence[str] = (),
+    said: str = "",
 ) -> Path:
     """Write the scene that a fit found, see `_fitted_scene`: every key of the scene stays, no comment does.
 
-    Args: `scene`: that was fitted. `said`: what the criticism of the fit says.
+    Args: `scene`: that was fitted. `said`: the verdict on the fit.
     Raises: SceneError: the fitted values make no scene. OSError: the file cannot be written.
     """
     files = [
         MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
         for each in data
     ]
-    texts = [("residuals", text) for text in said]
+    texts = [("residuals", said)] if said else []
     texts += [("value", f"{each.name}: {doubt}") for each in result.parameters for doubt in each.doubts]
     texts += [("value", each.text) for each in result.pulled]
     for product in result.combinations:

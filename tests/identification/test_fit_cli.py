@@ -14,7 +14,6 @@ import example_measurements
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.identification.criticism import Review, _Criticism, _LawComparison
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import bundled_scene, load_scene
@@ -110,19 +109,6 @@ def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:
     data = read_observations([Path(EXAMPLES[kind]) for kind in ("injection", "transfer")], scene=scene)
     assert inputs_of(scene).informed(data) == ["lambda_factor", "bore", "extra_loss"]
     assert inputs_of(prescribed).informed(data) == ["lambda_factor", "bore", "drag_coefficient"]
-
-
-def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Values may then be wrong by more than their intervals, so that a script must not go on with them."""
-    better = _LawComparison(other="another law", separation=100.0, preference=-50.0)
-    assert better.outcome == "other"
-    words = (PAPER, EXAMPLES["trial_weight"])
-    for laws, expected in (((), 0), ((better,), 1)):
-        found = Review(criticism=_Criticism(findings=()), laws=laws)
-        monkeypatch.setattr(Review, "of", lambda _, found=found: found)
-        code, out, _ = run(*words)
-        assert code == expected
-        assert ("prefer another law" in " ".join(out.split())) == bool(laws)
 
 
 @pytest.mark.parametrize(

@@ -96,14 +96,3 @@ def test_its_file_is_small(law: CalibratedLaw, tmp_path: Path) -> None:
     path = law.save(tmp_path / "law.json")
     assert path.stat().st_size < 150_000
     assert json.loads(path.read_text())["version"] == 4
-
-
-@pytest.mark.parametrize("exponent", [1.0, 1.75, 2.0])
-def test_heads_of_a_power_keep_the_loss_at_one_velocity(law: CalibratedLaw, exponent: float) -> None:
-    heads = law.heads.power(velocity=7.0, exponent=exponent)
-    assert heads.hump is not None
-    assert law.heads.hump is not None
-    u = np.geomspace(1e-4, 1e2, 50)
-    for table, own in ((heads.siphon, law.heads.siphon), (heads.hump, law.heads.hump)):
-        right = roots_of(own, 7.0) ** 8 * (u / 7.0) ** exponent
-        np.testing.assert_allclose(roots_of(table, u) ** 8, right, rtol=1e-6)

@@ -39,38 +39,44 @@ class FitRequest:
     json: bool
 
 
-def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tuple[int, FitResult]:
+def run_fit(scene: Path | None, data: Sequence[Path], request: FitRequest) -> tuple[int, FitResult]:
     """Fit, print and save. Returns: Exit code, and what was found. Raises: SceneError, OSError."""
     if scene is None or not data:
         raise _usage("command line", f"{'SCENE' if scene is None else 'DATA'} is missing")
-    if asked.save is not None:
-        keep_inputs(asked.save, (scene, *data))
-        check_file(asked.save)
+    if request.save is not None:
+        keep_inputs(request.save, (scene, *data))
+        check_file(request.save)
     if scene.suffix.lower() == ".csv":
         raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
     given = load_scene(scene)
     observations = read_observations(data, scene=given)
-    names = None if asked.parameters is None else _names(asked.parameters)
+    names = None if request.parameters is None else [name.strip() for name in request.parameters.split(",")]
+    if names is not None and (not all(names) or len(set(names)) < len(names)):
+        problem = "it is not a list of different names with commas between"
+        allowed = 'such as "bore,extra_loss"'
+        raise SceneError.of_option(
+            option="--parameters", value=request.parameters or "", problem=problem, allowed=allowed
+        )
     try:
         fitted = [each.name for each in problem_of(given, observations, names).parameters]
-        if asked.next is not None and asked.next not in fitted:
-            problem = f"this parameter is not fitted{did_you_mean(asked.next, fitted)}"
+        if request.next is not None and request.next not in fitted:
+            problem = f"this parameter is not fitted{did_you_mean(request.next, fitted)}"
             listed = ", ".join(fitted)
-            raise SceneError.of_option(option="--next", value=asked.next, problem=problem, allowed=listed)
+            raise SceneError.of_option(option="--next", value=request.next, problem=problem, allowed=listed)
         with activity("fit", "several starts, profiles of the likelihood ..."):
-            result = fit_scene(given, data=observations, parameters=names, loss=asked.loss)
+            result = fit_scene(given, data=observations, parameters=names, loss=request.loss)
     except FitError as error:
         raise SceneError.of_file(given.file, str(error)) from error
-    told, following = Review.of(result), next_measurement(result, asked.next)
-    if asked.json:
+    told, following = Review.of(result), next_measurement(result, request.next)
+    if request.json:
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
     else:
         rows = fit_rows(result, data=observations, told=told, following=following)
         print_rows(rows, headline=False)
-    if asked.save is not None:
-        save_result(asked.save, scene=given, result=result, data=observations, said=told.text)
-        print_message(f"fitted scene written to {asked.save}")
+    if request.save is not None:
+        save_result(request.save, scene=given, result=result, data=observations, said=told.text)
+        print_message(f"fitted scene written to {request.save}")
     return (DONE if told.describes else FAILED), result
 
 
@@ -86,12 +92,3 @@ def keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
 
 def _usage(file: str, problem: str) -> SceneError:
     return SceneError.of_file(file, f"{problem}: {_USAGE}")
-
-
-def _names(text: str) -> list[str]:
-    names = [name.strip() for name in text.split(",")]
-    if not all(names) or len(set(names)) < len(names):
-        problem = "it is not a list of different names with commas between"
-        allowed = 'such as "bore,extra_loss"'
-        raise SceneError.of_option(option="--parameters", value=text, problem=problem, allowed=allowed)
-    return names

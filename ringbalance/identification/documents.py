@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.criticism import Review
-from ringbalance.identification.fitting import FitResult, FittedParameter
+from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.kinds.kind import Observations
@@ -114,7 +114,18 @@ def fit_rows(
         "not fitted, taken as exact": ", ".join(result.exact),
     }
     heads = ("quantity", "fitted", "from", "to", "unit", "before", "identified")
-    rows = [(each.name, *_numbers(each), _WORDS[each.verdict]) for each in result.parameters]
+    rows = []
+    for each in result.parameters:
+        path, upper = each.path, None if each.before_interval is None else each.before_interval[1]
+        low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in each.interval)
+        value, before = (in_usual_unit(path, number) for number in (each.value, each.before))
+        width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
+        ends = [rounded(end, width) if math.isfinite(end) else "?" for end in (low, high)]
+        range_before = f"{before:.4g}"
+        if upper is not None:
+            range_before += f" ± {in_usual_unit(path, upper) - before:.2g}"
+        cells = each.name, rounded(value, width), *ends, usual_unit(path), range_before
+        rows.append((*cells, _WORDS[each.verdict]))
     quantities = [
         Quantity(
             key=each.path,
@@ -147,20 +158,6 @@ def fit_rows(
 def _review(told: Review) -> Iterator[Finding]:
     yield Finding(code="fit_describes" if told.describes else "fit_contradicted", values={"text": told.text})
     yield from (Finding(code="sense_undecided", values={"text": text}) for text in told.undecided)
-
-
-def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
-    """Value, ends of its interval, unit, and what was known before, in the usual unit."""
-    path = found.path
-    low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in found.interval)
-    value, before = (in_usual_unit(path, number) for number in (found.value, found.before))
-    width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
-    ends = [rounded(end, width) if math.isfinite(end) else "?" for end in (low, high)]
-    known = f"{before:.4g}"
-    if found.before_interval is not None:
-        far = in_usual_unit(path, found.before_interval[1])
-        known = f"{before:.4g} ± {far - before:.2g}"
-    return rounded(value, width), ends[0], ends[1], usual_unit(path), known
 
 
 def _of_parameters(result: FitResult) -> Iterator[Finding]:

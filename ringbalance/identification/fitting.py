@@ -229,39 +229,14 @@ def fit(
     Raises: FitError: data or parameters that cannot be fitted. ValueError: data that do not fit the scene.
     Source: `likelihood`, `optimisation`, `intervals`, `identifiability`.
     """
-    problem = problem_of(scene, data, parameters)
-    best, kept = optimum_as_stated(problem, loss=loss, starts=starts)
-    return _result(about_pulls(best, kept, scene=scene, loss=loss), kept, loss, scene)
-
-
-def problem_of(
-    scene: AnyScene, data: Sequence[Observations], parameters: Sequence[str] | None = None
-) -> Problem:
-    """The problem that `fit` solves. Raises: FitError: as `fit`."""
-    if not data:
-        raise FitError("give at least one file of measurements")
-    for each in data:
-        if each.kind not in kinds_of(scene.balancer):
-            raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
-        if reason := KINDS[each.kind].obstacle(scene, each):
-            raise FitError(f"{each.file}: {reason}")
-    inputs = inputs_of(scene)
-    names = inputs.informed(data) if parameters is None else list(parameters)
-    return Problem(
-        scene=scene,
-        models=inputs.models,
-        parameters=inputs.parameters(names),
-        blocks=tuple(Block(observations=each) for each in data),
-    )
-
-
-def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) -> FitResult:
+    best, held = optimum_as_stated(problem_of(scene, data, parameters), loss=loss, starts=starts)
+    best = about_pulls(best, held, scene=scene, loss=loss)
     residuals, problem, spread = best.residuals, best.residuals.problem, covariance(best.slopes)
-    data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
+    slopes = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
     intervals = profiles(best, spread)
-    found = verdicts(problem.parameters, best.t, data, intervals)
-    products = combinations(problem.parameters, best.t, data, found, intervals)
-    each = zip(problem.parameters, best.t.tolist(), intervals, found, strict=True)
+    identified = verdicts(problem.parameters, best.t, slopes, intervals)
+    products = combinations(problem.parameters, best.t, slopes, identified, intervals)
+    fitted = zip(problem.parameters, best.t.tolist(), intervals, identified, strict=True)
     size = np.sqrt(np.diag(spread))
     groups = zip(problem.estimated_groups, residuals.noise.tolist(), best.freedom.tolist(), strict=True)
     given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
@@ -285,7 +260,7 @@ def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) 
     whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in problem.blocks)
     noises = float(np.sum(np.log(residuals.noise[problem.group[problem.group >= 0]])))
     return FitResult(
-        parameters=tuple(_fitted(*one, products) for one in each),
+        parameters=tuple(_fitted(*each, products) for each in fitted),
         correlations=spread / np.outer(size, size),
         combinations=products,
         noise=tuple(noise),
@@ -297,9 +272,30 @@ def _result(best: Optimum, held: dict[str, float], loss: str, stated: AnyScene) 
         evaluations=problem.evaluations,
         log_likelihood=whitening - noises - float(np.sum(best.at**2)) / 2,
         scene=scene_as_fitted(best, held),
-        stated=stated,
+        stated=scene,
         joint=joint_of(best, held),
         optimum=best,
+    )
+
+
+def problem_of(
+    scene: AnyScene, data: Sequence[Observations], parameters: Sequence[str] | None = None
+) -> Problem:
+    """The problem that `fit` solves. Raises: FitError: as `fit`."""
+    if not data:
+        raise FitError("give at least one file of measurements")
+    for each in data:
+        if each.kind not in kinds_of(scene.balancer):
+            raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
+        if reason := KINDS[each.kind].obstacle(scene, each):
+            raise FitError(f"{each.file}: {reason}")
+    inputs = inputs_of(scene)
+    names = inputs.informed(data) if parameters is None else list(parameters)
+    return Problem(
+        scene=scene,
+        models=inputs.models,
+        parameters=inputs.parameters(names),
+        blocks=tuple(Block(observations=each) for each in data),
     )
 
 

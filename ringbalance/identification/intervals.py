@@ -78,22 +78,22 @@ def covariance(slopes: FloatArray) -> FloatArray:
 
 def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
     """Interval of each parameter. Args: `spread`: `covariance` at the optimum."""
-    least, found = float(np.sum(best.at**2)), []
+    least, intervals = float(np.sum(best.at**2)), []
     for i, factor in enumerate(_student(best).tolist()):
-        low, high = (_end(best, i, sign, factor, spread, least) for sign in (-1.0, 1.0))
-        points = sorted([*low.points, (float(best.t[i]), 0.0), *high.points])
-        found.append(
+        low, low_bound, low_t, points = _end(best, i, -1.0, factor, spread, least)
+        high, high_bound, high_t, more = _end(best, i, 1.0, factor, spread, least)
+        intervals.append(
             Profile(
-                low=low.place,
-                high=high.place,
-                low_bound=low.bound,
-                high_bound=high.bound,
+                low=low,
+                high=high,
+                low_bound=low_bound,
+                high_bound=high_bound,
                 factor=factor,
-                ends=(tuple(low.t.tolist()), tuple(high.t.tolist())),
-                points=tuple(points),
+                ends=(tuple(low_t.tolist()), tuple(high_t.tolist())),
+                points=tuple(sorted([*points, (float(best.t[i]), 0.0), *more])),
             )
         )
-    return found
+    return intervals
 
 
 def _student(best: Optimum) -> FloatArray:
@@ -114,52 +114,50 @@ def _student(best: Optimum) -> FloatArray:
     return np.asarray(stdtrit(limited, 0.975) * np.sqrt(1 + 2 * by_weights), dtype=np.float64)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _End:
-    place: float
-    bound: bool
-    t: FloatArray
-    points: list[tuple[float, float]]
+def _end(
+    best: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float
+) -> tuple[float, bool, FloatArray, list[tuple[float, float]]]:
+    """Find the end of an interval, at which the root of S - S0, nearly linear in t, is `factor`.
 
-
-def _end(best: Optimum, which: int, sign: float, factor: float, spread: FloatArray, least: float) -> _End:
-    """Where the root of S - S0, nearly linear in t, is `factor`: by the secant, in steps."""
+    By the secant, in steps. Returns: t of the parameter there; True where it is a bound; all parameters' t of
+    the last trial; t and rise of S of all trials.
+    """
     bounds = best.residuals.problem.bounds
-    bound, here = float(bounds[0 if sign < 0 else 1][which]), float(best.t[which])
-    wide = math.sqrt(float(spread[which, which]))
-    along = spread[:, which] / max(float(spread[which, which]), 1e-300)
+    bound, best_t = float(bounds[0 if sign < 0 else 1][which]), float(best.t[which])
+    sigma = math.sqrt(float(spread[which, which]))
+    direction = spread[:, which] / max(float(spread[which, which]), 1e-300)
     inside, outside, start = (0.0, 0.0), (math.inf, math.inf), best.t
     points: list[tuple[float, float]] = []
-    distance = min(factor * wide, _LONGEST)
+    distance = min(factor * sigma, _LONGEST)
     for _ in range(_TRIALS):
-        place = here + sign * distance
-        if (place - bound) * sign >= 0:
-            place, distance = bound, abs(bound - here)
-        begin = np.clip(start + along * (place - start[which]), *bounds)
-        begin[which] = place
+        trial = best_t + sign * distance
+        if (trial - bound) * sign >= 0:
+            trial, distance = bound, abs(bound - best_t)
+        begin = np.clip(start + direction * (trial - start[which]), *bounds)
+        begin[which] = trial
         end, at = searched(best.residuals, begin, gain=_GAIN, fixed=which)
         rise = float(at @ at) - least
         root = math.sqrt(max(rise, 0.0))
-        points.append((place, rise))
-        at_bound = root < factor and place == bound
+        points.append((trial, rise))
+        at_bound = root < factor and trial == bound
         if at_bound or abs(root - factor) <= _CLOSE * factor:
-            return _End(place=place, bound=at_bound, t=end, points=points)
+            return trial, at_bound, end, points
         if root < factor:
             inside, start = (distance, root), end
             if len(points) > 1:
-                along = (end - best.t) / (place - here)
+                direction = (end - best.t) / (trial - best_t)
         else:
             outside = (distance, root)
         reach, root = inside
         if math.isinf(outside[0]):
-            slope = root / reach if reach > 0 else 1 / wide
-            furthest = min(reach + _LONGEST, _LARGEST_STEP * max(reach, factor * wide))
+            slope = root / reach if reach > 0 else 1 / sigma
+            furthest = min(reach + _LONGEST, _LARGEST_STEP * max(reach, factor * sigma))
             distance = min(factor / max(slope, 1e-300), furthest)
         else:
             part = (factor - root) / (outside[1] - root)
             distance = reach + min(max(part, 0.05), 0.95) * (outside[0] - reach)
-    place = here + sign * (inside[0] if math.isinf(outside[0]) else outside[0])
-    return _End(place=place, bound=False, t=end, points=points)
+    trial = best_t + sign * (inside[0] if math.isinf(outside[0]) else outside[0])
+    return trial, False, end, points
 
 
 _ROUNDS: Final = 4

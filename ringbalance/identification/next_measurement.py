@@ -31,6 +31,8 @@ _WORTHWHILE: Final = 0.9
 """Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
 _AT_ALL: Final = 0.99
 _RANK: Final = 1e-12
+_WORDS: Final = {"gas_time": "valve-open time"}
+"""Names of columns that a sentence has another word for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +142,9 @@ def _words_of(offered: Observations, row: int) -> str:
         values = offered.columns.get(column.name)
         if values is None or column.measured or column.amplitude:
             continue
-        said.append(f"{column.words} {column.written(float(values[row]))}")
+        said.append(
+            f"{_WORDS.get(column.name, column.name.replace('_', ' '))} {column.written(float(values[row]))}"
+        )
     return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ringbalance.identification.kinds.bench import BENCH
 from ringbalance.identification.kinds.eccentric_mass import ECCENTRIC_MASS
-from ringbalance.identification.kinds.kind import Column, Kind, Observations
+from ringbalance.identification.kinds.kind import Kind, Observations
 from ringbalance.identification.kinds.liquid_ring import LIQUID_RING
 from ringbalance.identification.tables import (
     Table,
@@ -262,46 +262,8 @@ def _stated_uncertainty(
     A relative uncertainty of a vibration is that of both its components, so that its phase has it in radians.
     """
     measured = {column.name: column for column in kind.measured if column.name in columns}
-    result, faults = _of_header(table, kind, columns, measured)
-    if _UNCERTAINTY in columns:
-        result = {name: columns[_UNCERTAINTY] * _size(kind, columns, name) for name in measured}
-    stated = {name: columns.get(f"{_UNCERTAINTY}_{name}") for name in measured}
-    result |= {name: width for name, width in stated.items() if width is not None}
-    # A relative uncertainty of a value of zero says that the value is exact.
-    for name, width in result.items():
-        for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
-            if value == 0 and each == 0:
-                problem = f"{name} is 0 there, so its uncertainty cannot be relative"
-                allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
-                faults.append(data_fault(table.file, f"line {line}", problem, allowed=allowed))
-    # The noise of vibrations is given or estimated, all amplitudes of a file alike.
-    missing = [column.name for column in kind.measured if column.amplitude and column.name not in result]
-    if result and missing:
-        problem = f"stated of {', '.join(result)} and not of {', '.join(missing)}"
-        allowed = "of every amplitude, or of nothing"
-        faults.append(data_fault(table.file, _UNCERTAINTY, problem, allowed=allowed))
-    return result, faults
-
-
-def _of_header(
-    table: Table, kind: Kind, columns: Mapping[str, FloatArray], measured: Mapping[str, Column]
-) -> tuple[dict[str, FloatArray], list[Fault]]:
-    """What the first lines state: one share for all measured columns, or of each its own."""
     stated, result, faults = table.header.get(_UNCERTAINTY), {}, []
-    if stated is None:
-        return {}, []
-    if not isinstance(stated, Mapping):
-        try:
-            share_of_all = _RELATIVE.read(stated)
-        except FieldError as error:
-            allowed = (
-                'a share of the measured values such as "2 %" or 0.02 (95 %), or by column: '
-                '{ amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
-            )
-            value = toml_text(stated)
-            return {}, [data_fault(table.file, _UNCERTAINTY, error.problem, value=value, allowed=allowed)]
-        return {name: share_of_all * _size(kind, columns, name) for name in measured}, []
-    for name, value in stated.items():
+    for name, value in stated.items() if isinstance(stated, Mapping) else ():
         try:
             if name not in measured:
                 problem = f"the file measures no such column{did_you_mean(name, measured)}"
@@ -316,6 +278,34 @@ def _of_header(
             faults.append(data_fault(table.file, place, error.problem, value=text, allowed=error.allowed))
             continue
         result[name] = width * (np.abs(columns[name]) if relative else np.ones_like(columns[name]))
+    if stated is not None and not isinstance(stated, Mapping):
+        try:
+            share_of_all = _RELATIVE.read(stated)
+            result = {name: share_of_all * _size(kind, columns, name) for name in measured}
+        except FieldError as error:
+            allowed = (
+                'a share of the measured values such as "2 %" or 0.02 (95 %), or by column: '
+                '{ amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
+            )
+            value = toml_text(stated)
+            faults.append(data_fault(table.file, _UNCERTAINTY, error.problem, value=value, allowed=allowed))
+    if _UNCERTAINTY in columns:
+        result = {name: columns[_UNCERTAINTY] * _size(kind, columns, name) for name in measured}
+    by_column = {name: columns.get(f"{_UNCERTAINTY}_{name}") for name in measured}
+    result |= {name: width for name, width in by_column.items() if width is not None}
+    # A relative uncertainty of a value of zero says that the value is exact.
+    for name, width in result.items():
+        for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
+            if value == 0 and each == 0:
+                problem = f"{name} is 0 there, so its uncertainty cannot be relative"
+                allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
+                faults.append(data_fault(table.file, f"line {line}", problem, allowed=allowed))
+    # The noise of vibrations is given or estimated, all amplitudes of a file alike.
+    missing = [column.name for column in kind.measured if column.amplitude and column.name not in result]
+    if result and missing:
+        problem = f"stated of {', '.join(result)} and not of {', '.join(missing)}"
+        allowed = "of every amplitude, or of nothing"
+        faults.append(data_fault(table.file, _UNCERTAINTY, problem, allowed=allowed))
     return result, faults
 
 

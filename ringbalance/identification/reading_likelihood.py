@@ -219,7 +219,13 @@ class Comparison:
             except ValueError:
                 self.changed[i, settings] = None
             else:
-                held = _in_proportion(rows, predicted)
+                # Effects of held inputs are turned and stretched with the prediction of each row.
+                before, after, held = (
+                    values[: len(values) // 2] + 1j * values[len(values) // 2 :] if rows.vibration else values
+                    for values in (rows.predicted, predicted, rows.held)
+                )
+                moved = np.divide(after, before, out=np.zeros_like(after), where=before != 0)[:, None] * held
+                held = np.concatenate([moved.real, moved.imag]) if rows.vibration else moved
                 self.changed[i, settings] = _Rows(block=block, predicted=predicted, slopes=slopes, held=held)
         other = self.changed[i, settings] if settings else rows
         return None if other is None else replace(other, block=block)
@@ -230,18 +236,6 @@ def deviance_of(best: Optimum) -> float:
     residuals, predicted = best.residuals, best.residuals.problem.at(best.t)
     slopes, held, pulled = best.of_prediction, residuals.held, residuals.pulled
     return _settled(residuals.problem, best.t, predicted, slopes, held, pulled)[0]
-
-
-def _in_proportion(rows: _Rows, predicted: FloatArray) -> FloatArray:
-    """Effects of held inputs, turned and stretched with the prediction of each row."""
-    before, after, held = rows.predicted, predicted, rows.held
-    if rows.vibration:
-        before, after, held = (
-            values[: len(values) // 2] + 1j * values[len(values) // 2 :] for values in (before, after, held)
-        )
-    ratio = np.divide(after, before, out=np.zeros_like(after), where=before != 0)
-    moved = ratio[:, None] * held
-    return np.concatenate([moved.real, moved.imag]) if rows.vibration else moved
 
 
 def _unwhitened(problem: Problem, values: FloatArray) -> list[FloatArray]:

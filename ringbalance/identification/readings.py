@@ -136,7 +136,14 @@ def other_readings(
         if (gain := compare.gain(joint, chosen)) is not None
     }
     scene = problem.scene if stated is None else stated
-    gains = _without_idle_factors(compare, _with_senses_fitted(compare, gains, scene), scene)
+    # Senses that mirror each other differ by the lag alone, which tells less than what is linear may err by.
+    widest = {frozenset(joint): (joint, chosen) for joint, chosen in gains if {*joint} <= {*SENSES}}
+    most = max((gains[each] for each in widest.values()), default=0.0)
+    near = [each for each in widest.values() if gains[each] > most / 2]
+    if most >= _DECISIVE and len(near) > 1:
+        fitted = {each: compare.refitted(*each, scene) for each in near}
+        gains |= {each: gain for each, gain in fitted.items() if math.isfinite(gain)}
+    gains = _without_idle_factors(compare, gains, scene)
     ordered = sorted(gains.items(), key=lambda each: -each[1])
     likeliest = ordered[0][1] if ordered else 0.0
     files = [[problem.blocks[i].observations.file for i in chosen] for (_, chosen), _ in ordered]
@@ -165,22 +172,6 @@ def other_readings(
             )
         )
     return tuple(readings)
-
-
-def _with_senses_fitted(
-    compare: Comparison, gains: Mapping[_Choice, float], scene: Any
-) -> dict[_Choice, float]:
-    """Gains with those of the likeliest senses of the angles by fits, where several gain about as much.
-
-    Senses that mirror each other differ by the lag alone, which tells less than what is linear may err by.
-    """
-    widest = {frozenset(joint): (joint, chosen) for joint, chosen in gains if {*joint} <= {*SENSES}}
-    most = max((gains[each] for each in widest.values()), default=0.0)
-    near = [each for each in widest.values() if gains[each] > most / 2]
-    if most < _DECISIVE or len(near) < 2:
-        return dict(gains)
-    fitted = {each: compare.refitted(*each, scene) for each in near}
-    return {**gains, **{each: gain for each, gain in fitted.items() if math.isfinite(gain)}}
 
 
 def _without_idle_factors(

@@ -101,7 +101,8 @@ def _fitted_scene(
     Raises: SceneError: the fitted values make no scene, such as a crest outside the port. ValueError: a path
         that no scene file has.
     """
-    pulled = {} if result is None else {name: _key(name) for name in result.held if name not in MODEL_ERRORS}
+    held = [] if result is None else [name for name in result.held if name not in MODEL_ERRORS]
+    pulled = {name: path_of(name).split(".")[-1].split("[")[0] for name in held}
     while True:
         changes = _Changes(scene)
         if result is not None and result.joint.names:
@@ -111,7 +112,7 @@ def _fitted_scene(
             changes.put(place, each.value, origin=each.origin)
         cut = tuple(_put_widths(changes, placed))
         changes.values["measured.files"] = [asdict(each) for each in files]
-        changes.values["measured.quantities"] = [_record(place, each) for place, each in placed]
+        changes.values["measured.quantities"] = [place.record(each) for place, each in placed]
         changes.values["measured.findings"] = [asdict(each) for each in (*findings, *cut)]
         try:
             return scene.with_values(changes.whole())
@@ -122,11 +123,6 @@ def _fitted_scene(
             if suspected is None:
                 raise
             pulled = {name: key for name, key in pulled.items() if key not in suspected}
-
-
-def _key(name: str) -> str:
-    """Key of a quantity in its table."""
-    return path_of(name).split(".")[-1].split("[")[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,6 +153,26 @@ class _Place:
         if self.dimension is None:
             return _rounded(value)
         return float(format_quantity(value, self.dimension, self.unit, digits=_DIGITS).split(" ")[0])
+
+    def record(self, fitted: FittedParameter) -> dict[str, Any]:
+        """Make an entry of [measured]; ends that the interval does not have are left out."""
+        low, high = fitted.before_interval or (None, None)
+        numbers = {
+            "before": fitted.before,
+            "before_low": low,
+            "before_high": high,
+            "value": fitted.value,
+            "low": fitted.interval[0],
+            "high": fitted.interval[1],
+        }
+        return {
+            "quantity": fitted.path,
+            "unit": self.unit or NO_UNIT,
+            **{name: self.number(number) for name, number in numbers.items() if number is not None},
+            "verdict": str(fitted.verdict),
+            "profile": [self.number(value) for value, _ in fitted.curve],
+            "rise": [float(f"{rise:.{_RISE_DIGITS}g}") for _, rise in fitted.curve],
+        }
 
     def difference(self, value: float) -> float:
         """A difference of two values, SI, in the unit."""
@@ -249,7 +265,13 @@ def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) ->
             path, place = path_of(name), changes.place(path_of(name))
             unit, deviation = place.unit, place.difference(sd)
             if name in pulled:
-                _put_held(changes, place, inputs[name].value, NORMAL_95 * sd)
+                # The width that is left of the value is for whoever looks at it alone.
+                value, width, before = inputs[name].value, NORMAL_95 * sd, changes.before(place.path)
+                single = place.entry is None or not isinstance(before, list)
+                if (before if single else before[place.entry]) != place.written(value):
+                    changes.put(place, value, origin="inferred")
+                if place.entry is None:
+                    values[place.width] = place.written(min(width, abs(value)) if value else width)
         quantities.append(
             {
                 "quantity": path,
@@ -271,16 +293,6 @@ def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) ->
         place = changes.place("gas.gauge_correction")
         values[place.path] = place.written(liquid_ring_scene(found).gas.gauge_correction)
     values["fitted.quantities"] = quantities
-
-
-def _put_held(changes: _Changes, place: _Place, value: float, width: float) -> None:
-    """Write a value that a fit has moved, and the width that is left of it for whoever looks at it alone."""
-    before = changes.before(place.path)
-    here = before[place.entry] if place.entry is not None and isinstance(before, list) else before
-    if here != place.written(value):
-        changes.put(place, value, origin="inferred")
-    if place.entry is None:
-        changes.values[place.width] = place.written(min(width, abs(value)) if value else width)
 
 
 def _put_widths(
@@ -308,24 +320,3 @@ def _put_widths(
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
-
-
-def _record(place: _Place, fitted: FittedParameter) -> dict[str, Any]:
-    """One quantity of [measured]; ends that there are not are left out."""
-    known = fitted.before_interval or (None, None)
-    numbers = {
-        "before": fitted.before,
-        "before_low": known[0],
-        "before_high": known[1],
-        "value": fitted.value,
-        "low": fitted.interval[0],
-        "high": fitted.interval[1],
-    }
-    return {
-        "quantity": fitted.path,
-        "unit": place.unit or NO_UNIT,
-        **{name: place.number(number) for name, number in numbers.items() if number is not None},
-        "verdict": str(fitted.verdict),
-        "profile": [place.number(value) for value, _ in fitted.curve],
-        "rise": [float(f"{rise:.{_RISE_DIGITS}g}") for _, rise in fitted.curve],
-    }

@@ -147,7 +147,15 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table |
     """The table of a text, or all that is wrong with its form. Args: `most`: rows that it may have."""
     numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
     head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
-    header, faults = _header([line for _, line in numbered[: head_at - 1]], file)
+    header: Mapping[str, object] | None = None
+    faults: list[Fault] = []
+    try:
+        # The mark becomes a space, so that errors have the file's places.
+        header = read_toml("\n".join(_unmarked(line) for _, line in numbered[: head_at - 1]))
+    except (ValueError, csv.Error, RecursionError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
+        faults.append(data_fault(file, "", problem))
     for at, line in numbered[head_at:]:
         # As where files were joined: such a line would count for no row.
         if _SETS_A_KEY.match(line):
@@ -189,16 +197,6 @@ def _is_data(line: str) -> bool:
     """False for a line that is empty or marked, or a spreadsheet's that names the separator."""
     start = line.lstrip(f'" {_SEPARATORS}')
     return bool(start) and not start.startswith(_MARK) and not _NAMED_SEPARATOR.fullmatch(line.strip())
-
-
-def _header(lines: Sequence[str], file: str) -> tuple[Mapping[str, object] | None, list[Fault]]:
-    """The TOML of the first lines; the mark becomes a space, so that its errors have the file's places."""
-    try:
-        return read_toml("\n".join(map(_unmarked, lines))), []
-    except (ValueError, csv.Error, RecursionError) as error:
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
-        return None, [data_fault(file, "", problem)]
 
 
 def _rows(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -40,7 +40,7 @@ _CELLS: Final = (8, 16)
 
 
 Stated = tuple[FloatArray, FloatArray]
-"""What is predicted of each row, SI, and the expanded uncertainty (95 %) that the program states of it."""
+"""Prediction of each row, SI, and the expanded uncertainty (95 %) that the program states of it."""
 
 
 def laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
@@ -60,17 +60,13 @@ def _friction(data: Observations) -> Stated:
     aspect, roughness = (data.columns.get(name, none) for name in ("aspect_ratio", "relative_roughness"))
     reynolds, ratio = data.columns["reynolds"], laminar_ratio(aspect)
 
-    def each(formula: Callable[..., Any]) -> FloatArray:
-        """One wall after the other."""
-        found = np.empty_like(reynolds)
-        for wall in np.unique(roughness):
-            here = roughness == wall
-            found[here] = formula(
-                reynolds=reynolds[here], relative_roughness=float(wall), laminar_ratio=ratio[here]
-            )
-        return found
-
-    return each(friction_factor), each(friction_uncertainty)
+    factor, width = np.empty_like(reynolds), np.empty_like(reynolds)
+    for wall in np.unique(roughness):
+        rows = roughness == wall
+        flow = {"reynolds": reynolds[rows], "laminar_ratio": ratio[rows]}
+        factor[rows] = friction_factor(relative_roughness=float(wall), **flow)
+        width[rows] = friction_uncertainty(relative_roughness=float(wall), **flow)
+    return factor, width
 
 
 def _pressure(data: Observations) -> Stated:
@@ -97,20 +93,7 @@ def tube_loss(slenderness: float, reynolds: float, critical: float) -> tuple[flo
 
     Args: `slenderness`: L/d. `critical`: critical Re over the usual one.
     """
-    tube = _tube(slenderness)
-    flow = {"reynolds": reynolds, "critical_ratio": critical}
-    friction = {**flow, "relative_roughness": 0.0}
-    values = slenderness * friction_factor(**friction), entrance_loss(tube=tube, **flow), exit_loss(**flow)
-    half_widths = (
-        slenderness * friction_uncertainty(**friction),
-        entrance_uncertainty(tube=tube, **flow),
-        exit_uncertainty(tube=tube, **flow),
-    )
-    return float(np.sum(values)), float(np.linalg.norm(half_widths))
-
-
-def _tube(slenderness: float) -> Tube:
-    return Tube(
+    tube = Tube(
         bore=1.0,
         port_radius=0.0,
         hump_radius=None,
@@ -125,6 +108,15 @@ def _tube(slenderness: float) -> Tube:
         extra_loss=0.0,
         drag_coefficient=None,
     )
+    flow = {"reynolds": reynolds, "critical_ratio": critical}
+    friction = {**flow, "relative_roughness": 0.0}
+    values = slenderness * friction_factor(**friction), entrance_loss(tube=tube, **flow), exit_loss(**flow)
+    half_widths = (
+        slenderness * friction_uncertainty(**friction),
+        entrance_uncertainty(tube=tube, **flow),
+        exit_uncertainty(tube=tube, **flow),
+    )
+    return float(np.sum(values)), float(np.linalg.norm(half_widths))
 
 
 def _vessel_time(data: Observations) -> Stated:
@@ -136,8 +128,28 @@ def _vessel_time(data: Observations) -> Stated:
     """
     columns = {"critical_ratio": np.full(len(data), _CRITICAL_RATIO), **data.columns}
     names = ("pressure", "start_pressure", "far_pressure", "temperature", "volume", "conductance")
-    rows = zip(*(columns[name] for name in (*names, "critical_ratio")), strict=True)
-    limits = np.array([_limits(*(float(value) for value in row)) for row in rows])
+    limits, gamma = np.empty((len(data), 2)), HEAT_CAPACITY_RATIO
+    rows = zip(*(columns[name].tolist() for name in (*names, "critical_ratio")), strict=True)
+    for row, (pressure, start, far, temperature, volume, conductance, b) in enumerate(rows):
+        filling = far > start
+        line = GasLine(
+            supply_pressure=far if filling else start,
+            ambient_pressure=start if filling else far,
+            temperature=temperature,
+            conductance=conductance,
+            critical_ratio=b,
+            process="isothermal",
+        )
+        if filling:
+            time = float(line.filling_time(pressure, volume=volume))
+            limits[row] = time, time / gamma
+            continue
+        begin, rest = line.venting_time(np.array([start, pressure]), volume=volume)
+        falling: FloatArray = np.geomspace(1.0, pressure / start, _STEPS)
+        phi = np.sqrt(np.maximum(1 - (np.maximum(far / start / falling - b, 0.0) / (1 - b)) ** 2, 0.0))
+        cooled = falling ** ((gamma - 1) / (2 * gamma))
+        adiabatic = float(-np.trapezoid(1 / (gamma * falling * cooled * phi), falling))
+        limits[row] = float(begin - rest), line.time_constant(volume=volume) * adiabatic
     middle = limits.mean(axis=1)
     half = np.abs(limits[:, 1] - limits[:, 0]) / 2
     return middle, np.hypot(half, _CONDUCTANCE_UNCERTAINTY * middle)
@@ -154,31 +166,6 @@ def _not_between(_: object, data: Observations) -> str:
     reached, start, far = (data.columns[name] for name in ("pressure", "start_pressure", "far_pressure"))
     between = np.all((reached - start) * (far - reached) > 0)
     return "" if between else "pressure must lie between start_pressure and far_pressure in every row"
-
-
-def _limits(
-    pressure: float, start: float, far: float, temperature: float, volume: float, conductance: float, b: float
-) -> tuple[float, float]:
-    """Isothermal and adiabatic time from the start to a pressure, s."""
-    filling = far > start
-    line = GasLine(
-        supply_pressure=far if filling else start,
-        ambient_pressure=start if filling else far,
-        temperature=temperature,
-        conductance=conductance,
-        critical_ratio=b,
-        process="isothermal",
-    )
-    gamma = HEAT_CAPACITY_RATIO
-    if filling:
-        time = float(line.filling_time(pressure, volume=volume))
-        return time, time / gamma
-    whole, rest = line.venting_time(np.array([start, pressure]), volume=volume)
-    falling: FloatArray = np.geomspace(1.0, pressure / start, _STEPS)
-    phi = np.sqrt(np.maximum(1 - (np.maximum(far / start / falling - b, 0.0) / (1 - b)) ** 2, 0.0))
-    cooled = falling ** ((gamma - 1) / (2 * gamma))
-    adiabatic = float(-np.trapezoid(1 / (gamma * falling * cooled * phi), falling))
-    return float(whole - rest), line.time_constant(volume=volume) * adiabatic
 
 
 def _frequency(data: Observations) -> Stated:

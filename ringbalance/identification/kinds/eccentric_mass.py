@@ -53,11 +53,21 @@ def _positions(scene: EccentricScene, observations: Observations, _: object) -> 
     It starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed. Rows of
     one series, mass, voltage and speed are one motion.
     """
-    plant = PlantParameters.of(scene)
-    found = np.empty(len(observations))
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
+    moved, times = np.empty(len(observations)), observations.columns["time"]
     for motion, rows in _motions(observations):
-        found[rows] = _moved(plant, scene.masses.initial_angle, motion, observations.columns["time"][rows])
-    return found
+        speed, moves = float(motion.speed), np.arange(2) == motion.mass
+        state, flags = rest_state(angles), np.where(moves, STUCK, LOCKED)
+        whirl = plant.steady_whirl(speed, angles) if speed else 0j
+        state[0], state[1] = whirl.real, whirl.imag
+        command, now = motion.voltage * moves, 0.0
+        for row, time in zip(rows.tolist(), times[rows].tolist(), strict=True):
+            calls = math.ceil(substeps(plant, speed, 0.0, time - now) / _MOST_SUBSTEPS) if time > now else 0
+            for _ in range(calls):
+                state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / calls)
+            now = time
+            moved[row] = state[4 + motion.mass] - angles[motion.mass]
+    return moved
 
 
 def _moved_masses(observations: Observations) -> IntArray:
@@ -101,24 +111,6 @@ def _motions(observations: Observations) -> Iterator[tuple[_Motion, IntArray]]:
         rows_of.setdefault(_Motion(*values), []).append(row)
     for motion, rows in rows_of.items():
         yield motion, np.array(rows)[np.argsort(columns["time"][rows], kind="stable")]
-
-
-def _moved(
-    plant: PlantParameters, angles: tuple[float, float], motion: _Motion, times: FloatArray
-) -> FloatArray:
-    """Angle moved at rising times, rad."""
-    speed, mass = float(motion.speed), motion.mass
-    state, flags = rest_state(angles), np.where(np.arange(2) == mass, STUCK, LOCKED)
-    whirl = plant.steady_whirl(speed, angles) if speed else 0j
-    state[0], state[1] = whirl.real, whirl.imag
-    command, found, now = motion.voltage * (np.arange(2) == mass), np.empty(times.size), 0.0
-    for place, time in enumerate(times.tolist()):
-        parts = math.ceil(substeps(plant, speed, 0.0, time - now) / _MOST_SUBSTEPS) if time > now else 0
-        for _ in range(parts):
-            state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / parts)
-        now = time
-        found[place] = state[4 + mass] - angles[mass]
-    return found
 
 
 def _some_speeds(scene: EccentricScene) -> Grid:

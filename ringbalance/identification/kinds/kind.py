@@ -15,8 +15,6 @@ from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArr
 from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.scene.units import DIMENSIONS, FieldError, format_quantity
 
-_WORDS: Final = {"gas_time": "valve-open time"}
-"""Names of columns that a sentence has another word for."""
 _LARGEST: Final[Mapping[str, float]] = {
     "length": 10.0,
     "unbalance": 1e3,
@@ -45,7 +43,7 @@ class Column:
     meaning: str
     measured: bool = False
     amplitude: bool = False
-    """Whether it follows the file's convention of amplitudes."""
+    """True where it follows the file's convention of amplitudes."""
     optional: bool = False
     lowest: float = -math.inf
     """SI."""
@@ -58,11 +56,6 @@ class Column:
         """Name with unit, as it stands over the column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
-    @property
-    def words(self) -> str:
-        """Its name in a sentence."""
-        return _WORDS.get(self.name, self.name.replace("_", " "))
-
     def written(self, value: float) -> str:
         """A value, SI, in the template's unit."""
         return (
@@ -71,26 +64,22 @@ class Column:
 
     def check(self, value: float) -> None:
         """Raises: FieldError: a value, SI, that the column cannot have."""
+        largest = min(self.highest, _LARGEST.get(self.dimension or "", math.inf))
         if self.above_zero and not value > 0:
-            raise FieldError("it is not above zero", self._range())
-        if value < self.lowest:
-            raise FieldError("it is negative" if self.lowest == 0 else "it is too small", self._range())
-        if self.whole and value != round(value):
-            raise FieldError("it is not a whole number", self._range())
-        if abs(value) > self._largest:
-            hint = f"; is [{self.unit}] meant?" if self.unit else ""
-            raise FieldError(f"it is too large{hint}", self._range())
-
-    @property
-    def _largest(self) -> float:
-        return min(self.highest, _LARGEST.get(self.dimension or "", math.inf))
-
-    def _range(self) -> str:
+            problem = "it is not above zero"
+        elif value < self.lowest:
+            problem = "it is negative" if self.lowest == 0 else "it is too small"
+        elif self.whole and value != round(value):
+            problem = "it is not a whole number"
+        elif abs(value) > largest:
+            problem = "it is too large" + (f"; is [{self.unit}] meant?" if self.unit else "")
+        else:
+            return
         unit = DIMENSIONS[self.dimension].si_unit if self.dimension else ""
-        low = self.lowest if self.lowest > -math.inf else -self._largest
-        start = "above 0" if self.above_zero else f"from {low:.4g}"
-        end = "" if self._largest == math.inf else f"to {self._largest:.4g} {unit}"
-        return " ".join(filter(None, (start, end.strip())))
+        low = self.lowest if self.lowest > -math.inf else -largest
+        allowed = "above 0" if self.above_zero else f"from {low:.4g}"
+        end = "" if largest == math.inf else f" to {largest:.4g} {unit}".rstrip()
+        raise FieldError(problem, allowed + end)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +91,7 @@ class Observations:
     source: str = ""
     """Rig, run and date, as the file's first lines have them."""
     sha256: str = ""
-    """Of the file's bytes."""
+    """Hash of the file's bytes."""
     lines: IntArray
     """Line of each row in the file, from 1."""
     series: StringArray
@@ -118,7 +107,7 @@ class Observations:
         return int(self.lines.size)
 
     def where(self, chosen: BoolArray | IntArray) -> Observations:
-        """Some of the rows."""
+        """Copy with some of the rows."""
         return replace(
             self,
             lines=self.lines[chosen],
@@ -129,7 +118,7 @@ class Observations:
         )
 
     def with_columns(self, **columns: FloatArray) -> Observations:
-        """The same with columns in place of its own."""
+        """Copy with some columns replaced."""
         return replace(self, columns={**self.columns, **columns})
 
     def rows_of(self, values: FloatArray) -> FloatArray:
@@ -173,11 +162,11 @@ class Kind:
     one_of: tuple[str, ...] = ()
     """Columns of which a file has exactly one."""
     has_chamber: bool = False
-    """Whether a column `chamber` has the letter of the driven chamber."""
+    """True where a column `chamber` has the letter of the driven chamber."""
     balancer: str = ""
-    """Whose scenes predict it; empty: of a test bench."""
+    """Balancer whose scenes predict it; empty: a test bench without a scene."""
     any_rotor: bool = False
-    """Whether the scenes of a balancer without kinds of its own predict it too."""
+    """True where the scenes of a balancer without kinds of its own predict it too."""
     predict: Callable[[Any, Observations, Any], FloatArray] = _by_no_scene
     """Scene, observations and models (`device.Models`) to what was measured; a vibration counts as its real
     and its imaginary part."""
@@ -193,11 +182,11 @@ class Kind:
     ranges: Callable[[Any], Ranges] = lambda _: {}
     """Scene to what it has of the columns."""
     stated: Callable[[Observations], tuple[FloatArray, FloatArray]] | None = None
-    """Of a test bench: what the program predicts, and the expanded uncertainty (95 %) that it states."""
+    """Prediction for a test bench, and the expanded uncertainty (95 %) that the program states of it."""
 
     @property
     def has_amplitudes(self) -> bool:
-        """Whether the convention of amplitudes matters."""
+        """True where the convention of amplitudes matters."""
         return any(column.amplitude for column in self.columns)
 
     @property
@@ -239,25 +228,25 @@ class Kind:
         return [name for name in names if name in observations.columns] or names
 
     def noisy_column(self, observations: Observations) -> str:
-        """The measured column whose noise is stated or estimated."""
+        """Name of the measured column whose noise is stated or estimated."""
         return self._noisy(observations)[-1]
 
     def noise_given(self, observations: Observations) -> bool:
-        """Whether the noise is stated."""
+        """True where the file states the noise."""
         return all(name in observations.uncertainty for name in self._noisy(observations))
 
     def numbers(self, observations: Observations) -> FloatArray:
-        """What was measured: a number a row, or the parts of a vibration or of its change."""
+        """Measured numbers: one a row, or the parts of a vibration or of its change."""
         if not self._vibrations:
             return observations.columns[self.noisy_column(observations)]
         *before, last = (observations.vectors(when) for when in self._vibrations)
         return parts(last - sum(before))
 
     def covariance(self, observations: Observations) -> FloatArray:
-        """Of the errors of `numbers`; in units of one reading's where the noise is to be estimated.
+        """Covariance of the errors of `numbers`; in units of one reading's where the noise is estimated.
 
-        A vibration that stands as that after one injection and that before the next one of its series was
-        measured once: its error enters both changes, with opposite signs.
+        A vibration that stands as that after one injection and, digit for digit, as that before the next one
+        of its series was measured once: its error enters both changes, with opposite signs.
         """
         count, given = len(observations), self.noise_given(observations)
         if not self._vibrations:
@@ -270,19 +259,14 @@ class Kind:
         full, rows = np.zeros((2, count, 2, count)), np.arange(count)
         full[:, rows, :, rows] = sum(each)
         if len(each) > 1:
-            for later, earlier in _shared_readings(observations):
-                full[:, later, :, earlier] = full[:, earlier, :, later] = -each[-1][earlier]
+            before, after = observations.vectors("_before"), observations.vectors("_after")
+            last: dict[str, int] = {}
+            for i, series in enumerate(observations.series.tolist()):
+                if series in last and before[i] == after[last[series]]:
+                    earlier = last[series]
+                    full[:, i, :, earlier] = full[:, earlier, :, i] = -each[-1][earlier]
+                last[series] = i
         return full.reshape(2 * count, 2 * count)
-
-
-def _shared_readings(observations: Observations) -> Iterator[tuple[int, int]]:
-    """Rows whose vibration before is that after the row above in their series, digit for digit."""
-    before, after = observations.vectors("_before"), observations.vectors("_after")
-    last: dict[str, int] = {}
-    for i, series in enumerate(observations.series.tolist()):
-        if series in last and before[i] == after[last[series]]:
-            yield i, last[series]
-        last[series] = i
 
 
 def parts(vector: ComplexArray) -> FloatArray:
@@ -291,7 +275,7 @@ def parts(vector: ComplexArray) -> FloatArray:
 
 
 def always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
-    """The same parameters for all data of a kind."""
+    """Parameters that all data of a kind inform."""
     return lambda _: names
 
 

@@ -64,11 +64,15 @@ class Fit(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """What `ringbalance fit --json` prints."""
-        return fit_document(self.result, data=self.data, told=self.review, following=self.next_measurement)
+        return fit_document(
+            self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
+        )
 
     def rows(self) -> Rows:
         """Each parameter, whether the fit describes the data, and what else they say."""
-        return fit_rows(self.result, data=self.data, told=self.review, following=self.next_measurement)
+        return fit_rows(
+            self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
+        )
 
 
 def fit(

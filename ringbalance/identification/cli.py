@@ -30,7 +30,7 @@ _USAGE = (
 
 @dataclass(frozen=True, kw_only=True)
 class FitRequest:
-    """What `ringbalance fit` is asked for, see `reports.fit_cli.fit`."""
+    """Options of `ringbalance fit`; `reports.fit_cli.fit` describes them."""
 
     parameters: str | None
     loss: Loss
@@ -48,8 +48,8 @@ def run_fit(scene: Path | None, data: Sequence[Path], request: FitRequest) -> tu
         check_file(request.save)
     if scene.suffix.lower() == ".csv":
         raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
-    given = load_scene(scene)
-    observations = read_observations(data, scene=given)
+    stated_scene = load_scene(scene)
+    observations = read_observations(data, scene=stated_scene)
     names = None if request.parameters is None else [name.strip() for name in request.parameters.split(",")]
     if names is not None and (not all(names) or len(set(names)) < len(names)):
         problem = "it is not a list of different names with commas between"
@@ -58,26 +58,26 @@ def run_fit(scene: Path | None, data: Sequence[Path], request: FitRequest) -> tu
             option="--parameters", value=request.parameters or "", problem=problem, allowed=allowed
         )
     try:
-        fitted = [each.name for each in problem_of(given, observations, names).parameters]
+        fitted = [each.name for each in problem_of(stated_scene, observations, names).parameters]
         if request.next is not None and request.next not in fitted:
             problem = f"this parameter is not fitted{did_you_mean(request.next, fitted)}"
             listed = ", ".join(fitted)
             raise SceneError.of_option(option="--next", value=request.next, problem=problem, allowed=listed)
         with activity("fit", "several starts, profiles of the likelihood ..."):
-            result = fit_scene(given, data=observations, parameters=names, loss=request.loss)
+            result = fit_scene(stated_scene, data=observations, parameters=names, loss=request.loss)
     except FitError as error:
-        raise SceneError.of_file(given.file, str(error)) from error
-    told, following = Review.of(result), next_measurement(result, request.next)
+        raise SceneError.of_file(stated_scene.file, str(error)) from error
+    review, following = Review.of(result), next_measurement(result, request.next)
     if request.json:
-        document = fit_document(result, data=observations, told=told, following=following)
+        document = fit_document(result, data=observations, review=review, next_measurement=following)
         print(json_format.dumps(document, allow_nan=False))
     else:
-        rows = fit_rows(result, data=observations, told=told, following=following)
+        rows = fit_rows(result, data=observations, review=review, next_measurement=following)
         print_rows(rows, headline=False)
     if request.save is not None:
-        save_result(request.save, scene=given, result=result, data=observations, said=told.text)
+        save_result(request.save, scene=stated_scene, result=result, data=observations, said=review.text)
         print_message(f"fitted scene written to {request.save}")
-    return (DONE if told.describes else FAILED), result
+    return (DONE if review.describes else FAILED), result
 
 
 def keep_inputs(save: Path, inputs: Sequence[Path]) -> None:

@@ -54,7 +54,7 @@ class _LinearFit:
     residuals: FloatArray
     """(measured - predicted)/sigma, and of priors (value before - fitted)/sigma, shape (n,)."""
     derivatives: FloatArray
-    """Of the predictions by the parameters, over sigma, shape (n, p)."""
+    """Derivatives of the predictions by the parameters, over sigma, shape (n, p)."""
     block: StringArray
     """File of each row, such as "run.csv", shape (n,), empty for a prior; in the order of measurement."""
     known_noise: BoolArray
@@ -184,13 +184,13 @@ class _Explained:
 
     file: str
     share: float
-    """Of the variance, by the fit; below zero where no effect at all explains more."""
+    """Fraction of the variance that the fit explains; below zero where no effect at all explains more."""
     fails: bool
-    """Whether what was measured is mostly called noise, though the scene predicts an effect."""
+    """True where the fit takes most of the data for noise, though the scene predicts an effect."""
 
     @property
     def text(self) -> str:
-        """What it means."""
+        """Sentence on a file that is hardly explained."""
         return text_of("hardly_explained", share=max(self.share, 0.0), file=Path(self.file).name)
 
 
@@ -227,7 +227,7 @@ class Review:
 
     criticism: _Criticism
     explained: tuple[_Explained, ...] = ()
-    """Of each file, what the fit explains of it."""
+    """Fraction of the variance of each file that the fit explains."""
     readings: tuple[Reading, ...] = ()
     """Other readings of the files, the likeliest first."""
     ranges: tuple[ComparedColumn, ...] = ()
@@ -235,7 +235,7 @@ class Review:
 
     @property
     def _read_wrongly(self) -> tuple[str, ...]:
-        """What speaks against the files as they stand, each in one sentence."""
+        """Evidence against the files as they stand, one sentence each."""
         named = [each.text for each in self.readings if each.named]
         unexplained = [each.text for each in self.explained if each.fails]
         return (*named, *unexplained, *(each.text for each in self.ranges if each.fails))
@@ -248,7 +248,7 @@ class Review:
 
     @property
     def describes(self) -> bool:
-        """Whether the fit describes the data, as they are read."""
+        """True where the fit describes the data, as they are read."""
         return self.criticism.describes and not self._read_wrongly
 
     @property

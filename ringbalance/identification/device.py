@@ -59,7 +59,7 @@ class Models:
     velocity: float
     """Of a primed tube at equal fills, m/s."""
     gas_pressure: float
-    """Of the scene that is fitted, gauge, Pa: by what another one's differs the gauge of the data is off."""
+    """Gauge pressure of the fitted scene's gas, Pa; that of another one is off by the error of the gauge."""
     devices: dict[Scene, Device] = field(default_factory=_Kept, init=False, repr=False, compare=False)
     """The last `_KEPT` that were asked for."""
     rings: Rings = field(default_factory=_Kept, init=False, repr=False, compare=False)
@@ -79,7 +79,7 @@ class Models:
         devices = {id(device): device for device in (Device.of(scene, self) for scene in scenes)}
         lacking = [device for device in devices.values() if "law" not in vars(device)]
         for places in alike([device.scene for device in lacking]):
-            together = [lacking[place] for place in places]
+            together = [lacking[index] for index in places]
             for device in together:
                 device.together[:] = together
 
@@ -130,8 +130,8 @@ class Device:
             if velocity > 0 and self.models.velocity > 0:
                 law = bare.cleared_at(law.path.froude_velocity * velocity / self.models.velocity)
             vars(device)["law"] = law
-        own: CalibratedLaw = vars(self)["law"]
-        return own
+        result: CalibratedLaw = vars(self)["law"]
+        return result
 
     @cached_property
     def _plant(self) -> npt.NDArray[np.void]:
@@ -151,7 +151,7 @@ class Device:
 
     @cached_property
     def _delay(self) -> float:
-        """By which the flow starts late, s: its error (95 %) is L/2u at equal fills."""
+        """Delay of the start of the flow, s: its error (95 %) is L/2u at equal fills."""
         length = self.scene.tube.model_error(START_ERROR) / NORMAL_95 * self.scene.tube.length / 2
         return length / velocity if (velocity := self.models.velocity) else 0.0
 
@@ -162,7 +162,7 @@ class Device:
     def once(
         self, observations: Observations, find: Callable[[Device, Observations], FloatArray]
     ) -> FloatArray:
-        """What the device alone decides of a data set: predictions with another rotor take it again."""
+        """Part of a prediction that the device alone decides, which other rotors share."""
         # The entry keeps its data set alive, so that no other one can have the same identity.
         if id(observations) not in self._kept:
             self._kept[id(observations)] = observations, find(self, observations)
@@ -213,9 +213,9 @@ class Device:
             scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
         )
         disc = replace(scene.disc, lambda_factor=None)
-        built, kept = replace(scene, rotor=rotor, disc=disc), models.devices
-        device = kept.pop(built, None) or Device(scene=built, models=models)
-        kept[built] = device
-        if len(kept) > _KEPT:
-            del kept[next(iter(kept))]
+        built, devices = replace(scene, rotor=rotor, disc=disc), models.devices
+        device = devices.pop(built, None) or Device(scene=built, models=models)
+        devices[built] = device
+        if len(devices) > _KEPT:
+            del devices[next(iter(devices))]
         return device

@@ -27,9 +27,9 @@ from ringbalance.scene.uncertain import NORMAL_95
 
 
 def fit_document(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement
+    result: FitResult, *, data: Sequence[Observations], review: Review, next_measurement: NextMeasurement
 ) -> dict[str, Any]:
-    """What `ringbalance fit --json` prints."""
+    """Document that `ringbalance fit --json` prints."""
     scene = result.optimum.residuals.problem.scene
     return {
         "scene": _chosen(scene, "name source sha256"),
@@ -62,25 +62,25 @@ def fit_document(
         **_chosen(result, "exact loss starts evaluations log_likelihood"),
         **{name: dict(getattr(result, name)) for name in ("held", "pulls")},
         "criticism": {
-            **_chosen(told, "describes text"),
+            **_chosen(review, "describes text"),
             "findings": [
                 _chosen(each, "test p_value fails")
                 | {"residuals_of": each.block, "corrected_p_value": each.corrected}
-                for each in told.criticism.findings
+                for each in review.criticism.findings
             ],
             **{
-                name: [asdict(each) for each in getattr(told, name)]
+                name: [asdict(each) for each in getattr(review, name)]
                 for name in ("explained", "readings", "ranges")
             },
         },
-        "next_measurement": _chosen(following, "parameter text")
+        "next_measurement": _chosen(next_measurement, "parameter text")
         | {
             "candidates": [
                 {"measurement": each.candidate, "expected_width_ratio": each.ratio}
-                for each in following.gains
+                for each in next_measurement.gains
             ]
         },
-        **fit_rows(result, data=data, told=told, following=following).document(),
+        **fit_rows(result, data=data, review=review, next_measurement=next_measurement).document(),
     }
 
 
@@ -102,7 +102,7 @@ _FAR: Final = 3.0
 
 
 def fit_rows(
-    result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement
+    result: FitResult, *, data: Sequence[Observations], review: Review, next_measurement: NextMeasurement
 ) -> Rows:
     """Parameters with their intervals, whether the fit holds, and what else the data say."""
     scene, count = result.optimum.residuals.problem.scene, sum(len(each) for each in data)
@@ -143,11 +143,11 @@ def fit_rows(
         title=f"{scene.name} ({scene.source}), fitted to {count} measurements",
         quantities=tuple(quantities),
         findings=(
-            *_review(told),
+            *_review(review),
             *_of_parameters(result),
             *_of_errors(result),
             *result.pulled,
-            Finding(code="next_measurement", values={"text": following.text}),
+            Finding(code="next_measurement", values={"text": next_measurement.text}),
         ),
         facts=[(name, text) for name, text in facts.items() if text],
         tables=(Table(heads=heads, rows=rows, note="from, to: ends of the 95 % interval"),),
@@ -155,9 +155,11 @@ def fit_rows(
     )
 
 
-def _review(told: Review) -> Iterator[Finding]:
-    yield Finding(code="fit_describes" if told.describes else "fit_contradicted", values={"text": told.text})
-    yield from (Finding(code="sense_undecided", values={"text": text}) for text in told.undecided)
+def _review(review: Review) -> Iterator[Finding]:
+    yield Finding(
+        code="fit_describes" if review.describes else "fit_contradicted", values={"text": review.text}
+    )
+    yield from (Finding(code="sense_undecided", values={"text": text}) for text in review.undecided)
 
 
 def _of_parameters(result: FitResult) -> Iterator[Finding]:
@@ -218,9 +220,9 @@ class AgainstFit:
     column: str
     dimension: str | None
     unit: str
-    """Of the file's column."""
+    """Unit of the file's column."""
     component: IntArray
-    """Of every number: 0, or 1 of the imaginary part of a vibration."""
+    """Component of every number: 0, or 1 for the imaginary part of a vibration."""
     measured: FloatArray
     """Less what is no quantity of the device, such as the vibration without trial weight."""
     measured_uncertainty: FloatArray
@@ -237,7 +239,7 @@ class AgainstFit:
 
     @property
     def slope_uncertainty(self) -> float | None:
-        """Of the slope by the noise, expanded (95 %)."""
+        """Expanded uncertainty (95 %) of the slope by the noise."""
         return float(NORMAL_95 / np.sqrt(self._square)) if self._square else None
 
     @property
@@ -257,8 +259,8 @@ def against_fit(result: FitResult) -> list[AgainstFit]:
     spread = covariance(np.concatenate(best.of_all))
     b, n = residuals.linear_values(best.t)
     predicted = problem.at(best.t) + residuals.held @ (n - residuals.pulled)
-    kept = np.r_[: best.t.size, best.t.size + free.shape[1] : effects.shape[1]]
-    of_device, spread = effects[:, kept], spread[np.ix_(kept, kept)]
+    of_unknowns = np.r_[: best.t.size, best.t.size + free.shape[1] : effects.shape[1]]
+    of_device, spread = effects[:, of_unknowns], spread[np.ix_(of_unknowns, of_unknowns)]
     # Of each group: the number's part, measured, its uncertainty, fitted, its uncertainty.
     numbers: dict[str, list[FloatArray]] = {}
     first = {block.group: block for block in reversed(problem.blocks)}

@@ -40,7 +40,7 @@ root of two that rms amplitudes are wrong by where zero to peak is stated."""
 _FAR: Final = 3.0
 """Standard deviations by which data may disagree with what is known beforehand."""
 _TOLD: Final = 0.1
-"""Of what is known beforehand, by which data must be able to move a value to disagree."""
+"""Fraction of the prior standard deviation by which data must be able to move a value to disagree."""
 _LITTLE: Final = 1e-4
 """Change of a quantity, relative, or in SI units where it is zero."""
 Source = Literal["[uncertainty]", "geometry"]
@@ -60,13 +60,13 @@ class FittedParameter:
     value: float
     interval: tuple[float, float]
     at_bound: tuple[bool, bool]
-    """Whether an end of the interval is a rule of the scene and not the data."""
+    """True for an end of the interval that a rule of the scene sets and not the data."""
     before: float
-    """Of the scene."""
+    """Value of the scene."""
     before_interval: tuple[float, float] | None
     """None where nothing is known beforehand."""
     before_source: Source | None
-    """Where that interval comes from."""
+    """Source of that interval."""
     verdict: Identified
     text: str
     """The verdict with its reason, in one sentence."""
@@ -82,13 +82,13 @@ class FittedParameter:
 
     @property
     def origin(self) -> Origin:
-        """Of the value in a saved scene."""
+        """Origin of the value in a saved scene."""
         sound = self.verdict is Identified.IDENTIFIED and not self._impossible
         return "measured" if sound else "inferred"
 
     @property
     def contradicts(self) -> bool:
-        """Whether the value lies outside what was known before: that or the data are wrong."""
+        """True where the value lies outside the interval before: that or the data are wrong."""
         low, high = self.before_interval or (-math.inf, math.inf)
         return not low <= self.value <= high
 
@@ -100,23 +100,23 @@ class FittedParameter:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What speaks against the value, each in one sentence."""
-        disagrees, found = self.contradicts, []
+        """Doubts of the value, one sentence each."""
+        disagrees, doubts = self.contradicts, []
         if self.before_interval is not None:
             # Of data that agree with a prior of standard deviation p, of which the fit leaves q, the value is
             # off its middle by (p^2 - q^2)^(1/2).
-            known = (self.before_interval[1] - self.before) / NORMAL_95
+            prior = (self.before_interval[1] - self.before) / NORMAL_95
             left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
-            moved = math.sqrt(max(known**2 - left**2, 0.0))
-            disagrees |= moved > _TOLD * known and abs(self.value - self.before) > _FAR * moved
+            moved = math.sqrt(max(prior**2 - left**2, 0.0))
+            disagrees |= moved > _TOLD * prior and abs(self.value - self.before) > _FAR * moved
         if self.before_source == "[uncertainty]" and disagrees:
-            found.append(text_of("outside_stated" if self.contradicts else "data_outside_stated"))
+            doubts.append(text_of("outside_stated" if self.contradicts else "data_outside_stated"))
         far = self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR
         if far or (self.before_source == "geometry" and disagrees):
-            found.append(text_of("outside_geometry"))
+            doubts.append(text_of("outside_geometry"))
         if self._impossible:
-            found.append(text_of("lag_impossible"))
-        return tuple(found)
+            doubts.append(text_of("lag_impossible"))
+        return tuple(doubts)
 
     @property
     def path(self) -> str:
@@ -157,7 +157,7 @@ class FitResult:
 
     parameters: tuple[FittedParameter, ...]
     correlations: FloatArray
-    """Of the parameters in their own scales, in that order."""
+    """Correlations of the parameters in their own scales, in that order."""
     combinations: tuple[Combination, ...]
     """Products of powers of parameters that are not identified by themselves."""
     noise: tuple[Noise, ...]
@@ -172,9 +172,9 @@ class FitResult:
     evaluations: int
     """Predictions of all data."""
     log_likelihood: float
-    """Of the data at the optimum, priors and held inputs with it, but for constants."""
+    """Log likelihood of the data at the optimum, with priors and held inputs, but for constants."""
     scene: Any
-    """With the fitted values, the values to which held inputs are pulled, and corrected models."""
+    """Scene with the fitted values, the values to which held inputs are pulled, and corrected models."""
     stated: Any
     """The scene that was fitted."""
     joint: Joint
@@ -196,13 +196,13 @@ class FitResult:
         """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
         problem, t = self.optimum.residuals.problem, self.optimum.t
         inputs = inputs_of(problem.scene)
-        known = {*inputs.held(()), *(parameter.name for parameter in self.parameters)}
-        found = []
+        uncertain = {*inputs.held(()), *(parameter.name for parameter in self.parameters)}
+        exact = []
         for name, each in inputs.inputs.items():
             nearby = inputs.changed(name, -_LITTLE * abs(each.value) if each.value else _LITTLE)
-            if name not in known and np.any(replace(problem, scene=nearby).at(t) != problem.at(t)):
-                found.append(name)
-        return tuple(found)
+            if name not in uncertain and np.any(replace(problem, scene=nearby).at(t) != problem.at(t)):
+                exact.append(name)
+        return tuple(exact)
 
     def parameter(self, name: str) -> FittedParameter:
         """One parameter by name. Raises: KeyError: it was not fitted."""
@@ -239,10 +239,10 @@ def fit(
     fitted = zip(problem.parameters, best.t.tolist(), intervals, identified, strict=True)
     size = np.sqrt(np.diag(spread))
     groups = zip(problem.estimated_groups, residuals.noise.tolist(), best.freedom.tolist(), strict=True)
-    given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
+    stated = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
     noise = [Noise(group=g, standard_deviation=s, estimated=True, degrees_of_freedom=f) for g, s, f in groups]
     noise += [
-        Noise(group=g, standard_deviation=None, estimated=False, degrees_of_freedom=None) for g in given
+        Noise(group=g, standard_deviation=None, estimated=False, degrees_of_freedom=None) for g in stated
     ]
     # Normalised after what is no parameter has taken up its part.
     normalised, files = best.at[: problem.measured.size] / np.sqrt(residuals.weights), []
@@ -300,7 +300,7 @@ def problem_of(
 
 
 def _fitted(
-    parameter: Parameter, t: float, found: Profile, verdict: Identified, products: Sequence[Combination]
+    parameter: Parameter, t: float, profile: Profile, verdict: Identified, products: Sequence[Combination]
 ) -> FittedParameter:
     before, text = None, text_of("told_apart_by_data")
     source: Source | None = None
@@ -320,13 +320,13 @@ def _fitted(
     return FittedParameter(
         name=parameter.name,
         value=parameter.value(t),
-        interval=(parameter.value(found.low), parameter.value(found.high)),
-        at_bound=(found.low_bound, found.high_bound),
+        interval=(parameter.value(profile.low), parameter.value(profile.high)),
+        at_bound=(profile.low_bound, profile.high_bound),
         before=parameter.start,
         before_interval=before,
         before_source=source,
         verdict=verdict,
         text=text,
-        profile=found,
-        curve=tuple((parameter.value(at), rise / found.factor**2) for at, rise in found.points),
+        profile=profile,
+        curve=tuple((parameter.value(at), rise / profile.factor**2) for at, rise in profile.points),
     )

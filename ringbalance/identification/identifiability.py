@@ -1,4 +1,4 @@
-"""What the data alone, without priors on the parameters, can tell, from their Fisher information.
+"""Identifiability of parameters by the data alone, without priors, from their Fisher information.
 
 In the parameters' own scales t, ln x or ln(k + 1), F = J'J with J = d(residuals)/dt.
 
@@ -50,7 +50,7 @@ _WHOLE: Final = 3
 
 
 class Identified(StrEnum):
-    """Whether data identify a parameter."""
+    """Verdict on how well data identify a parameter."""
 
     IDENTIFIED = "identified"
     PRACTICALLY = "practically not identified"
@@ -64,9 +64,9 @@ class Combination:
     names: tuple[str, ...]
     exponents: tuple[float, ...]
     text: str
-    """Such as "lambda^2/(k + 1)"."""
+    """Formula, such as "lambda^2/(k + 1)"."""
     value: float
-    """With the parameters in SI, k + 1 for a loss coefficient."""
+    """Value with the parameters in SI, k + 1 for a loss coefficient."""
     relative_uncertainty: float
     """Expanded (95 %), by the data alone: of its logarithm."""
 
@@ -101,16 +101,16 @@ def verdicts(
     lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
     alone = np.linalg.norm(_data_root(slopes), axis=1)
     allowed = _allowed_widths(parameters, t)
-    found = []
+    identified = []
     for i, (parameter, profile) in enumerate(zip(parameters, profiles, strict=True)):
         reach = max(profile.high - float(t[i]), float(t[i]) - profile.low)
         # Prior and data of equal weight leave the prior's width over the root of two.
         wide = reach > allowed[i] / (math.sqrt(2) if parameter.prior else 1.0)
         weak = wide or profile.factor * alone[i] > allowed[i]
-        found.append(
+        identified.append(
             Identified.STRUCTURALLY if lost[i] else Identified.PRACTICALLY if weak else Identified.IDENTIFIED
         )
-    return tuple(found)
+    return tuple(identified)
 
 
 def _data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
@@ -128,19 +128,19 @@ def combinations(
     parameters: Sequence[Parameter],
     t: FloatArray,
     slopes: FloatArray,
-    found: Sequence[Identified],
+    identified: Sequence[Identified],
     profiles: Sequence[Profile],
 ) -> tuple[Combination, ...]:
     """Products of powers that the data identify, where they do not identify each parameter.
 
     Args: `slopes`: as of `verdicts`.
     """
-    if all(verdict is Identified.IDENTIFIED for verdict in found):
+    if all(verdict is Identified.IDENTIFIED for verdict in identified):
         return ()
     # A product is what the data alone tell: the geometry bounds its part, and makes it no better known.
     data = [replace(p, prior=None) if p.by_geometry else p for p in parameters]
     factor, allowed, flat = max(p.factor for p in profiles), _allowed_widths(data, t), slopes
-    weak = np.array([verdict is not Identified.IDENTIFIED for verdict in found])
+    weak = np.array([verdict is not Identified.IDENTIFIED for verdict in identified])
     # J with no more information along the way to the ends of wide profiles than these show, unless that is
     # its own but for little, or less because a prior ends the profile.
     for profile in [p for p, is_weak in zip(profiles, weak, strict=True) if is_weak]:
@@ -148,9 +148,9 @@ def combinations(
             way, scaled = (np.array(end) - t) / allowed, flat * allowed
             length = float(np.linalg.norm(way))
             if length > 1 / math.sqrt(2) and np.linalg.norm(scaled @ way) > _BENT * profile.factor:
-                along = way / length
-                without = scaled - np.outer(scaled @ along, along)
-                flat = np.concatenate([without, (profile.factor / length) * along[None, :]]) / allowed
+                direction = way / length
+                without = scaled - np.outer(scaled @ direction, direction)
+                flat = np.concatenate([without, (profile.factor / length) * direction[None, :]]) / allowed
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
     root = _data_root(flat)
@@ -176,7 +176,7 @@ def combinations(
 
 
 def _echelon(rows: FloatArray) -> FloatArray:
-    """The same space of directions with as many zeros as possible: reduced by Gauss and Jordan."""
+    """Basis of the space of some directions with as many zeros as possible, by Gauss and Jordan."""
     rows = rows.copy()
     pivots: list[int] = []
     for i in range(rows.shape[0]):
@@ -202,10 +202,12 @@ def _simple(row: FloatArray, root: FloatArray) -> FloatArray:
     best, row = width(row), row / np.max(np.abs(row))
     row = row * np.sign(row[np.flatnonzero(np.abs(row) > _SIGN)[0]])
     wholes = [(largest, np.round(row * largest)) for largest in range(1, _WHOLE + 1)]
-    near = [whole for largest, whole in wholes if np.max(np.abs(whole / largest - row)) < _ROUNDED]
-    alike = [whole for _, whole in wholes if width(whole) <= _ALIKE * best]
-    for whole in (*near, *alike):
-        return np.asarray(whole / np.gcd.reduce(whole.astype(np.int64)))
+    near = [
+        exponents for largest, exponents in wholes if np.max(np.abs(exponents / largest - row)) < _ROUNDED
+    ]
+    alike = [exponents for _, exponents in wholes if width(exponents) <= _ALIKE * best]
+    for exponents in (*near, *alike):
+        return np.asarray(exponents / np.gcd.reduce(exponents.astype(np.int64)))
     return np.asarray(np.round(row, 2))
 
 

@@ -29,7 +29,7 @@ from ringbalance.scene.faults import SceneError
 _AMPLITUDES: Final = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": math.sqrt(2.0)}
 """Factor to zero-to-peak."""
 _SIGNS: Final = {"lag": -1.0, "lead": 1.0, "exp(+jwt)": 1.0, "exp(-jwt)": -1.0}
-"""Of an angle or an imaginary part, to one that grows with the rotation ahead of the unbalance."""
+"""Factor on an angle or an imaginary part to one that grows with the rotation ahead of the unbalance."""
 _POLAR: Final = ("amplitude", "angle")
 _CARTESIAN: Final = ("real", "imaginary")
 _DIMENSIONS: Final = {
@@ -77,8 +77,8 @@ class InfluenceTable:
         first = max(min(first, self.speed.size - _NEAREST), 0)
         x = self.speed[first : first + _NEAREST]
         stiffness = x**2 / self.coefficient[first : first + _NEAREST]
-        others = [np.delete(x, place) for place in range(x.size)]
-        weights = [np.prod((speed - rest) / (own - rest)) for own, rest in zip(x, others, strict=True)]
+        others = [np.delete(x, point) for point in range(x.size)]
+        weights = [np.prod((speed - rest) / (node - rest)) for node, rest in zip(x, others, strict=True)]
         return complex(speed**2 / np.dot(weights, stiffness))
 
     def rotor(self, speed: float) -> dict[str, object]:

@@ -41,7 +41,7 @@ from ringbalance.scene.uncertain import NORMAL_95
 _CLOSE: Final = 0.01
 """Relative, of the root of S at an end of the interval."""
 _GAIN: Final = 1e-3
-"""Of S, below which the other parameters are not moved further."""
+"""Gain of S below which the other parameters are not moved further."""
 _TRIALS: Final = 16
 _LONGEST: Final = 0.7
 """In t, of a step beyond what is known."""
@@ -57,7 +57,7 @@ class Profile:
     """t at the lower end."""
     high: float
     low_bound: bool
-    """Whether the lower end is a bound and not a threshold."""
+    """True where the lower end is a bound and not a threshold."""
     high_bound: bool
     factor: float
     """Student's t."""
@@ -98,18 +98,18 @@ def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
 
 def _student(best: Optimum) -> FloatArray:
     """t(0.975) of each parameter, with what the estimated weights add."""
-    (data, known), count, group = best.of_all, best.t.size, best.residuals.problem.group
-    whole, parts = covariance(np.concatenate([data, known])), np.linalg.pinv(best.slopes, rcond=1e-10) ** 2
+    (data, priors), count, group = best.of_all, best.t.size, best.residuals.problem.group
+    inverse, parts = covariance(np.concatenate([data, priors])), np.linalg.pinv(best.slopes, rcond=1e-10) ** 2
     total, below, added = np.sum(parts, axis=1), np.zeros(count), np.zeros(count)
     for g, nu in enumerate(best.freedom.tolist()):
         below += np.sum(parts[:, : group.size][:, group == g], axis=1) ** 2 / nu
         mine = data[group == g]
-        rows = mine @ whole
+        rows = mine @ inverse
         # Diagonal of C (W - W C W) C by the rows' own covariance.
-        left = (rows.T @ rows) @ (np.eye(len(whole)) - mine.T @ rows)
+        left = (rows.T @ rows) @ (np.eye(len(inverse)) - mine.T @ rows)
         added += 2 / nu * np.diag(left)[:count]
     freedom = np.divide(total**2, below, out=np.full(count, np.inf), where=below > 1e-9 * total**2)
-    by_weights = np.maximum(added, 0.0) / np.diag(whole)[:count]
+    by_weights = np.maximum(added, 0.0) / np.diag(inverse)[:count]
     limited = np.minimum(np.maximum(freedom, 1.0), 1e9)
     return np.asarray(stdtrit(limited, 0.975) * np.sqrt(1 + 2 * by_weights), dtype=np.float64)
 
@@ -172,11 +172,11 @@ class Joint:
     """Normal distribution of fitted parameters and held inputs."""
 
     names: tuple[str, ...]
-    """Of the parameters, then of the held inputs, as the fit names them."""
+    """Names of the parameters, then of the held inputs, as in the fit."""
     values: FloatArray
     """SI; of an error of a model in its standard deviations."""
     covariance: FloatArray
-    """Of these, shape (n, n)."""
+    """Covariance of the values, shape (n, n)."""
 
     @property
     def deviations(self) -> FloatArray:
@@ -196,17 +196,23 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
         pulled = scene
         for (name, sd), pull in zip(held.items(), pulls.tolist(), strict=True):
             pulled = inputs_of(pulled).changed(name, pull * sd)
-        there = replace(problem, scene=pulled)
-        models = inputs_of(there.scene_at(t)).models
+        moved_problem = replace(problem, scene=pulled)
+        models = inputs_of(moved_problem.scene_at(t)).models
         if models is not None:
             # What the gauge of the data is off by stays that against the scene that is fitted.
-            there = replace(there, models=replace(models, gas_pressure=problem.models.gas_pressure))
+            moved_problem = replace(
+                moved_problem, models=replace(models, gas_pressure=problem.models.gas_pressure)
+            )
         linear = problem.at(t) + residuals.held @ (pulls - residuals.pulled)
-        if np.max(residuals.scale * np.abs(there.at(t) - linear), initial=0.0) < _LINEAR:
+        if np.max(residuals.scale * np.abs(moved_problem.at(t) - linear), initial=0.0) < _LINEAR:
             break
-        effects = there.held_effects(t, [inputs_of(pulled).both_sides(*each) for each in held.items()])
-        moved = replace(residuals, problem=there, held=effects, pulled=pulls)
-        best = optimum(there, effects, loss=loss, starts=best.starts, before=replace(best, residuals=moved))
+        effects = moved_problem.held_effects(
+            t, [inputs_of(pulled).both_sides(*each) for each in held.items()]
+        )
+        moved = replace(residuals, problem=moved_problem, held=effects, pulled=pulls)
+        best = optimum(
+            moved_problem, effects, loss=loss, starts=best.starts, before=replace(best, residuals=moved)
+        )
     return best
 
 
@@ -219,21 +225,21 @@ def _allowed(held: Mapping[str, float], pulls: FloatArray) -> FloatArray:
 def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
     """Distribution of parameters and held inputs at the optimum."""
     problem, t, parameters = best.residuals.problem, best.t, best.residuals.problem.parameters
-    data, known = best.of_all
+    data, priors = best.of_all
     count, free = t.size, problem.free.shape[1]
     student = np.append(stdtrit(np.clip(best.freedom, 1.0, 1e9), 0.975) / NORMAL_95, 1.0)
     # Parameters of which nothing is known beforehand.
     weak = np.zeros((count, data.shape[1]))
     weak[np.arange(count), np.arange(count)] = [0.0 if p.prior else 1 / _UNKNOWN for p in parameters]
-    whole = covariance(np.concatenate([data / student[problem.group][:, None], known, weak]))
-    kept = np.r_[:count, count + free : count + free + len(held)]
+    inverse = covariance(np.concatenate([data / student[problem.group][:, None], priors, weak]))
+    columns = np.r_[:count, count + free : count + free + len(held)]
     slopes = [p.slope(inner) for p, inner in zip(parameters, t.tolist(), strict=True)]
     values = [p.value(inner) for p, inner in zip(parameters, t.tolist(), strict=True)]
     scale = np.concatenate([slopes, list(held.values())])
     return Joint(
         names=(*(p.name for p in parameters), *held),
         values=np.concatenate([values, best.residuals.held_values(t)]),
-        covariance=whole[np.ix_(kept, kept)] * np.outer(scale, scale),
+        covariance=inverse[np.ix_(columns, columns)] * np.outer(scale, scale),
     )
 
 

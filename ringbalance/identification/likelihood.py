@@ -80,7 +80,7 @@ class Block:
 
     @property
     def estimated(self) -> bool:
-        """Whether its noise is estimated from the residuals."""
+        """True where its noise is estimated from the residuals."""
         return not self.kind.noise_given(self.observations)
 
     def predicted(self, scene: Any, models: Any) -> FloatArray:
@@ -90,11 +90,11 @@ class Block:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """What is fitted to what."""
+    """Parameters of a scene and the files that they are fitted to."""
 
     scene: Any
     models: Any
-    """What predictions of this scene take, fixed during the fit."""
+    """Models that predictions of this scene take, fixed during the fit."""
     parameters: tuple[Parameter, ...]
     blocks: tuple[Block, ...]
 
@@ -154,16 +154,16 @@ class Problem:
         return np.where(apart & (part > 0) & (part < 1), smaller, part * down + (1 - part) * up)
 
     def quick_slopes(self, t: FloatArray) -> FloatArray:
-        """The same by differences to one side, for a search."""
+        """d(L^-1 f)/dt by differences to one side, for a search."""
         return self._differences(t, np.where(t + STEP < self.bounds[1], t + STEP, t - STEP))
 
     def _differences(self, t: FloatArray, ends: FloatArray) -> FloatArray:
-        """Of L^-1 f from t to ends of each parameter in turn, over those of t; zero where there is none."""
+        """Slopes of L^-1 f from t to ends of each parameter in turn; zero over a step of zero."""
         which = np.arange(ends.size) % t.size
         points = [np.where(np.arange(t.size) == i, end, t) for i, end in zip(which, ends, strict=True)]
-        here, *there = self.at_each([t, *points])
+        center, *values = self.at_each([t, *points])
         step = ends - t[which]
-        return (np.stack(there, axis=1) - here[:, None]) / np.where(step == 0, 1.0, step)
+        return (np.stack(values, axis=1) - center[:, None]) / np.where(step == 0, 1.0, step)
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -190,7 +190,7 @@ class Problem:
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Of t."""
+        """Lower and upper bounds of t."""
         low, high = (
             np.array([p.inner(end) for p, end in zip(self.parameters, ends, strict=True)])
             for ends in zip(*((p.lowest, p.highest) for p in self.parameters), strict=True)
@@ -272,7 +272,7 @@ class Residuals:
         return basis_of(self.linear)
 
     def projected(self, columns: FloatArray) -> FloatArray:
-        """Of numbers of the data, without what b and n can take up, shape (n + held, ...)."""
+        """Numbers of the data without what b and n can take up, shape (n + held, ...)."""
         scaled = self.scale[:, None] * columns if columns.ndim == 2 else self.scale * columns
         below = np.zeros((self.held.shape[1], *columns.shape[1:]))
         full = np.concatenate([scaled, below])
@@ -280,8 +280,8 @@ class Residuals:
 
     def at(self, t: FloatArray, *, predicted: FloatArray | None = None) -> FloatArray:
         """Residuals and priors."""
-        found = self.problem.at(t) if predicted is None else predicted
-        full = np.concatenate([self.scale * (self.problem.measured - found), -self.pulled])
+        prediction = self.problem.at(t) if predicted is None else predicted
+        full = np.concatenate([self.scale * (self.problem.measured - prediction), -self.pulled])
         return np.concatenate([full - self.base @ (self.base.T @ full), self.problem.priors(t)])
 
     def slopes(self, t: FloatArray, of_prediction: FloatArray) -> FloatArray:
@@ -289,7 +289,7 @@ class Residuals:
         return np.concatenate([-self.projected(of_prediction), self.problem.prior_slopes(t)])
 
     def leverage(self, slopes: FloatArray) -> FloatArray:
-        """Of every number of the data: how much of it parameters, b and n take up.
+        """Fraction of every number of the data that parameters, b and n take up.
 
         Args: `slopes`: d(residuals)/dt.
         """
@@ -304,9 +304,9 @@ class Residuals:
         """Likeliest b and n at t."""
         left = self.scale * (self.problem.measured - self.problem.at(t))
         full = np.concatenate([left, -self.pulled])
-        found = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]
-        count = found.size - self.pulled.size
-        return found[:count], self.pulled + found[count:]
+        values = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]
+        count = values.size - self.pulled.size
+        return values[:count], self.pulled + values[count:]
 
 
 def basis_of(columns: FloatArray) -> FloatArray:

@@ -28,13 +28,13 @@ class Misreading:
     words: str
     change: Change
     settings: bool
-    """Whether it changes what was set, and so what is predicted."""
+    """True where it changes settings, and so predictions."""
     scale: float = 1.0
     """dy'/dy."""
     column: str = ""
-    """That it changes, where the scene has a range of it."""
+    """Name of the changed column, where the scene has a range of it."""
     together: bool = True
-    """Whether all files may have been misread alike."""
+    """True where all files may have been misread alike."""
 
 
 def _exchanged(observations: Observations, _: Any) -> Observations | None:
@@ -109,7 +109,7 @@ SENSES: Final = (
     ),
     Misreading(code="chambers_turned", words="letters of the chambers", change=_lettered, settings=True),
 )
-"""Of angles against the rotation, alone and together."""
+"""Senses of angles against the rotation, alone and together."""
 AMPLITUDES: Final = tuple(
     Misreading(
         code=f"amplitudes_{code}",

@@ -26,7 +26,7 @@ from ringbalance.scene.narrowing import AnyScene
 _ASSUMED_NOISE: Final = 0.01
 """Standard deviation of a kind that was not measured, relative to the largest that is predicted."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
-"""Of the middle of what was measured, or of what makes the vibration at the start."""
+"""Ratios to the median of the data, or to the unbalance that makes the vibration at the start."""
 _WORTHWHILE: Final = 0.9
 """Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
 _AT_ALL: Final = 0.99
@@ -37,7 +37,7 @@ _WORDS: Final = {"gas_time": "valve-open time"}
 
 @dataclass(frozen=True, kw_only=True)
 class NextMeasurement:
-    """What to measure next for one parameter."""
+    """Ranking of the measurements that would narrow one parameter."""
 
     parameter: str
     gains: tuple[_Gain, ...]
@@ -79,11 +79,13 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         _offered_rows(scene, kind, measured[kind].observations if kind in measured else None)
         for kind in kinds_of(scene.balancer)
     ]
-    asked = replace(problem, blocks=tuple(Block(observations=each) for each in offered if len(each)))
+    offered_problem = replace(
+        problem, blocks=tuple(Block(observations=each) for each in offered if len(each))
+    )
     changed = [(problem.scene, inputs_of(problem.scene).changed(n, sd)) for n, sd in result.held.items()]
-    by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
+    by_parameters, by_held = offered_problem.quick_slopes(t), offered_problem.held_effects(t, changed)
     ends = np.cumsum([0, *(each.free.shape[1] for each in problem.blocks)])
-    for block, mine in asked.rows:
+    for block, mine in offered_problem.rows:
         count, size = len(block.observations), block.measured.size
         before, noise = measured.get(block.observations.kind), 1.0
         free = np.zeros((size, problem.free.shape[1]))
@@ -94,7 +96,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
                 columns = np.kron(np.eye(2), np.tile(first.astype(np.float64), (count, 1)))
                 free[:, at : at + each.free.shape[1]] = columns
         if before is None:
-            parts = np.reshape(asked.at(t)[mine], (-1, count))
+            parts = np.reshape(offered_problem.at(t)[mine], (-1, count))
             noise = _ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300)
         elif before.estimated:
             noise = float(residuals.noise[problem.estimated_groups.index(before.group)])
@@ -136,7 +138,7 @@ def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> 
 
 
 def _words_of(offered: Observations, row: int) -> str:
-    """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, valve-open time 200 ms"."""
+    """Text of a row, such as "transfer with fill ratio 0.25, pressure 0.7 MPa, valve-open time 200 ms"."""
     said = []
     for column in KINDS[offered.kind].columns:
         values = offered.columns.get(column.name)
@@ -154,12 +156,12 @@ class Candidate:
 
     text: str
     derivatives: FloatArray
-    """Of its predictions by the parameters, each row over its standard deviation, shape (m, p)."""
+    """Derivatives of its predictions by the parameters, over the standard deviation, shape (m, p)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Gain:
-    """What a candidate does to one parameter."""
+    """Effect of a candidate on one parameter."""
 
     candidate: str
     before: float

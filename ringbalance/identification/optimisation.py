@@ -15,11 +15,11 @@ from ringbalance.identification.parameters import FitError, inputs_of
 from ringbalance.scene.arrays import FloatArray
 
 _FIRST_NOISE: Final = 0.02
-"""Of the root mean square of what a group measured: where the search for its noise begins."""
+"""Ratio to the root mean square of a group's data at which the search for its noise begins."""
 _LEAST_NOISE: Final = 1e-9
-"""Of the same: below, the data agree to round-off."""
+"""Ratio to the root mean square of a group's data below which the data agree to round-off."""
 _ROUNDS: Final = 25
-"""Of noise, or of robust weights."""
+"""Iterations of noise, or of robust weights."""
 _AGREES: Final = 1e-3
 """Relative change of the noise at which it is found."""
 _EVALUATIONS: Final = 40
@@ -29,10 +29,10 @@ _NEARBY: Final = 1e-2
 """Change of the sum of squares, relative or of few standard deviations, that tells one start's minimum from
 another's."""
 _APART: Final = 1.0
-"""Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
+"""Distance in t of a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
 _LEAST_GAIN: Final = 1e-8
-"""Of the sum of squares, below which a step to the optimum is not taken: a ten-thousandth of a standard
+"""Gain of the sum of squares below which a step to the optimum is not taken: a ten-thousandth of a standard
 deviation of a parameter."""
 _ROBUST: Final = 1.345
 """Residual over its standard deviation from which soft_l1 bends, for 95 % efficiency."""
@@ -40,11 +40,11 @@ _ROBUST: Final = 1.345
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """Where the likelihood is largest."""
+    """Maximum of the likelihood."""
 
     t: FloatArray
     residuals: Residuals
-    """With the noise found there."""
+    """Residuals with the noise that they have there."""
     freedom: FloatArray
     """Degrees of freedom of each estimated group."""
     starts: int
@@ -70,10 +70,10 @@ class Optimum:
         residuals, priors = self.residuals, self.residuals.problem.prior_slopes(self.t)
         count, held = self.residuals.problem.measured.size, self.residuals.held.shape[1]
         data = np.hstack([residuals.scale[:, None] * self.of_prediction, residuals.linear[:count]])
-        known = np.zeros((priors.shape[0] + held, data.shape[1]))
-        known[: priors.shape[0], : self.t.size] = priors
-        known[priors.shape[0] :, data.shape[1] - held :] = np.eye(held)
-        return data, known
+        prior_rows = np.zeros((priors.shape[0] + held, data.shape[1]))
+        prior_rows[: priors.shape[0], : self.t.size] = priors
+        prior_rows[priors.shape[0] :, data.shape[1] - held :] = np.eye(held)
+        return data, prior_rows
 
 
 def optimum(
@@ -122,13 +122,13 @@ def optimum_as_stated(problem: Problem, *, loss: str, starts: int) -> tuple[Opti
     first = optimum(problem, nothing, loss=loss, starts=starts)
     effects = problem.held_effects(first.t, [inputs.both_sides(*each) for each in held.items()])
     counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
-    kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
-    return optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first), kept
+    relevant = {name: sd for (name, sd), matters in zip(held.items(), counts, strict=True) if matters}
+    return optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first), relevant
 
 
-def _same(one: Residuals, other: Residuals) -> bool:
-    by_noise = np.max(np.abs(one.noise / other.noise - 1), initial=0.0)
-    return bool(by_noise < _AGREES and np.max(np.abs(one.weights - other.weights)) < 1e-2)
+def _same(first: Residuals, second: Residuals) -> bool:
+    by_noise = np.max(np.abs(first.noise / second.noise - 1), initial=0.0)
+    return bool(by_noise < _AGREES and np.max(np.abs(first.weights - second.weights)) < 1e-2)
 
 
 def _first_noise(problem: Problem) -> FloatArray:
@@ -166,7 +166,7 @@ def _settled_noise(
     problem, predicted = residuals.problem, residuals.problem.at(t)
     freedom = np.zeros(len(problem.estimated_groups))
     for _ in range(_ROUNDS):
-        whole = residuals.at(t, predicted=predicted)[: problem.measured.size] / np.sqrt(residuals.weights)
+        errors = residuals.at(t, predicted=predicted)[: problem.measured.size] / np.sqrt(residuals.weights)
         taken = residuals.leverage(residuals.slopes(t, of_prediction))
         noise = residuals.noise.copy()
         for g, name in enumerate(problem.estimated_groups):
@@ -178,14 +178,14 @@ def _settled_noise(
                     "the noise: measure more, fit fewer parameters, or give the uncertainty in the file"
                 )
             if loss == "linear":
-                noise[g] *= math.sqrt(float(np.sum(whole[mine] ** 2)) / float(freedom[g]))
+                noise[g] *= math.sqrt(float(np.sum(errors[mine] ** 2)) / float(freedom[g]))
             else:
                 # The median of a normal quantity's size is 0.6745 of its standard deviation.
-                size = float(np.median(np.abs(whole[mine]))) / 0.6745
+                size = float(np.median(np.abs(errors[mine]))) / 0.6745
                 noise[g] *= size * math.sqrt(np.count_nonzero(mine) / float(freedom[g]))
         floor = _LEAST_NOISE / _FIRST_NOISE * _first_noise(problem)
         noise = np.maximum(noise, floor)
-        weights = residuals.weights if loss == "linear" else 1 / np.sqrt(1 + (whole / _ROBUST) ** 2)
+        weights = residuals.weights if loss == "linear" else 1 / np.sqrt(1 + (errors / _ROBUST) ** 2)
         changed = replace(residuals, noise=noise, weights=weights)
         if _same(changed, residuals):
             return changed, freedom
@@ -206,30 +206,30 @@ def searched(
     # What is reported needs the slopes that central differences give; a profile's other parameters do not.
     differences = problem.slopes if fixed is None else problem.quick_slopes
 
-    def whole(part: FloatArray) -> FloatArray:
-        there = t.copy()
-        there[free] = part
-        return there
+    def full(part: FloatArray) -> FloatArray:
+        point = t.copy()
+        point[free] = part
+        return point
 
     def jacobian(part: FloatArray) -> FloatArray:
-        there = whole(part)
-        return np.asarray(residuals.slopes(there, differences(there))[:, free])
+        point = full(part)
+        return np.asarray(residuals.slopes(point, differences(point))[:, free])
 
-    here = residuals.at(t)
+    start = residuals.at(t)
     if not np.any(free):
-        return t, here
+        return t, start
     low, high = problem.bounds
     margin = 1e-9 * (high - low)
-    found = least_squares(
-        lambda part: residuals.at(whole(part)),
+    end = least_squares(
+        lambda part: residuals.at(full(part)),
         np.clip(t, low + margin, high - margin)[free],
         jac=jacobian,
         bounds=(low[free], high[free]),
         method="trf",
         x_scale="jac",
-        ftol=max(gain / max(float(here @ here), 1.0), 1e-12),
+        ftol=max(gain / max(float(start @ start), 1.0), 1e-12),
         xtol=1e-8,
         gtol=1e-10,
         max_nfev=_EVALUATIONS,
     )
-    return whole(found.x), np.asarray(found.fun)
+    return full(end.x), np.asarray(end.fun)

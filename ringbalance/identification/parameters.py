@@ -1,4 +1,4 @@
-"""What can be fitted: quantities of a scene, each on a scale on which its effect is nearly linear.
+"""Parameters of a fit: quantities of a scene, each on a scale on which its effect is nearly linear.
 
 Positive quantities are fitted by their logarithm, ln x.  A loss coefficient acts through k + 1, so it is
 fitted by ln g (x + c): c = 1 for a prescribed k; for an extra loss such that it is ln(k + 1) to first order.
@@ -58,14 +58,14 @@ class Parameter:
     symbol: str
     """In a combination, such as "(k + 1)"."""
     start: float
-    """Of the scene, SI."""
+    """Value of the scene, SI."""
     lowest: float
     """SI."""
     highest: float
     prior: float | None
     """Standard deviation, SI, of what is known beforehand; None: nothing is."""
     by_geometry: bool = False
-    """Whether that follows from the geometry, and the scene states nothing."""
+    """True where that follows from the geometry, and the scene states nothing."""
     offset: float = 0.0
     """c of ln(x + c), SI."""
     gain: float = 1.0
@@ -154,7 +154,7 @@ _REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central
 _WIDE: Final = 30.0
 _ANGLE: Final = "rad"
 _FAR: Final = 1000.0
-"""The same of a vibration."""
+"""Factor up to which the amplitude of a vibration is looked for."""
 START: Final = ("initial_amplitude", "initial_phase")
 """Parameters that belong to the measurement and not to the device."""
 _LOSS_STEP: Final = 0.01
@@ -181,9 +181,9 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
         return 1.0, 1.0
     if name != "extra_loss":
         return 0.0, 1.0
-    here = scene.tube.extra_loss
+    loss = scene.tube.extra_loss
     speeds = [
-        Models.of(with_value(scene=scene, quantity=name, value=here + step)).velocity
+        Models.of(with_value(scene=scene, quantity=name, value=loss + step)).velocity
         for step in (0.0, _LOSS_STEP)
     ]
     if speeds[1] <= 0 or speeds[0] <= speeds[1]:
@@ -192,7 +192,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
     fill, law = scene.disc.initial_fill, Device.of(scene, Models.of(scene)).law
     ends = law.ends(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure)
     head = float(driving_pressure(law.path, ends)) / scene.liquid.density
-    return apart - here, head * 2 / speeds[0] ** 2 / apart
+    return apart - loss, head * 2 / speeds[0] ** 2 / apart
 
 
 def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float, float]:
@@ -219,7 +219,7 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
 
 
 class _SceneInputs:
-    """What a fit asks of a scene, through its `Balancer`: quantities go by their paths, such as
+    """Quantities of a scene that a fit may move, through its `Balancer`, by their paths, such as
     "rotor.damping" and "masses.friction_arm[0]"."""
 
     def __init__(self, scene: Any) -> None:
@@ -248,8 +248,8 @@ class _SceneInputs:
         """Raises: FitError: a name that cannot be fitted."""
         if name not in self.inputs:
             raise FitError.unknown(name, tuple(self.inputs))
-        given = self.inputs[name]
-        start, is_angle = given.value, given.unit == _ANGLE
+        quantity = self.inputs[name]
+        start, is_angle = quantity.value, quantity.unit == _ANGLE
         if start <= 0 and not is_angle:
             raise FitError(f"{name} is zero: give a value above zero to fit it")
         return Parameter(
@@ -258,7 +258,7 @@ class _SceneInputs:
             start=start,
             lowest=start - math.pi if is_angle else start / _WIDE,
             highest=start + math.pi if is_angle else start * _WIDE,
-            prior=given.half_width / NORMAL_95 or None,
+            prior=quantity.half_width / NORMAL_95 or None,
             scale=1.0 if is_angle else None,
             change=lambda scene, value: with_values_at(scene, {name: value}),
         )
@@ -272,7 +272,7 @@ class _SceneInputs:
     def informed(self, data: Sequence[Observations]) -> list[str]:
         """Parameters that data inform."""
         names = (name for each in data for name in KINDS[each.kind].informs(each))
-        return list(dict.fromkeys(own for name in names for own in self.named(name)))
+        return list(dict.fromkeys(path for name in names for path in self.named(name)))
 
     def held(self, fitted: Sequence[str]) -> dict[str, float]:
         """Standard deviation, SI, of every uncertain quantity that is not fitted, and of what models may be
@@ -285,9 +285,9 @@ class _SceneInputs:
 
         Of a model's error in its standard deviations.
         """
-        given = self.inputs[name]
-        lowest = -math.inf if given.unit == _ANGLE else 0.1 * given.value
-        moved: SceneFile = with_values_at(self.scene, {name: max(given.value + change, lowest)})
+        quantity = self.inputs[name]
+        lowest = -math.inf if quantity.unit == _ANGLE else 0.1 * quantity.value
+        moved: SceneFile = with_values_at(self.scene, {name: max(quantity.value + change, lowest)})
         return moved
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
@@ -302,9 +302,11 @@ class _LiquidRing(_SceneInputs):
 
     @cached_property
     def inputs(self) -> Mapping[str, Input]:
-        given = {key: each for path, each in super().inputs.items() if (key := path.partition(".")[2])}
+        by_key = {key: each for path, each in super().inputs.items() if (key := path.partition(".")[2])}
         # A mesh has no plates, and may not be stretched by all of its dimensions.
-        return {key: given[key] for key in given if nominal_value(scene=self.scene, quantity=key) is not None}
+        return {
+            key: by_key[key] for key in by_key if nominal_value(scene=self.scene, quantity=key) is not None
+        }
 
     @property
     def models(self) -> Models:
@@ -341,7 +343,7 @@ _INPUTS: Final[Mapping[str, type[_SceneInputs]]] = {Scene.balancer: _LiquidRing}
 
 
 def inputs_of(scene: SceneFile) -> _SceneInputs:
-    """What a fit asks of a scene."""
+    """Quantities of a scene that a fit may move."""
     return _INPUTS.get(scene.balancer, _SceneInputs)(scene)
 
 

@@ -54,29 +54,29 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -
     Raises: SceneError: all that is wrong with any of the files, each error with line and column.
     """
     faults: list[Fault] = []
-    found: list[Observations] = []
+    files: list[Observations] = []
     for path in paths:
         content, wrong = read_content(path)
         if not wrong:
             observations, wrong = observations_of(content, file=file_name(path), scene=scene)
-            found += [observations] if observations else []
+            files += [observations] if observations else []
         faults += in_order(wrong)
     first: dict[str, str] = {}
-    for each in found:
+    for each in files:
         if each.sha256 in first:
             problem = f"it has the same content as {first[each.sha256]}; give it once"
             faults.append(data_fault(each.file, "", problem))
         first.setdefault(each.sha256, each.file)
     # The [uncertainty] of a scene that was fitted to a file has what it says.
-    known = set() if scene is None else {file.sha256 for file in scene.measured.files}
-    for each in found:
-        if scene is not None and each.sha256 in known:
+    fitted = set() if scene is None else {file.sha256 for file in scene.measured.files}
+    for each in files:
+        if scene is not None and each.sha256 in fitted:
             problem = f"{scene.file} was fitted to this file already, so that it would count twice"
             allowed = "the scene as it was before, with all files together"
             faults.append(data_fault(each.file, "", problem, allowed=allowed))
     if faults:
         raise SceneError(faults)
-    return tuple(found)
+    return tuple(files)
 
 
 def observations_of(
@@ -135,11 +135,11 @@ def _kind_faults(table: Table, scene: AnyScene | None) -> Iterator[Fault]:
 
 
 def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
-    known = (*_TEXTS, _UNCERTAINTY, *([_AMPLITUDE] if kind.has_amplitudes else []))
+    allowed_keys = (*_TEXTS, _UNCERTAINTY, *([_AMPLITUDE] if kind.has_amplitudes else []))
     for key, value in table.header.items():
-        if key not in known:
-            problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
-            yield data_fault(table.file, toml_text(key), problem, allowed=", ".join(known))
+        if key not in allowed_keys:
+            problem = f"this key of the first lines is not known{did_you_mean(key, allowed_keys)}"
+            yield data_fault(table.file, toml_text(key), problem, allowed=", ".join(allowed_keys))
         elif key in _TEXTS and not isinstance(value, str):
             yield data_fault(table.file, key, "it is not text", value=toml_text(value), allowed='"..."')
     for key in ("source", *([] if kind.balancer else [_UNCERTAINTY])):
@@ -156,8 +156,8 @@ def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
 
 
 def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
-    known = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
-    yield from table.name_faults(known)
+    allowed_names = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
+    yield from table.name_faults(allowed_names)
     names = set()
     for head in table.heads:
         name, unit = split_head(head) or ("", "")
@@ -167,8 +167,8 @@ def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
             if column is None and name in kind.texts and unit:
                 raise FieldError("a column of text has no unit", name)
             if column is None and name not in kind.texts and name.replace("_", "").islower():
-                problem = f"a file of this kind has no such column{did_you_mean(name, known)}"
-                raise FieldError(problem, ", ".join(known))
+                problem = f"a file of this kind has no such column{did_you_mean(name, allowed_names)}"
+                raise FieldError(problem, ", ".join(allowed_names))
             if column is not None and column.dimension is not None:
                 parse_quantity(f"1 {unit}", column.dimension)
             elif column is not None and unit and unit != "%":
@@ -180,17 +180,17 @@ def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
 
 def _missing(table: Table, kind: Kind, names: set[str]) -> Iterator[Fault]:
     """Columns that a file of a kind needs and has not."""
-    place = f"line {table.head_line}"
+    line = f"line {table.head_line}"
     needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
     for column in needed:
         if column.name not in names:
-            yield data_fault(table.file, place, f'the column "{column.head}" is missing: {column.meaning}')
+            yield data_fault(table.file, line, f'the column "{column.head}" is missing: {column.meaning}')
     if kind.has_chamber and "chamber" not in names:
-        yield data_fault(table.file, place, 'the column "chamber" is missing: letter of the driven chamber')
-    given = [name for name in kind.one_of if name in names]
-    if kind.one_of and len(given) != 1:
+        yield data_fault(table.file, line, 'the column "chamber" is missing: letter of the driven chamber')
+    present = [name for name in kind.one_of if name in names]
+    if kind.one_of and len(present) != 1:
         choice = " or ".join(f'"{c.head}"' for c in kind.columns if c.name in kind.one_of)
-        yield data_fault(table.file, place, f"{len(given)} of the columns {choice}, and one is needed")
+        yield data_fault(table.file, line, f"{len(present)} of the columns {choice}, and one is needed")
 
 
 def _columns(table: Table, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
@@ -274,8 +274,8 @@ def _stated_uncertainty(
             if not width > 0:
                 raise FieldError("an uncertainty is above zero", "leave it out where it is to be estimated")
         except FieldError as error:
-            place, text = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}", toml_text(value)
-            faults.append(data_fault(table.file, place, error.problem, value=text, allowed=error.allowed))
+            key, text = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}", toml_text(value)
+            faults.append(data_fault(table.file, key, error.problem, value=text, allowed=error.allowed))
             continue
         result[name] = width * (np.abs(columns[name]) if relative else np.ones_like(columns[name]))
     if stated is not None and not isinstance(stated, Mapping):
@@ -310,7 +310,7 @@ def _stated_uncertainty(
 
 
 def _size(kind: Kind, columns: Mapping[str, FloatArray], name: str) -> FloatArray:
-    """What a relative uncertainty refers to: the value, or one radian for the phase of a vibration."""
+    """Reference of a relative uncertainty: the value, or one radian for the phase of a vibration."""
     of_vibration = name.startswith("phase") and kind.has_amplitudes
     return np.ones_like(columns[name]) if of_vibration else np.abs(columns[name])
 
@@ -324,8 +324,8 @@ KINDS: Final[Mapping[str, Kind]] = MappingProxyType({**LIQUID_RING, **ECCENTRIC_
 
 def kinds_of(balancer: str) -> tuple[str, ...]:
     """Names of the kinds that the scenes of a balancer predict; of an empty one those of test benches."""
-    own = tuple(name for name, kind in KINDS.items() if balancer == kind.balancer)
-    return own or tuple(name for name, kind in KINDS.items() if kind.any_rotor)
+    names = tuple(name for name, kind in KINDS.items() if balancer == kind.balancer)
+    return names or tuple(name for name, kind in KINDS.items() if kind.any_rotor)
 
 
 def template(name: str) -> str:

@@ -1,4 +1,4 @@
-"""How likely files are, read otherwise than they stand.
+"""Likelihood of files that are read otherwise than they stand.
 
     -2 ln L = sum (e/s)^2 + priors + 2 sum n_g ln s_g + ln det A'A - 2 ln det L^-1 - 2 ln |dy'/dy|,
 
@@ -32,11 +32,11 @@ _ROUNDS: Final = 12
 _AGREES: Final = 1e-2
 """Relative change of the noise at which it is settled."""
 _LEAST_NOISE: Final = 1e-6
-"""Of the root mean square of what a group measured."""
+"""Ratio of the least noise to the root mean square of a group's data."""
 _WIDE: Final = 1.0
 """Standard deviation of a parameter of which nothing is known, in its own scale."""
 _STEPS: Final = 8
-"""Of Newton, to the influence coefficient and the lag."""
+"""Steps of Newton to the influence coefficient and the lag."""
 _CLOSE: Final = 1e-3
 """Relative change of the influence coefficient at which it is settled."""
 _LEAST_CHANCE: Final = 1e-300
@@ -55,11 +55,11 @@ class _Rows:
 
     @property
     def vibration(self) -> bool:
-        """Whether its numbers are real and imaginary parts, in proportion to the influence coefficient."""
+        """True where its numbers are real and imaginary parts, in proportion to the influence coefficient."""
         return self.block.measured.size == 2 * len(self.block.observations)
 
     def times(self, factor: complex) -> _Rows:
-        """The same with another influence coefficient."""
+        """Rows with the influence coefficient multiplied by a factor."""
         if not self.vibration or factor == 1:
             return self
         turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
@@ -82,7 +82,7 @@ class Comparison:
 
     problem: Problem
     rows: tuple[_Rows, ...]
-    given: float
+    deviance: float
     """-2 ln L of the files as they stand."""
     pulled: FloatArray
     """Held inputs at which predictions are made, in standard deviations."""
@@ -99,7 +99,9 @@ class Comparison:
         parts = zip(problem.blocks, *(_unwhitened(problem, each) for each in values), strict=True)
         rows = tuple(_Rows(block=b, predicted=f[:, 0], slopes=s, held=h) for b, f, s, h in parts)
         pulled = best.residuals.pulled
-        return cls(problem=problem, rows=rows, given=deviance_of(best), pulled=pulled, changed={}, refits={})
+        return cls(
+            problem=problem, rows=rows, deviance=deviance_of(best), pulled=pulled, changed={}, refits={}
+        )
 
     @cached_property
     def given_from_scene(self) -> float:
@@ -116,7 +118,7 @@ class Comparison:
             rows[i] = changed
         problem = replace(self.problem, blocks=tuple(r.block for r in rows))
         least = min(self._deviance(problem, rows, t) for t in self._starts(problem, rows))
-        gain = (self.given - least) / 2 + self.jacobian(joint, chosen)
+        gain = (self.deviance - least) / 2 + self.jacobian(joint, chosen)
         return gain if math.isfinite(gain) else None
 
     def jacobian(self, joint: Joint, chosen: Sequence[int]) -> float:
@@ -144,15 +146,15 @@ class Comparison:
             best, _ = optimum_as_stated(problem, loss="linear", starts=1)
         except (FitError, ValueError):
             return -math.inf
-        return (self.given - deviance_of(best)) / 2 + self.jacobian(joint, chosen)
+        return (self.deviance - deviance_of(best)) / 2 + self.jacobian(joint, chosen)
 
     @cached_property
     def _response(self) -> list[int]:
-        """Places of influence coefficient and lag; empty where predictions are not in proportion to them."""
-        places = [_place(self.problem, name) for name in ("influence_coefficient", "lag_angle")]
-        found = [place for place in places if place is not None]
-        others = (rows.slopes[:, found] for rows in self.rows if not rows.vibration)
-        return [] if len(found) < len(places) or any(map(np.any, others)) else found
+        """Columns of influence coefficient and lag; empty where predictions are not in proportion to them."""
+        wanted = [_column_of(self.problem, name) for name in ("influence_coefficient", "lag_angle")]
+        columns = [column for column in wanted if column is not None]
+        others = (rows.slopes[:, columns] for rows in self.rows if not rows.vibration)
+        return [] if len(columns) < len(wanted) or any(map(np.any, others)) else columns
 
     def _starts(self, problem: Problem, rows: Sequence[_Rows]) -> Iterator[FloatArray]:
         """t of the scene, and with the influence coefficient that explains the vibrations best."""
@@ -244,7 +246,7 @@ def _unwhitened(problem: Problem, values: FloatArray) -> list[FloatArray]:
     return [np.asarray(np.linalg.solve(b.whiten, p)) for b, p in zip(problem.blocks, parts, strict=True)]
 
 
-def _place(problem: Problem, name: str) -> int | None:
+def _column_of(problem: Problem, name: str) -> int | None:
     names = [each.name.rpartition(".")[2] for each in problem.parameters]
     return names.index(name) if name in names else None
 
@@ -269,11 +271,11 @@ def _settled(
     group, groups = problem.group, range(len(problem.estimated_groups))
     design, count = np.hstack([slopes, problem.free, held]), problem.measured.size
     # What is known beforehand of each unknown, one standard deviation a row, and how far t is off it.
-    known = np.zeros((t.size + held.shape[1], design.shape[1]))
-    known[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
+    priors = np.zeros((t.size + held.shape[1], design.shape[1]))
+    priors[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
     off = np.concatenate([(problem.start - t) / _WIDE, -pulled])
     for i, (parameter, inner) in enumerate(zip(problem.parameters, t.tolist(), strict=True)):
-        known[i, i] = parameter.slope(inner) / parameter.prior if parameter.prior else 1 / _WIDE
+        priors[i, i] = parameter.slope(inner) / parameter.prior if parameter.prior else 1 / _WIDE
         if parameter.prior:
             off[i] = (parameter.start - parameter.value(inner)) / parameter.prior
     apart = problem.measured - predicted
@@ -283,29 +285,29 @@ def _settled(
         noise = settled
         s = np.where(group < 0, 1.0, noise[group]) if noise.size else np.ones(count)
         left = np.concatenate([apart / s, off])
-        base, triangle = np.linalg.qr(np.concatenate([design / s[:, None], known]))
-        along = base.T @ left
-        rest, taken = left - base @ along, np.sum(base[:count] ** 2, axis=1)
+        base, triangle = np.linalg.qr(np.concatenate([design / s[:, None], priors]))
+        components = base.T @ left
+        rest, taken = left - base @ components, np.sum(base[:count] ** 2, axis=1)
         freedom = np.array([np.sum(1 - taken[group == g]) for g in groups])
         if np.any(freedom < _FEWEST):
-            return math.inf, np.zeros_like(along)
+            return math.inf, np.zeros_like(components)
         squares = np.array([np.sum(rest[:count][group == g] ** 2) for g in groups])
         settled = np.maximum(noise * np.sqrt(squares / freedom), least)
         if np.max(np.abs(settled / noise - 1), initial=0.0) < _AGREES:
             break
     inverse = np.linalg.pinv(triangle)
-    step, widths = inverse @ along, np.linalg.norm(inverse, axis=1)
+    step, widths = inverse @ components, np.linalg.norm(inverse, axis=1)
     sizes = np.maximum(np.abs(np.diag(triangle)), 1e-12)
     whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in problem.blocks)
-    chance, place = 1.0, _place(problem, "lag_angle")
+    chance, lag_column = 1.0, _column_of(problem, "lag_angle")
     # Probability that the lag lies between 0 and 180 degrees, unless the scene has it outside.
-    if place is not None and passive(problem.parameters[place].start):
-        lag = (float(t[place] + step[place]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
+    if lag_column is not None and passive(problem.parameters[lag_column].start):
+        lag = (float(t[lag_column] + step[lag_column]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
         vibrations = {b.group for b in problem.blocks if b.measured.size == 2 * len(b.observations)}
         named = zip(problem.estimated_groups, freedom.tolist(), strict=True)
         nu = min((each for name, each in named if name in vibrations), default=math.inf)
         nearer = min(lag, math.pi - lag)
-        inside, beyond = stdtr(min(nu, 1e9), np.array([nearer, nearer - math.pi]) / widths[place])
+        inside, beyond = stdtr(min(nu, 1e9), np.array([nearer, nearer - math.pi]) / widths[lag_column])
         chance = max(float(inside - beyond), _LEAST_CHANCE)
     logs = 2 * float(np.sum(np.log(s))) + 2 * float(np.sum(np.log(sizes)))
     return float(rest @ rest) + logs - 2 * whitening - 2 * math.log(chance), step

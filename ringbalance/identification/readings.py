@@ -39,7 +39,7 @@ _FAR: Final = 5.0
 """Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
 a unit, and beyond what a test rig changes."""
 _FAR_VIBRATION: Final = 100.0
-"""The same of vibrations, which the scene seldom knows better."""
+"""Ratio for vibrations, which the scene seldom knows better."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +49,11 @@ class ComparedColumn:
     file: str
     column: str
     unit: str
-    """Of the template; empty for a number without one."""
+    """Unit in the template; empty for a number without one."""
     ratio: float
     """Median of the column over the nearer end of the scene's range; one within it."""
     fails: bool
-    """Whether it lies so far off that a unit is wrong, or the machine another one."""
+    """True where it lies so far off that a unit is wrong, or the machine another one."""
     text: str
 
 
@@ -63,10 +63,10 @@ def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
         observations = block.observations
         ranges = block.kind.ranges(problem.scene)
         for column in block.kind.columns:
-            values, known = observations.columns.get(column.name), ranges.get(column.name)
-            if values is None or known is None or not np.any(values):
+            values, limits = observations.columns.get(column.name), ranges.get(column.name)
+            if values is None or limits is None or not np.any(values):
                 continue
-            low, high = known
+            low, high = limits
             middle = float(np.median(np.abs(values[values != 0])))
             ratio = middle / high if middle > high else middle / low if middle < low else 1.0
             limit = _FAR_VIBRATION if column.amplitude else _FAR
@@ -97,7 +97,7 @@ _CODES: Final = {
     (False, True): "read_undecided",
     (False, False): "read_otherwise",
 }
-"""Of the sentence, by whether a reading is named, and undecided."""
+"""Code of the sentence, by two flags of a reading: named, undecided."""
 _Choice = tuple[Joint, tuple[int, ...]]
 """A reading, and places of the files that are read so."""
 
@@ -107,14 +107,14 @@ class Reading:
     """Files read in another way."""
 
     code: str
-    """Of what was misread, joined by "+"."""
+    """Codes of the misreadings, joined by "+"."""
     files: tuple[str, ...]
     gain: float
-    """Of the log likelihood, over that of the files as they stand."""
+    """Gain of the log likelihood over that of the files as they stand."""
     named: bool
-    """Whether it fits decisively better, and no other reading better than it does."""
+    """True where it fits decisively better, and no other reading better than it does."""
     undecided: bool
-    """Whether the data cannot tell its sense of the angles from the likeliest one."""
+    """True where the data cannot tell its sense of the angles from the likeliest one."""
     text: str
 
 
@@ -182,7 +182,7 @@ def _without_idle_factors(
     It has to pay beside the sense of the angles alone, and the likeliest after a fit of both, too: where the
     scene of the fit is pulled far off, what is linear there is wrong by more than a factor gains.
     """
-    kept = dict(gains)
+    remaining = dict(gains)
 
     def idle(choice: _Choice, *, refitted: bool) -> bool:
         joint, chosen = choice
@@ -194,13 +194,13 @@ def _without_idle_factors(
 
     for choice in gains:
         if choice[0][-1] in AMPLITUDES and idle(choice, refitted=False):
-            del kept[choice]
-    for choice in sorted(kept, key=lambda each: -kept[each]):
-        if choice[0][-1] not in AMPLITUDES or kept[choice] < max(kept.values()) - _TELLS:
+            del remaining[choice]
+    for choice in sorted(remaining, key=lambda each: -remaining[each]):
+        if choice[0][-1] not in AMPLITUDES or remaining[choice] < max(remaining.values()) - _TELLS:
             break
         if len(choice[0]) > 1 and idle(choice, refitted=True):
-            del kept[choice]
-    return kept
+            del remaining[choice]
+    return remaining
 
 
 def _choices(problem: Problem, joint: Joint) -> Iterator[tuple[int, ...]]:

@@ -107,12 +107,12 @@ def _fitted_scene(
         changes = _Changes(scene)
         if result is not None and result.joint.names:
             _put_joint(changes, result, pulled)
-        placed = [(changes.place(each.path), each) for each in fitted]
-        for place, each in placed:
-            changes.put(place, each.value, origin=each.origin)
-        cut = tuple(_put_widths(changes, placed))
+        keyed = [(changes.scene_key(each.path), each) for each in fitted]
+        for scene_key, each in keyed:
+            changes.put(scene_key, each.value, origin=each.origin)
+        cut = tuple(_put_widths(changes, keyed))
         changes.values["measured.files"] = [asdict(each) for each in files]
-        changes.values["measured.quantities"] = [place.record(each) for place, each in placed]
+        changes.values["measured.quantities"] = [scene_key.record(each) for scene_key, each in keyed]
         changes.values["measured.findings"] = [asdict(each) for each in (*findings, *cut)]
         try:
             return scene.with_values(changes.whole())
@@ -126,8 +126,8 @@ def _fitted_scene(
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Place:
-    """Where a value stands in a scene file, and how it is written there."""
+class _SceneKey:
+    """Key of a value in a scene file, and the unit that it is written in."""
 
     table: str
     key: str
@@ -141,7 +141,7 @@ class _Place:
 
     @property
     def path(self) -> str:
-        """Of the value, or of the list."""
+        """Path of the value, or of the list."""
         return f"{self.table}.{self.key}"
 
     def written(self, value: float) -> str | float:
@@ -188,13 +188,13 @@ class _Changes:
     origins: dict[str, dict[str, Origin]] = field(default_factory=dict)
 
     def before(self, path: str) -> Any:
-        """What the file has at a path; None for nothing."""
+        """Value of the file at a path; None for nothing."""
         value: Any = document_of(self.scene)
         for step in path.split("."):
             value = value.get(step) if isinstance(value, Mapping) else None
         return value
 
-    def place(self, path: str) -> _Place:
+    def scene_key(self, path: str) -> _SceneKey:
         """Place of a path such as "tube.bore" or "masses.friction_arm[0]".
 
         Raises: ValueError: a scene file has no such value.
@@ -206,13 +206,13 @@ class _Changes:
         table, key, entry = match.groups()
         dimension = schema.key_at((table, key)).takes.dimension
         by_table = table in schema.tables["uncertainty"].keys
-        here, unit = self.before(f"{table}.{key}"), ""
+        before, unit = self.before(f"{table}.{key}"), ""
         if dimension is not None:
             # The unit that the file has there, else the one in which such a value is described.
-            first = here[0] if isinstance(here, list) and here else here
+            first = before[0] if isinstance(before, list) and before else before
             stated = unit_of(first) if isinstance(first, str) else ""
             unit = stated or usual_unit(path) or DIMENSIONS[dimension].si_unit
-        return _Place(
+        return _SceneKey(
             table=table,
             key=key,
             entry=None if entry is None else int(entry),
@@ -221,16 +221,16 @@ class _Changes:
             unit=unit,
         )
 
-    def put(self, place: _Place, value: float, *, origin: Origin) -> None:
+    def put(self, scene_key: _SceneKey, value: float, *, origin: Origin) -> None:
         """Write a value, SI."""
-        written: Any = place.written(value)
-        if place.entry is not None:
-            zeros = [place.written(0.0)] * _ENTRIES
-            both = list(self.values.get(place.path) or self.before(place.path) or zeros)
-            both[place.entry] = written
+        written: Any = scene_key.written(value)
+        if scene_key.entry is not None:
+            zeros = [scene_key.written(0.0)] * _ENTRIES
+            both = list(self.values.get(scene_key.path) or self.before(scene_key.path) or zeros)
+            both[scene_key.entry] = written
             written = both
-        self.values[place.path] = written
-        self.origins.setdefault(place.table, {})[place.key] = origin
+        self.values[scene_key.path] = written
+        self.origins.setdefault(scene_key.table, {})[scene_key.key] = origin
 
     def whole(self) -> dict[str, Any]:
         """Values and, after them, origins, by path."""
@@ -248,30 +248,30 @@ def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) ->
     independent.
     Args: `pulled`: held inputs whose values are written.
     """
-    names, size, found, values = result.joint.names, result.joint.deviations, result.scene, changes.values
-    kept = [i for i, name in enumerate(names) if name not in START]
+    names, size, scene, values = result.joint.names, result.joint.deviations, result.scene, changes.values
+    indices = [i for i, name in enumerate(names) if name not in START]
     causes = {match[1] for name in names if (match := ERROR_NAME.fullmatch(name)) and match[2]}
     pairs = [f"{MODEL}{cause}, {part}" for cause in MODEL_KINDS if cause in causes for part in _PARTS]
     lacking = [name for name in pairs if name not in names]
-    deviations = {names[i]: float(size[i]) for i in kept} | dict.fromkeys(lacking, 1.0)
+    deviations = {names[i]: float(size[i]) for i in indices} | dict.fromkeys(lacking, 1.0)
     correlations = np.eye(len(deviations))
-    known = result.joint.covariance[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
-    correlations[: len(kept), : len(kept)] = np.clip((known + known.T) / 2, -1.0, 1.0)
+    correlation = result.joint.covariance[np.ix_(indices, indices)] / np.outer(size[indices], size[indices])
+    correlations[: len(indices), : len(indices)] = np.clip((correlation + correlation.T) / 2, -1.0, 1.0)
     np.fill_diagonal(correlations, 1.0)
-    quantities, inputs = [], inputs_of(found).inputs
+    quantities, inputs = [], inputs_of(scene).inputs
     for (name, sd), row in zip(deviations.items(), correlations.tolist(), strict=True):
         path, unit, deviation = name, "", _rounded(sd)
         if name not in MODEL_ERRORS:
-            path, place = path_of(name), changes.place(path_of(name))
-            unit, deviation = place.unit, place.difference(sd)
+            path, scene_key = path_of(name), changes.scene_key(path_of(name))
+            unit, deviation = scene_key.unit, scene_key.difference(sd)
             if name in pulled:
                 # The width that is left of the value is for whoever looks at it alone.
-                value, width, before = inputs[name].value, NORMAL_95 * sd, changes.before(place.path)
-                single = place.entry is None or not isinstance(before, list)
-                if (before if single else before[place.entry]) != place.written(value):
-                    changes.put(place, value, origin="inferred")
-                if place.entry is None:
-                    values[place.width] = place.written(min(width, abs(value)) if value else width)
+                value, width, before = inputs[name].value, NORMAL_95 * sd, changes.before(scene_key.path)
+                single = scene_key.entry is None or not isinstance(before, list)
+                if (before if single else before[scene_key.entry]) != scene_key.written(value):
+                    changes.put(scene_key, value, origin="inferred")
+                if scene_key.entry is None:
+                    values[scene_key.width] = scene_key.written(min(width, abs(value)) if value else width)
         quantities.append(
             {
                 "quantity": path,
@@ -282,7 +282,7 @@ def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) ->
         )
     if any(name in MODEL_ERRORS for name in deviations):
         sums: dict[str, dict[str, Any]] = {}
-        for error in liquid_ring_scene(found).tube.model_errors:
+        for error in liquid_ring_scene(scene).tube.model_errors:
             parts = sums.setdefault(error.cause, {"cause": error.cause, "even": 0.0, "odd": 0.0})
             parts |= {"even": parts["even"] + error.even, "odd": parts["odd"] + error.odd}
         if sums:
@@ -290,30 +290,34 @@ def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) ->
             values["tube.model_errors"] = rounded
             changes.origins.setdefault("tube", {})["model_errors"] = "inferred"
     if "pressure" in deviations and ("pressure" in pulled or "pressure" not in result.held):
-        place = changes.place("gas.gauge_correction")
-        values[place.path] = place.written(liquid_ring_scene(found).gas.gauge_correction)
+        scene_key = changes.scene_key("gas.gauge_correction")
+        values[scene_key.path] = scene_key.written(liquid_ring_scene(scene).gas.gauge_correction)
     values["fitted.quantities"] = quantities
 
 
 def _put_widths(
-    changes: _Changes, placed: Iterable[tuple[_Place, FittedParameter]]
+    changes: _Changes, keyed: Iterable[tuple[_SceneKey, FittedParameter]]
 ) -> Iterator[MeasuredFinding]:
     """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
-    by_path: dict[str, list[tuple[_Place, FittedParameter]]] = {}
-    for place, one in placed:
-        by_path.setdefault(place.path, []).append((place, one))
+    by_path: dict[str, list[tuple[_SceneKey, FittedParameter]]] = {}
+    for scene_key, parameter in keyed:
+        by_path.setdefault(scene_key.path, []).append((scene_key, parameter))
     for group in by_path.values():
-        place, each = group[0][0], [one for _, one in group]
-        width = max((w for one in each if (w := one.half_width) is not None), default=None)
+        scene_key, each = group[0][0], [parameter for _, parameter in group]
+        width = max((w for parameter in each if (w := parameter.half_width) is not None), default=None)
         if width is None:
             continue
-        if place.entry is not None and len(each) < _ENTRIES and changes.before(place.width) is not None:
+        if (
+            scene_key.entry is not None
+            and len(each) < _ENTRIES
+            and changes.before(scene_key.width) is not None
+        ):
             # The uncertainty stands for both entries, and nothing was learnt of the other one.
             yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].path))
             continue
-        largest = min(abs(one.value) for one in each)
-        cut = width > largest and place.key not in _ANY_SIGN
-        changes.values[place.width] = place.written(largest if cut else width)
+        largest = min(abs(parameter.value) for parameter in each)
+        cut = width > largest and scene_key.key not in _ANY_SIGN
+        changes.values[scene_key.width] = scene_key.written(largest if cut else width)
         if cut:
             yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].path))
 

@@ -60,21 +60,21 @@ class Table:
             self.file, f'line {line}, column "{head}"', problem, value=toml_text(cell), allowed=allowed
         )
 
-    def name_faults(self, known: Collection[str] = ()) -> Iterator[Fault]:
+    def name_faults(self, suggestions: Collection[str] = ()) -> Iterator[Fault]:
         """Heads that are no name with a unit, and names that stand twice. Args: `known`: names to suggest."""
         names = [split_head(head) for head in self.heads]
         for head, name in zip(self.heads, names, strict=True):
             if name is None or not _NAME.fullmatch(name[0]):
                 problem = 'it is not a name with its unit in brackets, such as "pressure [kPa]"'
-                yield self.head_fault(head, problem + did_you_mean(name[0] if name else head, known))
+                yield self.head_fault(head, problem + did_you_mean(name[0] if name else head, suggestions))
         once = [name[0] for name in names if name is not None]
         for twice in sorted({each for each in once if once.count(each) > 1}):
             yield data_fault(self.file, f"line {self.head_line}", f'the column "{twice}" stands twice')
 
     def head_fault(self, head: str, problem: str, allowed: str = "") -> Fault:
         """One error of the name or the unit of a column."""
-        place = f"line {self.head_line}, column {toml_text(head)}"
-        return data_fault(self.file, place, problem, allowed=allowed)
+        position = f"line {self.head_line}, column {toml_text(head)}"
+        return data_fault(self.file, position, problem, allowed=allowed)
 
     def values(self, head: str, unit: str, dimension: str | None) -> tuple[FloatArray, list[Fault]]:
         """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
@@ -102,9 +102,9 @@ class Table:
         return tuple(cells[at] for cells in self.rows)
 
 
-def data_fault(file: str, place: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
+def data_fault(file: str, position: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
     """One error of a file of measurements. Args: `place`: such as 'line 3' or 'kind'; may be empty."""
-    return Fault(file=file, key=place, value=value, problem=problem, allowed=allowed)
+    return Fault(file=file, key=position, value=value, problem=problem, allowed=allowed)
 
 
 def file_name(path: Path) -> str:
@@ -139,8 +139,8 @@ def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
         return text, ()
     before = content[:at]
     line, start = before.count(b"\n") + 1, before.rfind(b"\n") + 1
-    place = f"line {line}, character {len(before[start:].decode('utf-8-sig', 'replace')) + 1}"
-    return "", (data_fault(file, place, f'{problem}; save the file as "CSV UTF-8"'),)
+    position = f"line {line}, character {len(before[start:].decode('utf-8-sig', 'replace')) + 1}"
+    return "", (data_fault(file, position, f'{problem}; save the file as "CSV UTF-8"'),)
 
 
 def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table | None, tuple[Fault, ...]]:
@@ -245,7 +245,7 @@ def _cell_fault(line: int, error: csv.Error, file: str) -> Fault:
 
 def in_order(faults: Iterable[Fault]) -> list[Fault]:
     """Errors of one file in the order of its lines, those of the whole file first."""
-    return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
+    return sorted(faults, key=lambda fault: int(match[1]) if (match := _LINE.match(fault.key)) else 0)
 
 
 def split_head(head: str) -> tuple[str, str] | None:

@@ -1,4 +1,4 @@
-"""What is measured on test benches without a balancer, and how the program predicts it with no scene."""
+"""Kinds of measurement on test benches without a balancer, and their predictions, which take no scene."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _CRITICAL_RATIO: Final = 0.5
 """b of a sharp opening, where the data do not give one."""
 _STEPS: Final = 2000
 _RADIUS: Final = 1e4
-"""Of the chamber, in widths of the tank."""
+"""Radius of the chamber, in widths of the tank."""
 _CELLS: Final = (8, 16)
 
 
@@ -169,9 +169,9 @@ def _not_between(_: object, data: Observations) -> str:
 
 
 def _frequency(data: Observations) -> Stated:
-    depths, place = np.unique(data.columns["depth_over_width"], return_inverse=True)
-    found = np.array([_tank_frequency(float(depth)) for depth in depths])[place]
-    return found, FREQUENCY_UNCERTAINTY * found
+    depths, rows = np.unique(data.columns["depth_over_width"], return_inverse=True)
+    frequencies = np.array([_tank_frequency(float(depth)) for depth in depths])[rows]
+    return frequencies, FREQUENCY_UNCERTAINTY * frequencies
 
 
 def _tank_frequency(depth: float) -> float:
@@ -229,7 +229,7 @@ BENCH: Final[Mapping[str, Kind]] = {
                 "laminar",
                 "1 where flow is known to be laminar, whatever Re; 0 without this column",
                 highest=1.0,
-                whole=True,
+                integer=True,
             ),
         ),
         stated=_pressure,

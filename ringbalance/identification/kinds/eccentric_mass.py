@@ -1,4 +1,4 @@
-"""What is measured on a rotor with eccentric masses, and how its scene predicts it."""
+"""Kinds of measurement on a rotor with eccentric masses, and their predictions by its scene."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from ringbalance.identification.kinds.kind import (
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 MOST_STEPS: Final = 300_000
-"""Of all motions of a file, some 0.2 s a prediction: a fit takes a minute or two."""
+"""Steps of all motions of a file, some 0.2 s a prediction: a fit takes a minute or two."""
 _MOST_SUBSTEPS: Final = 20_000
-"""Of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
+"""Steps of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
 _VOLTAGES: Final = (0.25, 0.5, 1.0)
-"""Of the largest; where the scene gives none, those of the data alone."""
+"""Fractions of the largest voltage; where the scene gives none, those of the data alone."""
 _TIMES: Final = (0.1, 0.4, 1.0)
 """s, of positioning."""
 _SPEEDS: Final = 9
@@ -155,7 +155,7 @@ ECCENTRIC_MASS: Final[Mapping[str, Kind]] = {
                 optional=True,
                 lowest=1.0,
                 highest=2.0,
-                whole=True,
+                integer=True,
             ),
         ),
         predict=_positions,

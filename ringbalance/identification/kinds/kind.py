@@ -39,7 +39,7 @@ class Column:
     dimension: str | None
     """Key of `DIMENSIONS`; None for a number without unit."""
     unit: str
-    """That the template uses; empty for a number without unit."""
+    """Unit in the template; empty for a number without unit."""
     meaning: str
     measured: bool = False
     amplitude: bool = False
@@ -49,7 +49,7 @@ class Column:
     """SI."""
     highest: float = math.inf
     above_zero: bool = False
-    whole: bool = False
+    integer: bool = False
 
     @property
     def head(self) -> str:
@@ -69,7 +69,7 @@ class Column:
             problem = "it is not above zero"
         elif value < self.lowest:
             problem = "it is negative" if self.lowest == 0 else "it is too small"
-        elif self.whole and value != round(value):
+        elif self.integer and value != round(value):
             problem = "it is not a whole number"
         elif abs(value) > largest:
             problem = "it is too large" + (f"; is [{self.unit}] meant?" if self.unit else "")
@@ -135,10 +135,10 @@ class Observations:
         Along the vector sigma_a, across it sigma_a or, where given, a sigma_phase.
         """
         size, angle = self.columns[f"amplitude{when}"], self.columns[f"phase{when}"]
-        along = across = self.uncertainty[f"amplitude{when}"] / NORMAL_95
+        radial = tangential = self.uncertainty[f"amplitude{when}"] / NORMAL_95
         if f"phase{when}" in self.uncertainty:
-            across = np.where(size > 0, size * self.uncertainty[f"phase{when}"] / NORMAL_95, along)
-        c, s, a, b = np.cos(angle), np.sin(angle), along**2, across**2
+            tangential = np.where(size > 0, size * self.uncertainty[f"phase{when}"] / NORMAL_95, radial)
+        c, s, a, b = np.cos(angle), np.sin(angle), radial**2, tangential**2
         mixed = (a - b) * c * s
         return np.moveaxis(np.array([[a * c**2 + b * s**2, mixed], [mixed, a * s**2 + b * c**2]]), -1, 0)
 
@@ -248,12 +248,12 @@ class Kind:
         A vibration that stands as that after one injection and, digit for digit, as that before the next one
         of its series was measured once: its error enters both changes, with opposite signs.
         """
-        count, given = len(observations), self.noise_given(observations)
+        count, stated = len(observations), self.noise_given(observations)
         if not self._vibrations:
-            width = observations.uncertainty[self.noisy_column(observations)] if given else NORMAL_95
+            width = observations.uncertainty[self.noisy_column(observations)] if stated else NORMAL_95
             return np.diag((width / NORMAL_95 * np.ones(count)) ** 2)
         each = [
-            observations.vector_covariance(when) if given else np.broadcast_to(np.eye(2), (count, 2, 2))
+            observations.vector_covariance(when) if stated else np.broadcast_to(np.eye(2), (count, 2, 2))
             for when in self._vibrations
         ]
         full, rows = np.zeros((2, count, 2, count)), np.arange(count)

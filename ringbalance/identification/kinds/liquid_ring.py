@@ -1,4 +1,4 @@
-"""What is measured on a rotor with a liquid ring, and how its scene predicts it.
+"""Kinds of measurement on a rotor with a liquid ring, and their predictions by its scene.
 
 Of injections the fills of a series follow from one to the next, from the scene's initial fill, unless a row
 states that of its chamber.
@@ -43,13 +43,13 @@ from ringbalance.scene.origins import SceneFile
 _DONE: Final = 1e-10
 """In ln u."""
 _FRACTIONS: Final = (0.3, 0.5, 0.7)
-"""Of the largest fill."""
+"""Fractions of the largest fill."""
 _PRESSURES: Final = (0.8, 1.0, 1.25)
-"""Of the scene's gas pressure."""
+"""Ratios to the scene's gas pressure."""
 _TIMES: Final = (0.05, 0.2, 0.8)
 """s, of valve-open."""
 _WEIGHTS: Final = (0.5, 1.0, 2.0)
-"""Of what makes the vibration at the start."""
+"""Ratios to the unbalance that makes the vibration at the start."""
 
 
 def _trial_changes(scene: SceneFile, observations: Observations, _: object) -> FloatArray:

@@ -234,6 +234,7 @@ def test_to_dict_is_what_the_command_prints(name: str, folder: Path, printed: An
     assert run["scene"] == {"name": scene.name, "source": path.name, "sha256": scene.sha256}
 
 
+@pytest.mark.heavy
 def test_to_dict_of_a_tuning_is_what_the_command_prints(folder: Path, printed: Any) -> None:
     path = folder / "line.toml"
     assert as_json(rb.tune(rb.load_scene(path), remedies=None)) == printed("tune", path)

@@ -15,8 +15,8 @@ import pytest
 
 import ringbalance as rb
 
-LONG: Final = {"Design", "Extremes", "extremes", "find_design", "write_report"}
-"""Whose examples take tens of seconds."""
+LONG: Final = {"Comparison", "Design", "Extremes", "Tuning", "extremes", "find_design", "write_report"}
+"""Whose examples take long, or run what the example of the function that makes them runs."""
 NAMES: Final = [
     pytest.param(name, marks=pytest.mark.heavy if name in LONG else ())
     for name in rb.__all__

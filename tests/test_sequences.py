@@ -70,7 +70,8 @@ SEQUENCES: Final = MappingProxyType(
             report tuned.toml --out tuned""",
     }
 )
-OFTEN: Final = {("fitted", each) for each in ("liquid_ring_paper", "grinding_spindle", "six_chamber")} | {
+OFTEN: Final = {
+    ("fitted", "liquid_ring_paper"),
     ("injected", "liquid_ring_paper"),
     ("prescribed", "README"),
 }

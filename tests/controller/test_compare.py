@@ -275,6 +275,7 @@ def test_the_masses_do_as_well_on_their_own_rotor_as_on_the_same_one_of_a_ring(
         assert times[0] == pytest.approx(times[1], rel=0.03)
 
 
+@pytest.mark.heavy
 def test_the_order_of_ring_and_masses_makes_no_difference(paper_scene: Scene, small: EccentricScene) -> None:
     ring, masses = under_paper_law(paper_scene), balancer_of(small)
     one, other = (compare(*both, most=8) for both in ((ring, masses), (masses, ring)))

@@ -79,10 +79,14 @@ def test_what_lost_workers_had_to_do_is_done_again() -> None:
     assert deal(executor, [partial(int, text) for text in ("7", "8", "9")]) == [7, 8, 9]
 
 
-def test_executors_make_no_difference(found: rb.Design) -> None:
+def test_threads_make_no_difference(found: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
         other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
     assert other.to_dict() == found.to_dict()
+
+
+@pytest.mark.heavy
+def test_workers_make_no_difference(found: rb.Design) -> None:
     of_its_own = rb.find_design(open_scene(requirement__fraction=0.7), workers=2)
     assert of_its_own.to_dict() == found.to_dict()
 
@@ -143,16 +147,20 @@ def test_all_listed_designs_that_can_work_count_as_raced(found: rb.Design) -> No
     assert found.raced == found.static.able > 1
 
 
-def test_the_demand_that_stands_against_every_design_is_named() -> None:
-    late = rb.find_design(open_scene(requirement__settling_time="0.2 s"))
+@pytest.fixture(scope="module")
+def late() -> rb.Design:
+    """No device settles that early."""
+    return rb.find_design(open_scene(requirement__settling_time="0.2 s"))
+
+
+def test_the_demand_that_stands_against_every_design_is_named(late: rb.Design) -> None:
     (demand,) = (each for each in late.rows().findings if each.code.startswith("design_demand"))
     assert not late.succeeded
     assert demand.values["what"] == "settling time"
     assert demand.values["share"] == pytest.approx(0.0)
 
 
-def test_what_the_devices_come_to_is_said_where_none_is_in_time() -> None:
-    late = rb.find_design(open_scene(requirement__settling_time="0.2 s"))
+def test_what_the_devices_come_to_is_said_where_none_is_in_time(late: rb.Design) -> None:
     (demand,) = (each for each in late.rows().findings if each.code.startswith("design_demand"))
     assert late.judgement is not None
     times = late.judgement.outcomes.settling_time

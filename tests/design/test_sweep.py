@@ -41,7 +41,14 @@ def table(sweep: rb.Sweep) -> list[dict[str, str]]:
 
 @pytest.mark.parametrize(
     "name",
-    ["liquid_ring_paper", "six_chamber", "perfluorinated_oil", "silicone_oil_100cst", "spindle_design"],
+    [
+        "liquid_ring_paper",
+        "spindle_design",
+        *(
+            pytest.param(each, marks=pytest.mark.heavy)
+            for each in ("six_chamber", "perfluorinated_oil", "silicone_oil_100cst")
+        ),
+    ],
 )
 def test_static_rows_are_those_of_a_calibration(name: str) -> None:
     """On ten drawn designs of each scene, without gravity; intervals by the inputs too."""

@@ -200,21 +200,26 @@ def test_the_function_block_is_one(six: Both) -> None:
     assert str(item.name) == "FB_disc"
 
 
-def test_disc_and_controller_have_the_bits_of_python(blocks: dict[str, Block]) -> None:
-    for kind, inputs in (
+@pytest.mark.parametrize(
+    ("kind", "inputs"),
+    [
         ("disc", {"open_time_a": 0.004, "open_time_e": 0.002}),
         ("controller", {"vibration_x": 3e-6, "vibration_y": -2e-6}),
-        ("law_based", {"vibration_x": 3e-6, "vibration_y": -2e-6}),
-    ):
-        block = blocks[kind]
-        machine = Machine(st_files(block, "disc")["disc.st"])
-        mine, row = list(block.start), list(block.start)
-        places = {each.name: each.place for each in block.variables}
-        for step in range(3):
-            given = {name: value * (step < 2) for name, value in inputs.items()}
-            for name, value in given.items():
-                mine[places[name]] = value
-            machine.call(f"disc_{block.steps}", [block.constants, *(block.tables or ()), mine, 0.003])
-            block.run(row, 0.003, given)
-            assert np.array(mine).tobytes() == np.array(row).tobytes()
-        assert mine != list(block.start)
+        pytest.param("law_based", {"vibration_x": 3e-6, "vibration_y": -2e-6}, marks=pytest.mark.heavy),
+    ],
+)
+def test_disc_and_controller_have_the_bits_of_python(
+    blocks: dict[str, Block], kind: str, inputs: dict[str, float]
+) -> None:
+    block = blocks[kind]
+    machine = Machine(st_files(block, "disc")["disc.st"])
+    mine, row = list(block.start), list(block.start)
+    places = {each.name: each.place for each in block.variables}
+    for step in range(3):
+        given = {name: value * (step < 2) for name, value in inputs.items()}
+        for name, value in given.items():
+            mine[places[name]] = value
+        machine.call(f"disc_{block.steps}", [block.constants, *(block.tables or ()), mine, 0.003])
+        block.run(row, 0.003, given)
+        assert np.array(mine).tobytes() == np.array(row).tobytes()
+    assert mine != list(block.start)

@@ -328,6 +328,7 @@ def test_the_work_of_a_fit_is_bounded(paper_scene: Scene) -> None:
     assert fit(scene, data=data, parameters=names).evaluations < 700
 
 
+@pytest.mark.heavy
 def test_few_rigs_are_covered() -> None:
     """Of 10 intervals of 95 % more than two miss once in ninety such tests: one rig of each set of data."""
     found = [holds for number in (1, 4, 7) for holds in covered(rig(number)).values()]

@@ -333,6 +333,7 @@ def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:
     assert document["criticism"]["text"].startswith("the fit does not describe the data")
 
 
+@pytest.mark.heavy
 def test_a_disc_with_imported_chambers(run: Run) -> None:
     """Injections of the paper's disc; a mesh has no plates that could be uncertain."""
     code, out, err = run(bundled_scene("imported_chamber"), EXAMPLES["transfer"], "--parameters", "bore")

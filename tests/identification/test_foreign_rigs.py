@@ -35,7 +35,9 @@ def held(number: int, result: FitResult) -> dict[str, bool]:
     return foreign_rigs.covered(number, {p.name: p.interval for p in result.parameters})
 
 
-@pytest.mark.parametrize("number", LIGHT)
+@pytest.mark.parametrize(
+    "number", [LIGHT[0], *(pytest.param(each, marks=pytest.mark.heavy) for each in LIGHT[1:])]
+)
 def test_intervals_of_a_foreign_rig_hold_what_was_built(number: int, tmp_path: Path) -> None:
     """All four but one at most, and none so wide that it says nothing."""
     result = fitted(foreign_rigs.rig(number), tmp_path / "rig")
@@ -77,7 +79,7 @@ def lambda_of(number: int, folder: Path) -> tuple[bool, float]:
     return low <= rig.device.lambda_factor <= high, (high - low) / 2
 
 
-@pytest.mark.parametrize("number", [1, 3])
+@pytest.mark.parametrize("number", [1, pytest.param(3, marks=pytest.mark.heavy)])
 def test_the_geometry_rules_out_what_a_viscous_oil_leaves_open(number: int, tmp_path: Path) -> None:
     """Trial weights and injections leave lambda^2 bore^3/(k + 1) alone: lambda was 1.15 (0.98 to 1.43) of a
     rig, and called identified."""

@@ -57,6 +57,7 @@ MISREAD: Mapping[str, tuple[Edit, tuple[str, ...]]] = {
     "times_in_seconds": (times(1e-3, "gas_time"), ("transfer.csv", "injection.csv")),
 }
 """By the code of the reading that the fit is to find: what was done, to which files."""
+OFTEN = ("before_and_after_exchanged", "pressures_tenth")
 
 
 @pytest.fixture
@@ -75,7 +76,9 @@ def fitted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., 
     return run
 
 
-@pytest.mark.parametrize("code", MISREAD)
+@pytest.mark.parametrize(
+    "code", [pytest.param(each, marks=() if each in OFTEN else pytest.mark.heavy) for each in MISREAD]
+)
 def test_a_file_that_is_read_wrongly_fails_and_is_named(
     code: str, fitted: Callable[..., tuple[int, dict[str, Any]]]
 ) -> None:

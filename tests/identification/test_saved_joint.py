@@ -113,6 +113,7 @@ def test_draws_have_the_stated_covariance(scene: Scene) -> None:
     assert stated[i, j] < -0.5
 
 
+@pytest.mark.heavy
 def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) -> None:
     """Standard deviation of ln(kappa lambda S u/V): of the fit's inputs drawn here from C, and of devices.
 

@@ -95,7 +95,9 @@ def test_resonant_fills_have_a_mode_at_the_speed(disc: Disc) -> None:
         assert ratios[mode - 1] == pytest.approx(1.0, abs=1e-4)
 
 
-@pytest.mark.parametrize("fill", [0.25, 0.4, 0.5])
+@pytest.mark.parametrize(
+    "fill", [0.25, *(pytest.param(each, marks=pytest.mark.heavy) for each in (0.4, 0.5))]
+)
 def test_the_interval_is_what_exact_waves_do_within_six_per_cent(disc: Disc, fill: float) -> None:
     """Without viscosity and plates; natural frequencies q times as high answer at s/q."""
     found = forced(bare(disc, np.pi / 2), fill)

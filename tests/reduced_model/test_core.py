@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -66,6 +66,7 @@ def _drawn(scene: Scene, *, seed: int, count: int, gas: Gas = "vented", saturate
     gas=st.sampled_from(("vented", "trapped")),
     saturated=st.booleans(),
 )
+@settings(max_examples=10)
 def test_rows_are_answered_each_by_itself_and_in_any_order(
     table_1_scene: Scene, seed: int, gas: Gas, saturated: bool
 ) -> None:

@@ -125,7 +125,9 @@ def assert_exact(document: dict[str, Any], scene: Scene) -> None:
     assert 0 <= known["lambda_variation"]["value"] <= span + 1e-6
 
 
-@pytest.mark.parametrize("angle", [0.05, 0.14, 0.2, 0.25, 0.3, 1.0])
+@pytest.mark.parametrize(
+    "angle", [0.05, 0.25, 1.0, *(pytest.param(each, marks=pytest.mark.heavy) for each in (0.14, 0.2, 0.3))]
+)
 def test_narrow_chambers_are_solved(angle: float, calibrated: Calibrate) -> None:
     text = text_of(angle=angle, fill=1.0)
     code, document, _ = calibrated(text)
@@ -133,7 +135,9 @@ def test_narrow_chambers_are_solved(angle: float, calibrated: Calibrate) -> None
     assert_exact(document, loaded(text))
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(each, marks=pytest.mark.heavy) for each in range(6, 12))]
+)
 def test_random_chambers_agree_with_closed_forms(
     seed: int,
     calibrated: Calibrate,

@@ -140,6 +140,8 @@ SHAPES: Final = {
     "neck": Shape(inner=neck, panels=(_MANY, _FEW), cells=(6, 20, 2)),
 }
 
+OFTEN: Final = ("cone", "pillars")
+
 
 def mesh(shape: Shape, kind: CellKind = "hexahedron27") -> ChamberGeometry:
     """A chamber's mesh in mm, its outer wall and the rest named."""
@@ -188,7 +190,9 @@ def mesh_findings(document: dict[str, Any]) -> list[dict[str, Any]]:
     return [each for each in document["findings"] if each["code"] in MESH_FINDINGS]
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=() if each in OFTEN else pytest.mark.heavy) for each in SHAPES]
+)
 def test_a_foreign_chamber_meets_its_own_quadrature(name: str, tmp_path: Path) -> None:
     """Volume, moment, lambda, head and stall, within what is printed with each and within 1e-4."""
     shape = SHAPES[name]
@@ -220,7 +224,7 @@ def test_a_foreign_chamber_meets_its_own_quadrature(name: str, tmp_path: Path) -
     assert mesh_findings(found) == []
 
 
-@pytest.mark.parametrize("name", ["cone", "neck"])
+@pytest.mark.parametrize("name", ["cone", pytest.param("neck", marks=pytest.mark.heavy)])
 def test_the_law_holds_the_head_between_its_nodes(name: str, tmp_path: Path) -> None:
     """In the edge of a cone the head goes with the root of the fill."""
     shape = SHAPES[name]
@@ -236,7 +240,12 @@ def test_the_law_holds_the_head_between_its_nodes(name: str, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("shift", "codes"), [((6.0, 0.0), ["off_axis"]), ((0.3, 0.2), ["off_axis"]), ((0.0, 0.0), [])]
+    ("shift", "codes"),
+    [
+        ((0.3, 0.2), ["off_axis"]),
+        pytest.param((6.0, 0.0), ["off_axis"], marks=pytest.mark.heavy),
+        pytest.param((0.0, 0.0), [], marks=pytest.mark.heavy),
+    ],
 )
 def test_a_chamber_beside_the_shaft_is_named(
     shift: tuple[float, float], codes: list[str], tmp_path: Path
@@ -272,7 +281,7 @@ def test_a_wall_that_holds_no_liquid_outward_is_refused(wall: str, tmp_path: Pat
         scene_of(tmp_path, replace(chamber, boundaries={"outer_wall": chamber.boundaries[wall]}))
 
 
-@pytest.mark.parametrize("edges", [8, 24])
+@pytest.mark.parametrize("edges", [8, pytest.param(24, marks=pytest.mark.heavy)])
 def test_cells_coarser_than_a_pillar_are_named_and_counted(edges: int, tmp_path: Path) -> None:
     """Straight cells that draw a pillar as a polygon: what that leaves is in every interval."""
     shape = replace(SHAPES["pillars"], cells=(4, edges, 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
-from ringbalance.reports.page import render
+from ringbalance.reports.page import page_content, render_pages
 from ringbalance.reports.pages import first_page, loop
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.report import Report, write_report
@@ -101,9 +101,24 @@ def test_the_report_gives_the_estimates_of_every_command(first: Report) -> None:
     assert shown["tube inertia"]["model"] != "left out"
 
 
-def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
-    evidence = json.loads((first.page.parent / "evidence.json").read_text())
-    pages = render(evidence)
+@pytest.fixture(scope="module")
+def evidence_file(first: Report) -> Record:
+    """Content of the evidence file."""
+    content: Record = json.loads((first.page.parent / "evidence.json").read_text())
+    return content
+
+
+@pytest.fixture(scope="module")
+def views(evidence_file: Record) -> Mapping[str, Record | None]:
+    """Views of the sections, made by this process."""
+    return views_of(evidence_file)
+
+
+def test_the_page_comes_from_the_evidence_file_alone(
+    first: Report, evidence_file: Record, views: Mapping[str, Record | None]
+) -> None:
+    evidence = evidence_file
+    pages = render_pages(page_content(evidence, views=views))
     for name, page in pages.items():
         assert (first.page.parent / name).read_text() == page
     assert untrue(pages.values(), evidence) == []
@@ -137,6 +152,7 @@ def second(write: Write, first: Report, tmp_path_factory: pytest.TempPathFactory
     return write(out)
 
 
+@pytest.mark.heavy
 def test_a_second_run_differs_in_times_alone(first: Report, second: Report) -> None:
     again = second.evidence
     assert {key for key in again if again[key] != first.evidence[key]} <= {"times", "verification"}
@@ -148,6 +164,7 @@ def test_a_second_run_differs_in_times_alone(first: Report, second: Report) -> N
     assert len(run) == len(QUICK) - 1
 
 
+@pytest.mark.heavy
 def test_what_looks_at_no_scene_is_run_once(first: Report, second: Report) -> None:
     assert first.evidence["times"]["kept_cases"] == {}
     today = first.evidence["times"]["date"]
@@ -211,6 +228,7 @@ def test_a_failure_leaves_the_old_report(
     assert [path.name for path in out.iterdir()] == ["report.html"]
 
 
+@pytest.mark.heavy
 def test_heavy_results_are_kept_with_their_date(second: Report) -> None:
     found = next(case for case in second.evidence["verification"] if case["id"] == "coverage")
     # The newest result on this very scene; the one on another scene is left alone.
@@ -294,9 +312,9 @@ def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_worker_makes_the_same_views(first: Report) -> None:
+def test_a_worker_makes_the_same_views(first: Report, views: Mapping[str, Record | None]) -> None:
     path = first.page.parent / "evidence.json"
     with Workers(1) as pool:
-        views = report_module._views(path, first.evidence, pool)
-    assert set(views) > {"trade", "inside", CASES_VIEW}
-    assert views == views_of(first.evidence)
+        by_worker = report_module._views(path, first.evidence, pool)
+    assert set(by_worker) > {"trade", "inside", CASES_VIEW}
+    assert by_worker == views

@@ -149,16 +149,6 @@ class CalibratedLaw:
         """Under which a flow carries half of the gas over the crest out, none and all, Pa."""
         return _carrying_pressures(table, self.density, self.path.froude_velocity)
 
-    def cleared_at(self, froude_velocity: float) -> CalibratedLaw:
-        """The law with another velocity of the path that carries gas out of the crest, m/s."""
-        law = replace(self, path=replace(self.path, froude_velocity=froude_velocity))
-        numbers, pieces = (each.copy() for each in self.constants)
-        for way, table in enumerate(self.heads.tables):
-            pieces[way, [point.HALF, point.NONE, point.ALL]] = law.carrying_pressures(table)
-        numbers[[point.CARRY, point.CARRY_FROM]] = _carried_by(law.path)
-        vars(law)["constants"] = numbers, pieces
-        return law
-
     def scalars(self) -> dict[int, float]:
         """What is no table, at the places of `point`."""
         path, inputs, heads = self.path, self.inputs, self.heads
@@ -412,6 +402,25 @@ def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]
             rows.add_shares(siphon, density)
     scalars = [law.scalars() for law in laws]
     return rows.arrays({place: [each[place] for each in scalars] for place in scalars[0]})
+
+
+def cleared_laws(laws: Sequence[CalibratedLaw], froude_velocities: Sequence[float]) -> list[CalibratedLaw]:
+    """Copy laws with equally many ways and knots, with other velocities that carry gas out of the crest.
+
+    Args: `froude_velocities`: of the paths, m/s.
+    """
+    density = np.array([law.density for law in laws])
+    tables = [Table.stacked(each) for each in zip(*(law.heads.tables for law in laws), strict=True)]
+    ways = [_carrying_pressures(each, density, np.array(froude_velocities)) for each in tables]
+    copies = []
+    for law, froude, *pressures in zip(laws, froude_velocities, *ways, strict=True):
+        copy = replace(law, path=replace(law.path, froude_velocity=froude))
+        numbers, pieces = (each.copy() for each in law.constants)
+        pieces[: len(ways), [point.HALF, point.NONE, point.ALL]] = pressures
+        numbers[[point.CARRY, point.CARRY_FROM]] = _carried_by(copy.path)
+        vars(copy)["constants"] = numbers, pieces
+        copies.append(copy)
+    return copies
 
 
 def _carrying_pressures(table: Table, density: npt.ArrayLike, froude: npt.ArrayLike) -> FloatArray:

@@ -23,7 +23,7 @@ from ringbalance.reduced_model.injection.dynamics import WORKSPACE, empty_plants
 from ringbalance.reduced_model.injection.limits import hold_liquid
 from ringbalance.reduced_model.injection.march import inject_each
 from ringbalance.reduced_model.injection.pair import at_rest
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, cleared_laws
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.making import Rings, nominal_law, nominal_laws
 from ringbalance.reduced_model.residual_liquid import Holding
@@ -123,13 +123,12 @@ class Device:
         scenes = [each.scene for each in devices]
         gravity = self.scene.environment.gravity > 0
         laws = nominal_laws(scenes, gravity=gravity, rings=self.models.rings)
-        for device, law in zip(devices, laws, strict=True):
-            # No velocity of a primed tube depends on which flows carry gas out of the crest.
-            bare = replace(law, path=replace(law.path, froude_velocity=0.0))
-            velocity = _primed_velocity(bare, device.scene)
-            if velocity > 0 and self.models.velocity > 0:
-                law = bare.cleared_at(law.path.froude_velocity * velocity / self.models.velocity)
-            vars(device)["law"] = law
+        velocities = [_primed_velocity(law, each.scene) for law, each in zip(laws, devices, strict=True)]
+        flowing = [i for i, velocity in enumerate(velocities) if velocity > 0 and self.models.velocity > 0]
+        froude = [laws[i].path.froude_velocity * velocities[i] / self.models.velocity for i in flowing]
+        cleared = dict(zip(flowing, cleared_laws([laws[i] for i in flowing], froude), strict=True))
+        for i, (device, law) in enumerate(zip(devices, laws, strict=True)):
+            vars(device)["law"] = cleared.get(i, law)
         result: CalibratedLaw = vars(self)["law"]
         return result
 

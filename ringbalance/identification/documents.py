@@ -230,25 +230,10 @@ class AgainstFit:
     fitted: FloatArray
     fitted_uncertainty: FloatArray
     """Expanded (95 %), of all that was fitted together."""
-
-    @property
-    def slope(self) -> float | None:
-        """Measured over fitted values, a line through zero weighted by noise; None for fitted zeros."""
-        square = self._square
-        return float(np.sum(self._weights * self.measured * self.fitted) / square) if square else None
-
-    @property
-    def slope_uncertainty(self) -> float | None:
-        """Expanded uncertainty (95 %) of the slope by the noise."""
-        return float(NORMAL_95 / np.sqrt(self._square)) if self._square else None
-
-    @property
-    def _square(self) -> float:
-        return float(np.sum(self._weights * self.fitted**2))
-
-    @property
-    def _weights(self) -> FloatArray:
-        return np.asarray((NORMAL_95 / self.measured_uncertainty) ** 2)
+    slope: float | None
+    """Measured over fitted values, a line through zero weighted by noise; None for fitted zeros."""
+    slope_uncertainty: float | None
+    """Expanded uncertainty (95 %) of the slope by the noise."""
 
 
 def against_fit(result: FitResult) -> list[AgainstFit]:
@@ -280,6 +265,9 @@ def against_fit(result: FitResult) -> list[AgainstFit]:
     for group, parts in numbers.items():
         block, joined = first[group], np.concatenate(parts, axis=1)
         column = block.kind.column(block.column)
+        _, measured, noise, fitted, _ = joined
+        weights = np.asarray((NORMAL_95 / noise) ** 2)
+        square = float(np.sum(weights * fitted**2))
         entries.append(
             AgainstFit(
                 kind=block.observations.kind,
@@ -291,6 +279,8 @@ def against_fit(result: FitResult) -> list[AgainstFit]:
                 measured_uncertainty=joined[2],
                 fitted=joined[3],
                 fitted_uncertainty=joined[4],
+                slope=float(np.sum(weights * measured * fitted) / square) if square else None,
+                slope_uncertainty=float(NORMAL_95 / np.sqrt(square)) if square else None,
             )
         )
     return entries

@@ -266,7 +266,7 @@ def fit(
         noise=tuple(noise),
         residuals=tuple(files),
         held=held,
-        pulls=dict(zip(held, (residuals.held_values(best.t) / NORMAL_95).tolist(), strict=True)),
+        pulls=dict(zip(held, (residuals.linear_values(best.t)[1] / NORMAL_95).tolist(), strict=True)),
         loss=loss,
         starts=best.starts,
         evaluations=problem.evaluations,

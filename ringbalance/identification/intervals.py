@@ -192,7 +192,7 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
     """
     for _ in range(_ROUNDS):
         residuals, t = best.residuals, best.t
-        problem, pulls = residuals.problem, _allowed(held, residuals.held_values(t))
+        problem, pulls = residuals.problem, _allowed(held, residuals.linear_values(t)[1])
         pulled = scene
         for (name, sd), pull in zip(held.items(), pulls.tolist(), strict=True):
             pulled = inputs_of(pulled).changed(name, pull * sd)
@@ -238,7 +238,7 @@ def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
     scale = np.concatenate([slopes, list(held.values())])
     return Joint(
         names=(*(p.name for p in parameters), *held),
-        values=np.concatenate([values, best.residuals.held_values(t)]),
+        values=np.concatenate([values, best.residuals.linear_values(t)[1]]),
         covariance=inverse[np.ix_(columns, columns)] * np.outer(scale, scale),
     )
 
@@ -246,7 +246,7 @@ def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
 def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
     """The scene with the fitted values, the values to which held inputs are pulled, and corrected models."""
     residuals, scene = best.residuals, best.residuals.problem.scene
-    steps = _allowed(held, residuals.held_values(best.t)) - residuals.pulled
+    steps = _allowed(held, residuals.linear_values(best.t)[1]) - residuals.pulled
     for (name, sd), step in zip(held.items(), steps.tolist(), strict=True):
         scene = inputs_of(scene).changed(name, step * sd)
     as_fitted: AnyScene = replace(residuals.problem, scene=scene).scene_at(best.t)

@@ -105,10 +105,6 @@ class Problem:
             scene = parameter.change(scene, parameter.value(inner))
         return scene
 
-    def predicted(self, scene: Any) -> FloatArray:
-        """L^-1 f of all blocks."""
-        return np.concatenate([b.whiten @ b.predicted(scene, self.models) for b in self.blocks])
-
     @cached_property
     def rows(self) -> tuple[tuple[Block, slice], ...]:
         """Every block with the place of its numbers among those of all."""
@@ -128,7 +124,9 @@ class Problem:
         """L^-1 f at t; a point that was asked for before is not predicted again."""
         key = t.tobytes()
         if key not in self._known:
-            self._known[key] = self.predicted(self.scene_at(t))
+            scene = self.scene_at(t)
+            predicted = [b.whiten @ b.predicted(scene, self.models) for b in self.blocks]
+            self._known[key] = np.concatenate(predicted)
         return self._known[key]
 
     def at_each(self, points: Sequence[FloatArray]) -> list[FloatArray]:
@@ -271,13 +269,6 @@ class Residuals:
         """Q; directions that the data do not hold are left out."""
         return basis_of(self.linear)
 
-    def projected(self, columns: FloatArray) -> FloatArray:
-        """Numbers of the data without what b and n can take up, shape (n + held, ...)."""
-        scaled = self.scale[:, None] * columns if columns.ndim == 2 else self.scale * columns
-        below = np.zeros((self.held.shape[1], *columns.shape[1:]))
-        full = np.concatenate([scaled, below])
-        return np.asarray(full - self.base @ (self.base.T @ full))
-
     def at(self, t: FloatArray, *, predicted: FloatArray | None = None) -> FloatArray:
         """Residuals and priors."""
         prediction = self.problem.at(t) if predicted is None else predicted
@@ -285,8 +276,10 @@ class Residuals:
         return np.concatenate([full - self.base @ (self.base.T @ full), self.problem.priors(t)])
 
     def slopes(self, t: FloatArray, of_prediction: FloatArray) -> FloatArray:
-        """d(residuals)/dt. Args: `of_prediction`: d(L^-1 f)/dt."""
-        return np.concatenate([-self.projected(of_prediction), self.problem.prior_slopes(t)])
+        """d(residuals)/dt, without what b and n can take up. Args: `of_prediction`: d(L^-1 f)/dt."""
+        below = np.zeros((self.held.shape[1], of_prediction.shape[1]))
+        full = np.concatenate([self.scale[:, None] * of_prediction, below])
+        return np.concatenate([-(full - self.base @ (self.base.T @ full)), self.problem.prior_slopes(t)])
 
     def leverage(self, slopes: FloatArray) -> FloatArray:
         """Fraction of every number of the data that parameters, b and n take up.
@@ -295,10 +288,6 @@ class Residuals:
         """
         both = np.hstack([basis_of(slopes)[: self.scale.size], self.base[: self.scale.size]])
         return np.asarray(np.sum(both**2, axis=1))
-
-    def held_values(self, t: FloatArray) -> FloatArray:
-        """Likeliest n of the held inputs at t, in their standard deviations."""
-        return self.linear_values(t)[1]
 
     def linear_values(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Likeliest b and n at t."""

@@ -175,11 +175,6 @@ def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
                 raise FieldError("this column has no unit", f"{name}, or {name} [%]")
         except FieldError as error:
             yield table.head_fault(head, error.problem, error.allowed)
-    yield from _missing(table, kind, names)
-
-
-def _missing(table: Table, kind: Kind, names: set[str]) -> Iterator[Fault]:
-    """Columns that a file of a kind needs and has not."""
     line = f"line {table.head_line}"
     needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
     for column in needed:

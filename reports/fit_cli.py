@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ringbalance.identification.cli import DONE, FitRequest, keep_inputs, run_fit
+from ringbalance.identification.cli import DONE, keep_inputs, run_fit
 from ringbalance.identification.documents import against_fit
 from ringbalance.identification.fitting import Loss
 from ringbalance.identification.reading import template as template_of
@@ -51,8 +51,7 @@ def fit(
     check_output("--plot", plot, ".svg")
     if plot is not None and scene is not None:
         keep_inputs(plot, (scene, *data))
-    asked = FitRequest(parameters=parameters, loss=loss, next=next, save=save, json=json)
-    code, result = run_fit(scene, data, asked)
+    code, result = run_fit(scene, data, parameters=parameters, loss=loss, next=next, save=save, json=json)
     if plot is not None:
         # Loading what draws takes as long as a short fit.
         from ringbalance.reports.figure import sheet  # noqa: PLC0415

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json as json_format
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from ringbalance.identification.criticism import Review
@@ -28,55 +27,56 @@ _USAGE = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitRequest:
-    """Options of `ringbalance fit`; `reports.fit_cli.fit` describes them."""
+def run_fit(
+    scene: Path | None,
+    data: Sequence[Path],
+    *,
+    parameters: str | None,
+    loss: Loss,
+    next: str | None,
+    save: Path | None,
+    json: bool,
+) -> tuple[int, FitResult]:
+    """Fit, print and save, as `reports.fit_cli.fit` describes.
 
-    parameters: str | None
-    loss: Loss
-    next: str | None
-    save: Path | None
-    json: bool
-
-
-def run_fit(scene: Path | None, data: Sequence[Path], request: FitRequest) -> tuple[int, FitResult]:
-    """Fit, print and save. Returns: Exit code, and what was found. Raises: SceneError, OSError."""
+    Returns: Exit code and result. Raises: SceneError, OSError.
+    """
     if scene is None or not data:
         raise _usage("command line", f"{'SCENE' if scene is None else 'DATA'} is missing")
-    if request.save is not None:
-        keep_inputs(request.save, (scene, *data))
-        check_file(request.save)
+    if save is not None:
+        keep_inputs(save, (scene, *data))
+        check_file(save)
     if scene.suffix.lower() == ".csv":
         raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
     stated_scene = load_scene(scene)
     observations = read_observations(data, scene=stated_scene)
-    names = None if request.parameters is None else [name.strip() for name in request.parameters.split(",")]
+    names = None if parameters is None else [name.strip() for name in parameters.split(",")]
     if names is not None and (not all(names) or len(set(names)) < len(names)):
         problem = "it is not a list of different names with commas between"
         allowed = 'such as "bore,extra_loss"'
         raise SceneError.of_option(
-            option="--parameters", value=request.parameters or "", problem=problem, allowed=allowed
+            option="--parameters", value=parameters or "", problem=problem, allowed=allowed
         )
     try:
         fitted = [each.name for each in problem_of(stated_scene, observations, names).parameters]
-        if request.next is not None and request.next not in fitted:
-            problem = f"this parameter is not fitted{did_you_mean(request.next, fitted)}"
+        if next is not None and next not in fitted:
+            problem = f"this parameter is not fitted{did_you_mean(next, fitted)}"
             listed = ", ".join(fitted)
-            raise SceneError.of_option(option="--next", value=request.next, problem=problem, allowed=listed)
+            raise SceneError.of_option(option="--next", value=next, problem=problem, allowed=listed)
         with activity("fit", "several starts, profiles of the likelihood ..."):
-            result = fit_scene(stated_scene, data=observations, parameters=names, loss=request.loss)
+            result = fit_scene(stated_scene, data=observations, parameters=names, loss=loss)
     except FitError as error:
         raise SceneError.of_file(stated_scene.file, str(error)) from error
-    review, following = Review.of(result), next_measurement(result, request.next)
-    if request.json:
+    review, following = Review.of(result), next_measurement(result, next)
+    if json:
         document = fit_document(result, data=observations, review=review, next_measurement=following)
         print(json_format.dumps(document, allow_nan=False))
     else:
         rows = fit_rows(result, data=observations, review=review, next_measurement=following)
         print_rows(rows, headline=False)
-    if request.save is not None:
-        save_result(request.save, scene=stated_scene, result=result, data=observations, said=review.text)
-        print_message(f"fitted scene written to {request.save}")
+    if save is not None:
+        save_result(save, scene=stated_scene, result=result, data=observations, said=review.text)
+        print_message(f"fitted scene written to {save}")
     return (DONE if review.describes else FAILED), result
 
 

@@ -78,8 +78,23 @@ def covariance(slopes: FloatArray) -> FloatArray:
 
 def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
     """Interval of each parameter. Args: `spread`: `covariance` at the optimum."""
+    # t(0.975) of each parameter, with what the estimated weights add.
+    (data, priors), count, group = best.of_all, best.t.size, best.residuals.problem.group
+    inverse, parts = covariance(np.concatenate([data, priors])), np.linalg.pinv(best.slopes, rcond=1e-10) ** 2
+    total, below, added = np.sum(parts, axis=1), np.zeros(count), np.zeros(count)
+    for g, nu in enumerate(best.freedom.tolist()):
+        below += np.sum(parts[:, : group.size][:, group == g], axis=1) ** 2 / nu
+        mine = data[group == g]
+        rows = mine @ inverse
+        # Diagonal of C (W - W C W) C by the rows' own covariance.
+        left = (rows.T @ rows) @ (np.eye(len(inverse)) - mine.T @ rows)
+        added += 2 / nu * np.diag(left)[:count]
+    freedom = np.divide(total**2, below, out=np.full(count, np.inf), where=below > 1e-9 * total**2)
+    by_weights = np.maximum(added, 0.0) / np.diag(inverse)[:count]
+    limited = np.minimum(np.maximum(freedom, 1.0), 1e9)
+    factors = stdtrit(limited, 0.975) * np.sqrt(1 + 2 * by_weights)
     least, intervals = float(np.sum(best.at**2)), []
-    for i, factor in enumerate(_student(best).tolist()):
+    for i, factor in enumerate(factors.tolist()):
         low, low_bound, low_t, points = _end(best, i, -1.0, factor, spread, least)
         high, high_bound, high_t, more = _end(best, i, 1.0, factor, spread, least)
         intervals.append(
@@ -94,24 +109,6 @@ def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
             )
         )
     return intervals
-
-
-def _student(best: Optimum) -> FloatArray:
-    """t(0.975) of each parameter, with what the estimated weights add."""
-    (data, priors), count, group = best.of_all, best.t.size, best.residuals.problem.group
-    inverse, parts = covariance(np.concatenate([data, priors])), np.linalg.pinv(best.slopes, rcond=1e-10) ** 2
-    total, below, added = np.sum(parts, axis=1), np.zeros(count), np.zeros(count)
-    for g, nu in enumerate(best.freedom.tolist()):
-        below += np.sum(parts[:, : group.size][:, group == g], axis=1) ** 2 / nu
-        mine = data[group == g]
-        rows = mine @ inverse
-        # Diagonal of C (W - W C W) C by the rows' own covariance.
-        left = (rows.T @ rows) @ (np.eye(len(inverse)) - mine.T @ rows)
-        added += 2 / nu * np.diag(left)[:count]
-    freedom = np.divide(total**2, below, out=np.full(count, np.inf), where=below > 1e-9 * total**2)
-    by_weights = np.maximum(added, 0.0) / np.diag(inverse)[:count]
-    limited = np.minimum(np.maximum(freedom, 1.0), 1e9)
-    return np.asarray(stdtrit(limited, 0.975) * np.sqrt(1 + 2 * by_weights), dtype=np.float64)
 
 
 def _end(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ _LONGEST_TIME: Final = 10.0
 """s, of an injection: seconds are looked for where milliseconds stand, and not hours."""
 Change = Callable[[Observations, Any], Observations | None]
 """Takes the scene, too, which kinds of one balancer alone ask for a value of that balancer."""
+Conversion = Callable[[FloatArray, Any], FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,15 +55,11 @@ def _exchanged(observations: Observations, _: Any) -> Observations | None:
     return replace(observations, columns=columns, uncertainty=widths)
 
 
-def _turned(*names: str) -> Change:
-    """Angles of these names with the other sign."""
-
-    def change(observations: Observations, _: Any) -> Observations | None:
-        chosen = {n: -v for n, v in observations.columns.items() if n.startswith(names)}
-        vibration = any(n.startswith("phase") for n in observations.columns)
-        return observations.with_columns(**chosen) if chosen and vibration else None
-
-    return change
+def _turned(name: str, observations: Observations, _: Any) -> Observations | None:
+    """Angles whose names begin so with the other sign."""
+    chosen = {n: -v for n, v in observations.columns.items() if n.startswith(name)}
+    vibration = any(n.startswith("phase") for n in observations.columns)
+    return observations.with_columns(**chosen) if chosen and vibration else None
 
 
 def _lettered(observations: Observations, scene: Any) -> Observations | None:
@@ -73,39 +71,36 @@ def _lettered(observations: Observations, scene: Any) -> Observations | None:
     return replace(observations, chamber=np.array([letters[-i % len(letters)] for i in numbers]))
 
 
-def _amplitudes(factor: float) -> Change:
-    def change(observations: Observations, _: Any) -> Observations | None:
-        columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
-        widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
-        return replace(observations.with_columns(**columns), uncertainty=widths) if columns else None
-
-    return change
+def _amplitudes(factor: float, observations: Observations, _: Any) -> Observations | None:
+    """Amplitudes, with their uncertainties, times a factor."""
+    columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
+    widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
+    return replace(observations.with_columns(**columns), uncertainty=widths) if columns else None
 
 
 def _gas(
-    name: str, convert: Callable[[FloatArray, Any], FloatArray], *, above: float, below: float
-) -> Change:
-    """A column of what the gas does, in another unit, within what an injection can have."""
-
-    def change(observations: Observations, scene: Any) -> Observations | None:
-        if observations.kind not in ("injection", "transfer"):
-            return None
-        values = convert(observations.columns[name], scene)
-        usable = np.all(values > above) and np.median(values) < below
-        return observations.with_columns(**{name: values}) if usable else None
-
-    return change
+    name: str, above: float, below: float, convert: Conversion, observations: Observations, scene: Any
+) -> Observations | None:
+    """A column of what the gas does, in another unit, within the limits of an injection."""
+    if observations.kind not in ("injection", "transfer"):
+        return None
+    values = convert(observations.columns[name], scene)
+    usable = np.all(values > above) and np.median(values) < below
+    return observations.with_columns(**{name: values}) if usable else None
 
 
-def _pressures(code: str, words: str, convert: Callable[[FloatArray, Any], FloatArray]) -> Misreading:
-    change = _gas("pressure", convert, above=0.0, below=math.inf)
+def _pressures(code: str, words: str, convert: Conversion) -> Misreading:
+    change = partial(_gas, "pressure", 0.0, math.inf, convert)
     return Misreading(code=code, words=words, change=change, settings=True, column="pressure")
 
 
 SENSES: Final = (
-    Misreading(code="phases_turned", words="phases", change=_turned("phase"), settings=False),
+    Misreading(code="phases_turned", words="phases", change=partial(_turned, "phase"), settings=False),
     Misreading(
-        code="weights_turned", words="angles of the trial weights", change=_turned("angle"), settings=True
+        code="weights_turned",
+        words="angles of the trial weights",
+        change=partial(_turned, "angle"),
+        settings=True,
     ),
     Misreading(code="chambers_turned", words="letters of the chambers", change=_lettered, settings=True),
 )
@@ -114,7 +109,7 @@ AMPLITUDES: Final = tuple(
     Misreading(
         code=f"amplitudes_{code}",
         words=f"amplitudes {words}",
-        change=_amplitudes(factor),
+        change=partial(_amplitudes, factor),
         settings=False,
         scale=factor,
     )
@@ -152,7 +147,7 @@ _OTHERS: Final = (
     Misreading(
         code="times_in_seconds",
         words="valve-open times a thousand times as long, such as seconds stated as milliseconds",
-        change=_gas("gas_time", lambda values, _: 1e3 * values, above=-math.inf, below=_LONGEST_TIME),
+        change=partial(_gas, "gas_time", -math.inf, _LONGEST_TIME, lambda values, _: 1e3 * values),
         settings=True,
         column="gas_time",
     ),

@@ -87,7 +87,8 @@ def optimum(
     Args: `held`: effects of held inputs. `loss`: "linear" or "soft_l1". `starts`: searches from the scene and
         from around it. `before`: an optimum to begin at instead.
     Raises: FitError: no more numbers than unknowns in a group whose noise is to be estimated.
-    Source: Harville, J. Am. Stat. Assoc. 72 (1977) 320 (restricted likelihood).
+    Source: Harville, J. Am. Stat. Assoc. 72 (1977) 320 (restricted likelihood); additive recurrence with the
+        generalised golden ratio (Roberts, 2018) for the starts.
     """
     noise = _first_noise(problem) if before is None else before.residuals.noise
     weights = np.ones(problem.measured.size) if before is None else before.residuals.weights
@@ -95,7 +96,18 @@ def optimum(
     pulled = before.residuals.pulled if before is not None and same else np.zeros(held.shape[1])
     residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights, pulled=pulled)
     if before is None:
-        ends = [searched(residuals, point, gain=_NEARBY) for point in _start_points(problem, starts)]
+        # Points around the scene's, within the bounds, by a quasi-random sequence.
+        low, high = problem.bounds
+        ratio, size = 2.0, problem.start.size
+        for _ in range(30):
+            ratio = (1 + ratio) ** (1 / (size + 1))
+        both = zip(problem.parameters, problem.start.tolist(), strict=True)
+        reach = np.array([min(p.prior / p.slope(t), _WIDE) if p.prior else _WIDE for p, t in both])
+        points = [problem.start]
+        for n in range(1, starts):
+            part = np.mod(n * ratio ** -np.arange(1, size + 1), 1.0)
+            points.append(np.clip(problem.start + _APART * reach * (2 * part - 1), low, high))
+        ends = [searched(residuals, point, gain=_NEARBY) for point in points]
         t = min(ends, key=lambda end: float(end[1] @ end[1]))[0]
     else:
         t = before.t
@@ -134,29 +146,6 @@ def _same(first: Residuals, second: Residuals) -> bool:
 def _first_noise(problem: Problem) -> FloatArray:
     sizes = [problem.measured[problem.group == g] for g in range(len(problem.estimated_groups))]
     return np.array([_FIRST_NOISE * max(float(np.sqrt(np.mean(y**2))), 1e-300) for y in sizes])
-
-
-def _start_points(problem: Problem, count: int) -> list[FloatArray]:
-    """t of the scene, and points around it by a quasi-random sequence, within the bounds.
-
-    Source: additive recurrence with the generalised golden ratio (Roberts, 2018).
-    """
-    low, high = problem.bounds
-    size = problem.start.size
-    ratio = 2.0
-    for _ in range(30):
-        ratio = (1 + ratio) ** (1 / (size + 1))
-    wide = np.array(
-        [
-            min(p.prior / p.slope(t), _WIDE) if p.prior else _WIDE
-            for p, t in zip(problem.parameters, problem.start.tolist(), strict=True)
-        ]
-    )
-    points = [problem.start]
-    for n in range(1, count):
-        part = np.mod(n * ratio ** -np.arange(1, size + 1), 1.0)
-        points.append(np.clip(problem.start + _APART * wide * (2 * part - 1), low, high))
-    return points
 
 
 def _settled_noise(

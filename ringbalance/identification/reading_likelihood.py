@@ -15,6 +15,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -131,22 +132,19 @@ class Comparison:
 
         The scene to which wrong readings pull held inputs is far from where another reading has them.
         """
-        if (joint, chosen) not in self.refits:
-            self.refits[joint, chosen] = self._refitted(joint, chosen, scene)
-        return self.refits[joint, chosen]
-
-    def _refitted(self, joint: Joint, chosen: tuple[int, ...], scene: Any) -> float:
-        blocks = list(self.problem.blocks)
+        if (joint, chosen) in self.refits:
+            return self.refits[joint, chosen]
+        blocks, gain = list(self.problem.blocks), -math.inf
         for i in chosen:
             for each in joint:
                 changed = each.change(blocks[i].observations, scene)
                 blocks[i] = Block(observations=changed) if changed is not None else blocks[i]
         problem = replace(self.problem, scene=scene, blocks=tuple(blocks))
-        try:
+        with suppress(FitError, ValueError):
             best, _ = optimum_as_stated(problem, loss="linear", starts=1)
-        except (FitError, ValueError):
-            return -math.inf
-        return (self.deviance - deviance_of(best)) / 2 + self.jacobian(joint, chosen)
+            gain = (self.deviance - deviance_of(best)) / 2 + self.jacobian(joint, chosen)
+        self.refits[joint, chosen] = gain
+        return gain
 
     @cached_property
     def _response(self) -> list[int]:

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
+    from ringbalance.fitting import Fit as Fit
+    from ringbalance.fitting import fit as fit
     from ringbalance.identification.influence import InfluenceTable as InfluenceTable
     from ringbalance.identification.influence import read_influence as read_influence
     from ringbalance.reduced_model.calibration_record import Calibration as Calibration
@@ -45,19 +47,17 @@ if TYPE_CHECKING:
     from ringbalance.reduced_model.law.flow_law import FlowLaw as FlowLaw
     from ringbalance.reduced_model.law.flow_law import MomentCurve as MomentCurve
     from ringbalance.reduced_model.law.flow_law import Regime as Regime
+    from ringbalance.reporting import plot as plot
+    from ringbalance.reporting import write_report as write_report
     from ringbalance.scene import Scene as Scene
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
     from ringbalance.scene.platform.progress_line import ProgressLine as ProgressLine
     from ringbalance.search import find_design as find_design
-    from ringbalance.studies import Fit as Fit
     from ringbalance.studies import extremes as extremes
-    from ringbalance.studies import fit as fit
-    from ringbalance.studies import plot as plot
     from ringbalance.studies import run_cases as run_cases
     from ringbalance.studies import trade as trade
-    from ringbalance.studies import write_report as write_report
     from ringbalance.verification.extremes.study import Extremes as Extremes
     from ringbalance.verification.trade import TradeStudy as TradeStudy
 
@@ -74,6 +74,7 @@ register(
     scene="ringbalance.controller.eccentric_mass.scene_records:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
+register_function("run_command", place="ringbalance.running:run_command")
 register_function("with_chamber", place="ringbalance.scene.chamber_file.loading:with_chamber")
 register_function("with_values", place="ringbalance.scene.changes:with_values")
 register_function("sobol", place="ringbalance.design.sobol:sobol")
@@ -82,6 +83,9 @@ register_function("line_answers", place="ringbalance.reduced_model.injection.lin
 register_function("multigrid", place="pyamg:smoothed_aggregation_solver")
 register_function("run_row", place="ringbalance.design.runs:run_row")
 register_function("left_out", place="ringbalance.design.trade:left_out")
+register_function("data_document", place="ringbalance.verification.validation.comparison:data_document")
+register_function("sheet", place="ringbalance.reports.figure:sheet")
+register_function("figures_of", place="ringbalance.reports.run_figures:figures_of")
 register_function("figures_of_result", place="ringbalance.reports.result_figures:figures_of_result")
 register_function("sweep_figures", place="ringbalance.reports.sweep_figures:sweep_figures")
 register_function("control_state_space", place="control:StateSpace")
@@ -135,15 +139,9 @@ _NAMES = {
         "load_scene",
     ),
     "search": ("find_design",),
-    "studies": (
-        "Fit",
-        "extremes",
-        "fit",
-        "plot",
-        "run_cases",
-        "trade",
-        "write_report",
-    ),
+    "fitting": ("Fit", "fit"),
+    "reporting": ("plot", "write_report"),
+    "studies": ("extremes", "run_cases", "trade"),
     "verification.extremes.study": ("Extremes",),
     "verification.trade": ("TradeStudy",),
 }

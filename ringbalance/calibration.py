@@ -6,10 +6,11 @@ from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.law.paper_law import paper_law as paper_law_of
-from ringbalance.scene.changes import checked_scene
+from ringbalance.running import checked
 from ringbalance.scene.narrowing import AnyScene
 
 
+@checked
 def calibrate(scene: AnyScene) -> Calibration:
     """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
 
@@ -22,9 +23,10 @@ def calibrate(scene: AnyScene) -> Calibration:
         >>> f"{flow.velocity:.1f} m/s"
         '14.9 m/s'
     """
-    return calibrate_scene(checked_scene(scene))
+    return calibrate_scene(scene)
 
 
+@checked
 def paper_law(scene: AnyScene) -> PaperLaw:
     """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
 
@@ -36,4 +38,4 @@ def paper_law(scene: AnyScene) -> PaperLaw:
         >>> f"{law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity:.2f} m/s"
         '5.24 m/s'
     """
-    return paper_law_of(checked_scene(scene))
+    return paper_law_of(scene)

@@ -1,4 +1,4 @@
-"""The command line: which function answers to which command, and what the exit codes mean.
+"""The command line: the parser of the commands, and what the exit codes mean.
 
 A command's module is imported only when the command runs, so that `--help` loads nothing from numpy down.
 Results go to standard output, everything else to standard error.
@@ -13,12 +13,13 @@ import os
 import shlex
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from inspect import signature
+from inspect import Parameter as SignatureParameter
+from inspect import Signature, signature
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, get_args
+from typing import Annotated, Any, get_args
 
 from cyclopts import (
     App,
@@ -32,8 +33,10 @@ from cyclopts import (
 )
 
 import ringbalance
+from ringbalance.commands import COMMANDS, EXAMPLE_SCENES, Command
 from ringbalance.scene.platform.display import LOG, displayed
 from ringbalance.scene.platform.memory import seldom_collected
+from ringbalance.scene.registry import registered
 from ringbalance.signals import interrupts
 from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
 
@@ -41,122 +44,10 @@ DONE = 0
 BAD_INPUT = 2
 INTERRUPTED = 130
 BROKEN_PIPE = 141
-EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
 
 _EVERYWHERE = Parameter(group=Group("Options of every command", sort_key=100), show_default=False)
 
 
-class Command(NamedTuple):
-    """A command as its `--help` shows it."""
-
-    target: str
-    """Module and function."""
-    summary: str
-    example: str
-    """Arguments; SCENE stands for a scene file."""
-    failure: str
-    """Condition of exit code 1; empty: never given."""
-
-    def epilogue(self, name: str) -> str:
-        """An example, the exit codes, and the page with the rest."""
-        example = " ".join(("ringbalance", name, self.example.replace("SCENE", EXAMPLE_SCENES[0]))).strip()
-        failed = f"1 {self.failure}; " if self.failure else ""
-        return (
-            f"Example: {example}\n\n"
-            f"Exit codes: 0 done; {failed}2 bad input, or output that cannot be written; 130 interrupted; "
-            "141 the reader of standard output went away.\n\n"
-            f"All options, files and JSON keys: docs/commands.md"
-        )
-
-
-COMMANDS = {
-    "report": (
-        "ringbalance.reports.cli:report",
-        "Verify, calibrate, simulate and draw: everything, into a report and its annex.",
-        "SCENE --out out",
-        "a check of the program failed (what becomes of the scene's requirements does not count)",
-    ),
-    "calibrate": (
-        "ringbalance.reduced_model.cli:calibrate",
-        "lambda, k and the flow law of a disc, with uncertainties.",
-        "SCENE --save law.json",
-        "",
-    ),
-    "simulate": (
-        "ringbalance.reports.simulate_cli:simulate",
-        "One closed-loop balancing run.",
-        "SCENE --plot run.svg",
-        "the run did not settle, or misses what the scene requires",
-    ),
-    "tune": (
-        "ringbalance.controller.cli:tune",
-        "Settings of the controller chosen by runs of drawn devices, and the fraction that they serve.",
-        "SCENE --save tuned.toml",
-        "what the scene requires is not met with the best settings, or it is undecided",
-    ),
-    "export": (
-        "ringbalance.export.cli:export",
-        "The flow law for another program: C, FMI, structured text, a Python module, a table.",
-        "SCENE --to c --out law",
-        "",
-    ),
-    "sweep": (
-        "ringbalance.design.cli:sweep",
-        "Many designs: a row of answers for every point of a grid or a sample.",
-        "SCENE --vary tube.bore=0.5mm:2mm:30 --out sweep",
-        "",
-    ),
-    "design": (
-        "ringbalance.design.design_cli:design",
-        "The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.",
-        "SCENE --save designed.toml",
-        "no design meets what the scene requires, or it is undecided",
-    ),
-    "fit": (
-        "ringbalance.reports.fit_cli:fit",
-        "Parameters of a built disc from measurements, with intervals and what the data identify.",
-        "SCENE rig.csv --save fitted.toml",
-        "the fit does not describe its data",
-    ),
-    "verify": (
-        "ringbalance.verification.cli:verify",
-        "The verification cases and the paper's claims, judged.",
-        "gci_celik2008 --mutations",
-        "a code verification failed, or a mutation was not noticed",
-    ),
-    "compare": (
-        "ringbalance.controller.cli:compare",
-        "Two balancers on one rotor, side by side.",
-        "SCENE other_disc.toml",
-        "one of the two does not settle the fraction of devices that is asked for, or it is undecided",
-    ),
-    "trade": (
-        "ringbalance.verification.trade:trade",
-        "Speed against accuracy: designs a second and error of every model.",
-        "SCENE --level light",
-        "",
-    ),
-    "extremes": (
-        "ringbalance.verification.extremes.study:extremes",
-        "Limits of validity: where results stop, what is reported beyond, and whether the invariants hold "
-        "inside.",
-        "SCENE --out extremes",
-        "an invariant does not hold",
-    ),
-    "plot": (
-        "ringbalance.reports.cli:plot",
-        "The off-screen 3-D pictures alone.",
-        "SCENE --out pictures",
-        "this machine cannot draw; the fields are written",
-    ),
-    "doctor": (
-        "ringbalance.doctor:doctor",
-        "What this machine gives the program, and what to do where something lacks.",
-        "",
-        "something is broken",
-    ),
-}
-"""By name, see `Command`."""
 THREAD_COUNTS = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -196,15 +87,37 @@ def _build_app() -> App:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    for name, entry in COMMANDS.items():
-        command = Command._make(entry)
-        app.command(command.target, name=name, help=command.summary, help_epilogue=command.epilogue(name))
+    for name, command in COMMANDS.items():
+        function = _shell_function(name, command)
+        app.command(function, name=name, help=command.summary, help_epilogue=command.epilogue(name))
     app.register_install_completion_command(
         help="Let this shell (bash, zsh or fish) complete names of commands and options.", help_epilogue=""
     )
     app.meta.suppress_keyboard_interrupt = False
     app.meta.default(partial(_dispatch, app))
     return app
+
+
+def _shell_function(name: str, command: Command) -> Callable[..., int]:
+    """The function from whose signature and docstring the shell's parser and `--help` of a command come."""
+
+    def run(*arguments: Any, **options: Any) -> int:
+        given = shape.bind(*arguments, **options).arguments
+        result: int = registered("function", "run_command")(name, **given)
+        return result
+
+    hints: dict[str, Any] = {}
+    parameters = []
+    for key, option in command.options.items():
+        own = not option.text or f"    {key}: " in command.text
+        shown: dict[str, Any] = {**option.parsing, **({} if own else {"help": option.text})}
+        hints[key] = Annotated[option.hint, Parameter(**shown)]
+        several = option.kind is SignatureParameter.VAR_POSITIONAL
+        default = SignatureParameter.empty if several else option.default
+        parameters.append(SignatureParameter(key, option.kind, default=default, annotation=hints[key]))
+    shape = Signature(parameters)
+    run.__signature__, run.__annotations__, run.__doc__ = shape, hints, command.text  # type: ignore[attr-defined]
+    return run
 
 
 def _dispatch(

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from numbers import Integral
+from json import dumps
 from os import PathLike
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from ringbalance.design.axes import plan_of
+from ringbalance.design.axes import plan_of, plan_of_file, plan_of_texts
 from ringbalance.design.static import EMPTY, REFUSED, static_rows
-from ringbalance.design.sweep import Sweep, run_sweep
+from ringbalance.design.sweep import STORE, Sweep, check_rows, run_sweep
 from ringbalance.design.work import Progress
-from ringbalance.scene import AnyScene
-from ringbalance.scene.changes import checked_scene
+from ringbalance.running import check_counts, checked, print_result
+from ringbalance.scene import AnyScene, load_scene
+from ringbalance.scene.changes import file_text
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.narrowing import read_tolerance
+from ringbalance.scene.platform.files import check_file, write_whole
+from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.registry import registered
 
 
+@checked
 def sweep(
     scene: AnyScene,
     vary: Mapping[Any, Any],
@@ -53,13 +61,11 @@ def sweep(
         >>> len(table.points)
         6
     """
-    scene = checked_scene(scene)
     if not isinstance(vary, Mapping):
         raise TypeError(f'`vary` maps keys to values, such as {{"tube.bore": [1e-3, 2e-3]}}: {vary!r}')
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"`executor` is none of concurrent.futures: {executor!r}")
-    for name, count, least in (("runs", runs, 0), ("check", check, 0), ("workers", workers, 1)):
-        _check_count(name, count, least)
+    check_counts("sweep", runs=runs, check=check, workers=workers)
     return run_sweep(
         scene,
         plan_of(scene, vary, sample=sample),
@@ -73,6 +79,7 @@ def sweep(
     )
 
 
+@checked
 def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> dict[str, Any]:
     """Answer one changed scene with plain numbers, for an optimiser: the same changes give the same answer.
 
@@ -91,8 +98,7 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
         >>> answer["status"], answer["velocity"] > 10
         ('ok', True)
     """
-    scene = checked_scene(scene)
-    _check_count("runs", runs, 0)
+    check_counts("sweep", runs=runs)
     (row,) = static_rows(scene, [dict(changes)], intervals=False)
     if row["status"] == REFUSED and not all(_is_key(scene, path) for path in changes):
         scene.with_values(changes)  # Says which.
@@ -113,7 +119,49 @@ def _is_key(scene: AnyScene, path: str) -> bool:
     return key in scene_kind(scene.balancer).schema.keys_in(tables) if tables else False
 
 
-def _check_count(name: str, count: int, least: int) -> None:
-    """Raises: ValueError: no whole number, or below the least."""
-    if not isinstance(count, Integral) or count < least:
-        raise ValueError(f"`{name}` is a whole number of at least {least}, not {count!r}")
+def sweep_file(options: SimpleNamespace) -> int:
+    """Run the command `sweep`: write the table, its document, figures and the scenes of some rows."""
+    given = load_scene(options.scene)
+    if options.tolerance is not None:
+        given = given.with_values({"accuracy.tolerance": read_tolerance(options.tolerance)})
+    if options.plan is None:
+        points = plan_of_texts(given, options.vary or [], sample=options.sample)
+    elif options.vary or options.sample:
+        problem, allowed = "the plan has axes and sample", "either of them"
+        raise SceneError.of_option(option="--plan", value=str(options.plan), problem=problem, allowed=allowed)
+    else:
+        points = plan_of_file(given, options.plan)
+    if options.write:
+        check_rows(options.write, len(points.points()))
+    table, summary = options.out / "table.csv", options.out / "sweep.json"
+    for file in (table, summary):
+        check_file(file)
+    with activity("sweep", "points ...") as shown:
+        result = run_sweep(
+            given,
+            points,
+            runs=options.runs,
+            intervals=not options.no_intervals,
+            check=options.check,
+            store=options.out / STORE,
+            workers=options.workers or os.cpu_count() or 1,
+            progress=lambda done: shown.show(done.text, done=done.points, total=done.total),
+        )
+    write_whole(table, result.to_csv())
+    write_whole(summary, dumps(result.to_dict(), allow_nan=False) + "\n")
+    if not options.no_figures:
+        result.plot(options.out / "figures")
+    print_result(result, json=options.json)
+    if not options.json:
+        print_message(f"written to {options.out}")
+    folder, errors = options.out / "scenes", list[Fault]()
+    for row in options.write or ():
+        try:
+            write_whole(folder / f"row-{row}.toml", file_text(result.point_scene(row), to=folder))
+        except SceneError as error:
+            problem = f"this row has no scene: {error}"
+            of_row = SceneError.of_option(option="--write", value=row, problem=problem, allowed="other rows")
+            errors += of_row.faults
+    if errors:
+        raise SceneError(errors)
+    return 0

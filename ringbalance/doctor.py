@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires, version
 from multiprocessing import get_context
+from types import SimpleNamespace
 from typing import Final, Literal, NamedTuple
 
 from rich.markup import escape
@@ -46,17 +47,10 @@ def checks() -> Iterator[Check]:
     yield _processes()
 
 
-def doctor(*, json: bool = False) -> int:
-    """Tell what this machine gives the program, and what to do where something lacks.
-
-    Args:
-        json: print one JSON document instead of a table.
-
-    Returns:
-        Exit code: 0; 1 where something is broken.
-    """
+def doctor(options: SimpleNamespace) -> int:
+    """Run the command `doctor`. Returns: Exit code: 1 where something is broken."""
     made = list(checks())
-    if json:
+    if options.json:
         print(json_format.dumps({"checks": [check._asdict() for check in made]}))
     else:
         _print(made)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import replace
+from json import dumps
+from types import SimpleNamespace
 from typing import Any, Literal, Protocol, cast, overload
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.balancer import AS_GIVEN, balancer_of, takes
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -17,8 +20,12 @@ from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.flow_law import Flow
+from ringbalance.results.result import csv_text, print_rows
+from ringbalance.running import checked, law_for, opened
 from ringbalance.scene import AnyScene, Scene
-from ringbalance.scene.changes import checked_scene
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.terminal import activity
+from ringbalance.scene.registry import registered
 
 
 class GivesVelocities(Protocol):
@@ -64,6 +71,7 @@ def simulate(
 def simulate(scene: AnyScene, *, progress: Progress | None = None) -> Simulation | EccentricRun: ...
 
 
+@checked
 def simulate(
     scene: AnyScene,
     *,
@@ -96,13 +104,41 @@ def simulate(
         >>> run.settled
         True
     """
-    balancer = balancer_of(
-        checked_scene(scene), flow_law=flow_law, controller=controller, sensor=sensor, modelled=modelled
-    )
+    balancer = balancer_of(scene, flow_law=flow_law, controller=controller, sensor=sensor, modelled=modelled)
     run = balancer.run({}, AS_GIVEN, trace=True, progress=progress).traced[0].run
     return cast("Simulation | EccentricRun", run)
 
 
+def simulate_file(options: SimpleNamespace) -> int:
+    """Run the command `simulate`. Returns: Exit code: 0 settled, with all that the scene requires."""
+    given = opened(options.scene, options.tolerance, options.models)
+    if options.seed is not None:
+        given = replace(given, run=replace(given.run, seed=options.seed))
+    balancer = balancer_of(given, flow_law=law_for(given, options.law))
+    with activity("simulate", "closed loop ...") as shown:
+
+        def show(time: float, limit: float) -> None:
+            shown.show(f"{time:.1f} s of {limit:g} s simulated", done=time, total=limit)
+
+        outcomes = balancer.run({}, AS_GIVEN, trace=True, progress=show)
+        run, met = outcomes.traced[0].run, all(each.met(outcomes).all() for each in balancer.demands())
+        document = run.to_dict() if options.json else {}
+        sheet = ""
+        if options.plot is not None:
+            # Loading what draws takes as long as a short run.
+            sheet = registered("function", "sheet")(registered("function", "figures_of")(given, run))
+    if options.csv is not None:
+        write_whole(options.csv, csv_text(balancer.history(run)))
+    if options.plot is not None:
+        write_whole(options.plot, sheet)
+    if options.json:
+        print(dumps(document, allow_nan=False))
+    else:
+        print_rows(balancer.rows(run))
+    return 0 if run.settled and met else 1
+
+
+@checked
 def compare(
     first: AnyScene, second: AnyScene, *, rotor: Literal["first", "second"] | None = None
 ) -> Comparison:
@@ -117,10 +153,25 @@ def compare(
         >>> len(comparison.to_dict()["scenes"])
         2
     """
-    one, other = (balancer_of(checked_scene(scene)) for scene in (first, second))
-    return run_comparison(one, other, rotor=rotor)
+    return run_comparison(balancer_of(first), balancer_of(second), rotor=rotor)
 
 
+def compare_under(
+    first: AnyScene,
+    second: AnyScene,
+    *,
+    law: str,
+    rotor: Literal["first", "second"] | None,
+    progress: Callable[[str], None],
+) -> Comparison:
+    """Compare as the command does: under a law for each balancer that has one."""
+    one, other = (
+        balancer_of(scene, flow_law=law if takes(scene, "flow_law") else None) for scene in (first, second)
+    )
+    return run_comparison(one, other, rotor=rotor, progress=progress)
+
+
+@checked
 def tune(
     scene: AnyScene,
     *,
@@ -144,5 +195,5 @@ def tune(
         >>> sorted(tuning.recommended.settings)
         ['controller.gas_time_offset', 'controller.integral_time', 'controller.proportional', 'gas.pressure']
     """
-    balancer = balancer_of(checked_scene(scene), flow_law=flow_law)
+    balancer = balancer_of(scene, flow_law=flow_law)
     return tuned(balancer, along=pressure, remedies=remedies, progress=progress)

@@ -8,10 +8,11 @@ from concurrent.futures import Executor
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import Design, run_design
 from ringbalance.results.result import Presentation
+from ringbalance.running import checked
 from ringbalance.scene import AnyScene
-from ringbalance.scene.changes import checked_scene
 
 
+@checked
 def find_design(
     scene: AnyScene,
     *,
@@ -34,7 +35,7 @@ def find_design(
         'met'
     """
     return run_design(
-        checked_scene(scene),
+        scene,
         presentation=Presentation(document=design_document, rows=design_rows),
         executor=executor,
         workers=workers,

@@ -18,6 +18,7 @@ import pytest
 from cyclopts import CycloptsError, UnknownOptionError
 
 from ringbalance import __version__, cli, streams
+from ringbalance.commands import COMMANDS, Command
 from ringbalance.scene import Fault, SceneError, bundled_scene
 
 ROOT = Path(__file__).parents[1]
@@ -180,7 +181,7 @@ def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException | int], 
     """Runs a command that gives back a number or raises."""
 
     def run_it(outcome: BaseException | int) -> int:
-        def act() -> int:
+        def act(_: object) -> int:
             if isinstance(outcome, BaseException):
                 raise outcome
             return outcome
@@ -188,7 +189,7 @@ def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException | int], 
         module = ModuleType("acting_command")
         module.act = act  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "acting_command", module)
-        monkeypatch.setattr(cli, "COMMANDS", {"act": ("acting_command:act", "acts", "", "")})
+        monkeypatch.setitem(COMMANDS, "act", Command("acts", "acting_command:act", {}))
         return cli.main(["act"])
 
     return run_it
@@ -308,15 +309,15 @@ def test_a_log_that_cannot_be_written_is_refused(here: Run, tmp_path: Path) -> N
     assert_bad_input(here("calibrate", PAPER, "--log", tmp_path / "absent" / "log.txt"), "log.txt")
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", COMMANDS)
 def test_help_has_an_example_and_the_exit_codes_of_its_command(here: Run, name: str) -> None:
     shown = " ".join(here(name, "--help").stdout.split())
     assert f"Example: ringbalance {name}" in shown
-    assert ("0 done; 1 " in shown) == bool(cli.Command._make(cli.COMMANDS[name]).failure)
+    assert ("0 done; 1 " in shown) == bool(COMMANDS[name].failure)
     assert "docs/commands.md" in shown
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", COMMANDS)
 def test_every_documented_option_is_accepted(here: Run, name: str) -> None:
     """By the page of commands and by `--help`; a value that lacks is another error."""
     page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")

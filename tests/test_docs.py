@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import ringbalance as rb
-from ringbalance.cli import COMMANDS
+from ringbalance.commands import COMMANDS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 

@@ -10,6 +10,7 @@ from typing import NoReturn
 import pytest
 
 from ringbalance import doctor
+from ringbalance.running import run_command
 
 
 @pytest.fixture
@@ -32,7 +33,7 @@ def by_name() -> dict[str, doctor.Check]:
 
 
 def test_everything_that_is_required_is_here(capsys: pytest.CaptureFixture[str]) -> None:
-    assert doctor.doctor() == 0
+    assert run_command("doctor") == 0
     assert "scikit-fem" in capsys.readouterr().out
 
 
@@ -44,7 +45,7 @@ def test_a_package_that_lacks(
     check = by_name()[package]
     assert check.state == state
     assert "pip install" in check.advice
-    assert doctor.doctor() == code
+    assert run_command("doctor") == code
     assert "pip install" in capsys.readouterr().out
 
 

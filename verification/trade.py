@@ -6,14 +6,12 @@ that, beside what the finest one is itself known to.  The command `ringbalance t
 
 from __future__ import annotations
 
-import json as json_format
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from operator import itemgetter
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -31,14 +29,10 @@ from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.terms import models_used, terms_of
 from ringbalance.results.numbers import MISSING, number, percent
-from ringbalance.results.result import Result, Rows, Table, print_rows
+from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Quantity
-from ringbalance.scene import load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import Models, liquid_ring_scene, with_tolerance
-from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.uncertain import without_fitted
 from ringbalance.verification.evidence import Level
 
@@ -287,45 +281,3 @@ def _flow_models(scene: Scene, fills: FloatArray) -> dict[str, Solve]:
         "the same with uncertainties, checked by finite elements": lambda: chamber_and_law(scene)[1],
     }
     return {name: partial(velocity, law) for name, law in laws.items()}
-
-
-def trade(
-    scene: Path,
-    *,
-    json: bool = False,
-    out: Path | None = None,
-    level: Level = "heavy",
-    tolerance: str | None = None,
-    models: Models | None = None,
-) -> int:
-    """Measure speed against accuracy on a scene: designs a second and error of every model.
-
-    Args:
-        scene: the scene file.
-        json: print one JSON document instead of tables.
-        out: also write the document to trade.json in this folder.
-        level: "light" leaves out the meshes in three dimensions.
-        tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
-
-    Returns:
-        Exit code 0.
-
-    Raises:
-        SceneError: a scene that cannot be used.
-        OSError: a file cannot be written.
-    """
-    asked = with_tolerance(liquid_ring_scene(load_scene(scene)), tolerance=tolerance, models=models)
-    if out is not None:
-        check_file(out / _FILE)
-    with activity("trade", "models ...") as shown:
-        study = trade_study(asked, level=level, progress=lambda title: shown.show(f"{title} ..."))
-    text = json_format.dumps(study.to_dict(), allow_nan=False)
-    if json:
-        print(text)
-    else:
-        print_rows(study.rows(), headline=False)
-    if out is not None:
-        write_whole(out / _FILE, text + "\n")
-        print_message(f"written to {out / _FILE}")
-    return 0

@@ -29,7 +29,7 @@ from ringbalance.controller.rotor import (
     vibrating,
 )
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.requirements import Paired, Proportion
+from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite
@@ -174,6 +174,11 @@ class Comparison(Result):
     def better(self) -> int | None:
         """Which side settles more of the devices; None: no difference is shown."""
         return self.paired.better(_LEVEL)
+
+    @property
+    def succeeded(self) -> bool:
+        """True when both meet what is required of a fraction of devices."""
+        return set(self.verdicts) == {MET}
 
     @property
     def verdicts(self) -> tuple[str, ...]:

@@ -41,5 +41,10 @@ def balancers() -> tuple[str, ...]:
 
 def registered(part: Part, name: str) -> Any:
     """What was registered under a name. Raises: KeyError: nothing was."""
-    module, _, attribute = _PLACES[part, name].partition(":")
+    return imported(_PLACES[part, name])
+
+
+def imported(place: str) -> Any:
+    """Import what stands at a place "module:name"."""
+    module, _, attribute = place.partition(":")
     return getattr(import_module(module), attribute)

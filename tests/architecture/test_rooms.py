@@ -13,10 +13,6 @@ import pytest
 DYNAMIC = {"import_module", "__import__"}
 REGISTRY = "ringbalance.scene.registry"
 """It imports what the face registers, or a package of the user's own."""
-WHERE_OPTIONS_LOAD = {
-    *("ringbalance.reports.simulate_cli", "ringbalance.reports.fit_cli", "ringbalance.verification.cli"),
-}
-"""Short commands of which one option alone, `--plot` or `--data`, loads what draws or compiles."""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Scope = Function | ast.ClassDef
 Scopes = tuple[ast.AST, ...]
@@ -107,11 +103,7 @@ def cycle(sources: Mapping[str, str]) -> list[str]:
 
 
 def test_imports_are_absolute_and_at_module_level(modules: Mapping[str, Path]) -> None:
-    faults = {
-        name: style_faults(path.read_text())
-        for name, path in modules.items()
-        if name not in {REGISTRY, *WHERE_OPTIONS_LOAD}
-    }
+    faults = {name: style_faults(path.read_text()) for name, path in modules.items() if name != REGISTRY}
     assert {name: found for name, found in faults.items() if found} == {}
 
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from quantities import by_key
 
-from ringbalance.reduced_model.cli import calibrate
 from ringbalance.reduced_model.law.files import load_law
+from ringbalance.running import run_command
 from ringbalance.scene import SceneError, bundled_scene
 
 
 def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     target = tmp_path / "deep" / "law.json"
-    assert calibrate(bundled_scene("liquid_ring_paper"), json=True, save=target) == 0
+    assert run_command("calibrate", scene=bundled_scene("liquid_ring_paper"), json=True, save=target) == 0
     captured = capsys.readouterr()
     document = json.loads(captured.out)
     assert document["scene"]["source"] == "liquid_ring_paper.toml"
@@ -26,7 +26,7 @@ def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str], tmp_path
 
 @pytest.mark.parametrize("name", ["liquid_ring_paper", "silicone_oil_100cst"])
 def test_tables_show_what_matters(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert calibrate(bundled_scene(name)) == 0
+    assert run_command("calibrate", scene=bundled_scene(name)) == 0
     shown = capsys.readouterr().out
     for word in (
         "lambda",
@@ -49,7 +49,7 @@ def test_no_interval_is_finer_than_inputs_that_nobody_stated(
     parts = re.split(r"(?m)^(?=\[(?:uncertainty|run)\])", stated)
     unstated = tmp_path / "unstated.toml"
     unstated.write_text(parts[0] + parts[2], encoding="utf-8")
-    assert calibrate(unstated) == 0
+    assert run_command("calibrate", scene=unstated) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "the scene states no uncertainty of its inputs" in shown
     assert "volume of a chamber 67.69 ml" in shown
@@ -61,4 +61,4 @@ def test_no_interval_is_finer_than_inputs_that_nobody_stated(
 
 def test_a_missing_scene_is_a_fault_not_a_traceback(tmp_path: Path) -> None:
     with pytest.raises(SceneError):
-        calibrate(tmp_path / "none.toml")
+        run_command("calibrate", scene=tmp_path / "none.toml")

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ringbalance.reports.cli import plot
 from ringbalance.reports.pictures.draw import PICTURE, THEMES
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.process import _start_drawing, _write_fields
+from ringbalance.running import run_command
 from ringbalance.scene import Scene, bundled_scene
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -25,7 +25,7 @@ needs_opengl = pytest.mark.skipif(not OPENGL.available, reason=OPENGL.text)
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The pictures of the six-chamber disc, through the command."""
     out = tmp_path_factory.mktemp("plot") / "out"
-    assert plot(bundled_scene("six_chamber"), out=out) == 0
+    assert run_command("plot", scene=bundled_scene("six_chamber"), out=out) == 0
     return out
 
 
@@ -87,7 +87,7 @@ def test_plot_without_opengl_writes_the_fields(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("ringbalance.reports.pictures.process.find_opengl", lambda: NO_OPENGL)
-    assert plot(bundled_scene("liquid_ring_paper"), out=tmp_path / "out") == 1
+    assert run_command("plot", scene=bundled_scene("liquid_ring_paper"), out=tmp_path / "out") == 1
     assert "no OpenGL here" in capsys.readouterr().err.replace("\n", " ")
     assert len(list((tmp_path / "out" / "fields").glob("*.vtu"))) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["out"]

@@ -14,9 +14,9 @@ import pytest
 from check_traces import apart, traces, untrue
 from keep_evidence import kept_document
 
+from ringbalance import reporting
 from ringbalance.controller.judging import tune
 from ringbalance.controller.judging.judge import judged, judged_all
-from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
@@ -26,6 +26,7 @@ from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases
 from ringbalance.reports.sections import CASES_VIEW, views_of
+from ringbalance.running import run_command
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.case import CaseDefinition
@@ -298,8 +299,8 @@ def test_exit_codes(
         for case in whole["verification"]
     ]
     finished = Report(page=tmp_path / "report.html", evidence=whole | {"verification": cases})
-    monkeypatch.setattr(cli, "write_report", lambda *_, **__: finished)
-    assert cli.report(bundled_scene("liquid_ring_paper"), out=tmp_path) == code
+    monkeypatch.setattr(reporting, "write_scene_report", lambda *_, **__: finished)
+    assert run_command("report", scene=bundled_scene("liquid_ring_paper"), out=tmp_path) == code
     told = capsys.readouterr()
     assert told.out.strip() == str(finished.page)
     assert "claims of the liquid-ring paper" in told.err
@@ -308,7 +309,7 @@ def test_exit_codes(
 def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("[disc]\n")
     with pytest.raises(SceneError):
-        cli.report(tmp_path / "bad.toml", out=tmp_path / "out")
+        run_command("report", scene=tmp_path / "bad.toml", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -14,7 +14,7 @@ import pytest
 import ringbalance
 from ringbalance.cli import main
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reports.simulate_cli import simulate
+from ringbalance.running import run_command
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -34,7 +34,7 @@ def changed(scene_file: Path, tmp_path: Path, old: str, new: str) -> Path:
 
 
 def document(path: Path, capsys: pytest.CaptureFixture[str], **options: Any) -> tuple[int, dict[str, Any]]:
-    code = simulate(path, json=True, **options)
+    code = run_command("simulate", scene=path, json=True, **options)
     printed = capsys.readouterr()
     assert code in (0, 1), printed.err
     return code, json.loads(printed.out)
@@ -114,7 +114,7 @@ def test_a_law_of_another_disc_is_refused(
     saved = paper_law(paper_scene).save(tmp_path / "law.json")
     scene_file = changed(scene_file, tmp_path, "initial_fill = 0.25", "# initial_fill = 0.25")
     with pytest.raises(SceneError, match=rf"\[disc\] {key}"):
-        simulate(changed(scene_file, tmp_path, old, new), law=str(saved))
+        run_command("simulate", scene=changed(scene_file, tmp_path, old, new), law=str(saved))
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

@@ -11,8 +11,8 @@ from ball_balancer.scene_keys import EXAMPLE
 from check_traces import traces, untrue
 from report_texts import page_text
 
-from ringbalance.reports.cli import report
 from ringbalance.reports.report import write_report
+from ringbalance.running import run_command
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.registry import register
 
@@ -44,4 +44,4 @@ def test_a_third_balancer_is_reported(balls: Path) -> None:
 
 def test_its_exit_code_says_whether_it_settles(tmp_path: Path) -> None:
     (tmp_path / "balls.toml").write_bytes(EXAMPLE)
-    assert report(tmp_path / "balls.toml", out=tmp_path / "out") == 0
+    assert run_command("report", scene=tmp_path / "balls.toml", out=tmp_path / "out") == 0

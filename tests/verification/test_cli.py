@@ -10,16 +10,17 @@ from typing import Any
 import pytest
 
 from ringbalance.cli import main
+from ringbalance.running import run_command
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.cli import _exit_code, _print_results, verify
+from ringbalance.verification.command import _exit_code, _print_results
 from ringbalance.verification.evidence import Found
 from ringbalance.verification.runner import run_definition
 
 
 def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str]) -> None:
-    assert verify("gci_celik2008", "claim_12_correction_mass", json=True) == 0
+    assert run_command("verify", case_ids=("gci_celik2008", "claim_12_correction_mass"), json=True) == 0
     printed = capsys.readouterr()
     document = json.loads(printed.out)
     assert [case["id"] for case in document] == ["gci_celik2008", "claim_12_correction_mass"]
@@ -28,7 +29,7 @@ def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_table_says_verdict_and_consequence(capsys: pytest.CaptureFixture[str]) -> None:
-    assert verify("claim_12_correction_mass", mutations=True) == 0
+    assert run_command("verify", case_ids=("claim_12_correction_mass",), mutations=True) == 0
     words = " ".join(capsys.readouterr().out.split())
     assert "claim_12_correction_mass claim 12 refuted" in words
     assert "Read 72 mm per transferred mass" in words
@@ -37,12 +38,12 @@ def test_the_table_says_verdict_and_consequence(capsys: pytest.CaptureFixture[st
 
 
 def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert verify(list_=True, json=True) == 0
+    assert run_command("verify", list_=True, json=True) == 0
     listed = json.loads(capsys.readouterr().out)
     for paper, last in (("liquid_ring", 23), ("eccentric_mass", 10)):
         numbers = [case["number"] for case in listed if case["number"] and case["paper"] == paper]
         assert numbers == list(range(1, last + 1))
-    assert verify(list_=True) == 0
+    assert run_command("verify", list_=True) == 0
     assert "claim_20_rectangular_element" in capsys.readouterr().out
 
 
@@ -58,7 +59,7 @@ def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_unknown_case_is_bad_input(
     capsys: pytest.CaptureFixture[str], asked: str, meant: str | None
 ) -> None:
-    assert verify(asked) == 2
+    assert run_command("verify", case_ids=(asked,)) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert f'unknown case "{asked}"' in printed.err
@@ -70,7 +71,7 @@ def test_a_scene_that_is_none_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "disc.toml"
     path.write_text("name = 3")
     with pytest.raises(SceneError):
-        verify("claim_20_rectangular_element", scene=path)
+        run_command("verify", case_ids=("claim_20_rectangular_element",), scene=path)
 
 
 def test_only_code_verification_and_missed_defects_fail_the_run(
@@ -130,7 +131,7 @@ def test_a_file_of_measurements_is_predicted_and_judged(
     code, out, err = _judged(path, rows.replace(",51,", ",80,"), capsys)
     assert code == 0, err
     assert json.loads(out)["verdict"] == "refuted"
-    assert verify(data=path) == 0
+    assert run_command("verify", data=path) == 0
     assert "refuted (rig 4)" in " ".join(capsys.readouterr().out.split())
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ringbalance.verification.cli import verify
+from ringbalance.running import run_command
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "verification-cases.md"
 TEXT = """
@@ -72,7 +72,10 @@ def test_the_documented_case_passes_and_catches_its_mutation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cases = _documented(tmp_path)
-    assert verify("moment_without_plates", cases=cases, mutations=True, json=True) == 0
+    assert (
+        run_command("verify", case_ids=("moment_without_plates",), cases=cases, mutations=True, json=True)
+        == 0
+    )
     (result,) = json.loads(capsys.readouterr().out)
     assert (result["verdict"], result["broken"]) == ("passed", False)
     assert [mutation["verdict"] for mutation in result["mutations"]] == ["failed"]
@@ -81,11 +84,16 @@ def test_the_documented_case_passes_and_catches_its_mutation(
 @pytest.mark.parametrize("which", ["folder of cases", "one case"])
 def test_own_cases_join_the_program_s(folder: Path, capsys: pytest.CaptureFixture[str], which: str) -> None:
     cases = folder if which == "folder of cases" else folder / "good"
-    assert verify("good", "claim_12_correction_mass", cases=cases, mutations=True, json=True) == 0
+    assert (
+        run_command(
+            "verify", case_ids=("good", "claim_12_correction_mass"), cases=cases, mutations=True, json=True
+        )
+        == 0
+    )
     results = json.loads(capsys.readouterr().out)
     assert [result["id"] for result in results] == ["good", "claim_12_correction_mass"]
     assert results[0]["quantities"][0]["value"] == 4
-    assert verify(cases=cases, list_=True, json=True) == 0
+    assert run_command("verify", cases=cases, list_=True, json=True) == 0
     listed = [case["id"] for case in json.loads(capsys.readouterr().out)]
     assert listed[-1] == "good"
     assert len(listed) > 40
@@ -106,7 +114,7 @@ def reference(scene):
 """
     changed = 'scene = {{ "disc.axial_width" = 0.05 }}\nwhat = "one is added"'
     _write(tmp_path, "narrow", code, TEXT.replace('what = "one is added"', changed))
-    assert verify("narrow", cases=tmp_path, mutations=True, json=True) == 0
+    assert run_command("verify", case_ids=("narrow",), cases=tmp_path, mutations=True, json=True) == 0
     (result,) = json.loads(capsys.readouterr().out)
     assert [mutation["verdict"] for mutation in result["mutations"]] == ["failed"]
 
@@ -118,10 +126,10 @@ def test_a_case_that_fails_or_misses_its_mutation_ends_with_one(
     _write(folder, "blind", CODE.replace(' + (defect == "one_more")', ""))
     _write(folder, "broken_down", CODE.replace("2 + 2", "1 / 0"))
     for name in ("false", "broken_down"):
-        assert verify(name, cases=folder) == 1
+        assert run_command("verify", case_ids=(name,), cases=folder) == 1
     assert "ZeroDivisionError" in capsys.readouterr().out
-    assert verify("blind", cases=folder) == 0
-    assert verify("blind", cases=folder, mutations=True) == 1
+    assert run_command("verify", case_ids=("blind",), cases=folder) == 0
+    assert run_command("verify", case_ids=("blind",), cases=folder, mutations=True) == 1
 
 
 @pytest.mark.parametrize(
@@ -146,7 +154,7 @@ def test_wrong_code_is_one_sentence_and_stops_no_other(
     folder: Path, capsys: pytest.CaptureFixture[str], code: str, named: list[str]
 ) -> None:
     _write(folder, "wrong", code)
-    assert verify("wrong", "good", cases=folder, json=True) == 2
+    assert run_command("verify", case_ids=("wrong", "good"), cases=folder, json=True) == 2
     printed = capsys.readouterr()
     assert [(result["id"], result["verdict"]) for result in json.loads(printed.out)] == [("good", "passed")]
     assert len(printed.err.splitlines()) == 1
@@ -168,7 +176,7 @@ def test_a_wrong_text_is_one_sentence_and_stops_no_other(
 ) -> None:
     assert old in TEXT
     _write(folder, "wrong", CODE, TEXT.replace(old, new))
-    assert verify("good", cases=folder) == 2
+    assert run_command("verify", case_ids=("good",), cases=folder) == 2
     printed = capsys.readouterr()
     assert "1 passed" in printed.out
     assert len(printed.err.splitlines()) == 1
@@ -180,7 +188,7 @@ def test_a_case_asked_for_by_name_says_what_is_wrong_with_its_text(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _write(folder, "wrong", CODE, TEXT.replace("limit =", "limt ="))
-    assert verify("wrong", cases=folder) == 2
+    assert run_command("verify", case_ids=("wrong",), cases=folder) == 2
     said = capsys.readouterr().err
     assert "wrong/case.toml" in said
     assert "unknown case" not in said
@@ -188,5 +196,5 @@ def test_a_case_asked_for_by_name_says_what_is_wrong_with_its_text(
 
 def test_a_folder_without_cases_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for place in (tmp_path, tmp_path / "missing"):
-        assert verify("claim_12_correction_mass", cases=place) == 2
+        assert run_command("verify", case_ids=("claim_12_correction_mass",), cases=place) == 2
         assert str(place) in capsys.readouterr().err

@@ -5,11 +5,8 @@ The command `ringbalance extremes` prints the study.
 
 from __future__ import annotations
 
-import json as json_format
-import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -22,16 +19,11 @@ from ringbalance.design.static import content_of
 from ringbalance.design.store import Store
 from ringbalance.design.work import answers, tasks_of
 from ringbalance.results.numbers import number
-from ringbalance.results.result import Cells, Result, Rows, Table, print_rows
+from ringbalance.results.result import Cells, Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.platform.files import staged, write_whole
-from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import AXES, Axis, Point, designed_set
@@ -281,7 +273,7 @@ def find_extremes(
     Raises: SceneError: its chamber is imported.
     Raises: OSError: the folder cannot be written.
     """
-    _check_sector(scene)
+    check_sector(scene)
     content, keywords = content_of(scene), dict(mutation or {})
     store = None if kept is None else Store(folder=kept)
 
@@ -327,7 +319,8 @@ def _sweeps(judge: Callable[[Sequence[Point]], Sequence[Judgement]], size: Size)
     return tuple(sweeps)
 
 
-def _check_sector(scene: Scene) -> None:
+def check_sector(scene: Scene) -> None:
+    """Raises: SceneError: its chamber is imported."""
     if scene.disc.geometry is None:
         return
     fault = Fault(
@@ -339,54 +332,3 @@ def _check_sector(scene: Scene) -> None:
         allowed="a scene that gives the dimensions of its chambers",
     )
     raise SceneError([fault])
-
-
-def extremes(
-    scene: Path,
-    *,
-    json: bool = False,
-    out: Path | None = None,
-    level: Level = "light",
-    workers: int | None = None,
-) -> int:
-    """Find the limits of validity of a scene: where results stop, what is reported beyond, and whether the
-    invariants hold inside.
-
-    Args:
-        scene: the scene file.
-        json: print one JSON document instead of tables.
-        out: also write extremes.json to this folder; an interrupted run with the same folder resumes where it
-            stopped.
-        level: "heavy" judges thousands of points, for an hour or more.
-        workers: processes; default one for each core, at most two.
-
-    Returns:
-        Exit code: 0; 1 when an invariant was violated at some point.
-
-    Raises:
-        SceneError: a scene that cannot be used; nothing is written.
-        OSError: the folder cannot be written.
-    """
-    given = liquid_ring_scene(load_scene(scene))
-    _check_sector(given)
-    with nullcontext() if out is None else staged(out, files=(_FILE,)) as stage:
-        with activity("extremes", "axes") as shown:
-            result = find_extremes(
-                given,
-                size=SIZES[level],
-                workers=min(2, os.cpu_count() or 1) if workers is None else checked_workers(workers),
-                progress=lambda what, done, number: shown.show(
-                    f"{what}: {done} of {number} points", done=done, total=number
-                ),
-                kept=None if out is None else out / _STORE,
-            )
-        text = json_format.dumps(result.to_dict(), allow_nan=False)
-        if stage is not None:
-            write_whole(stage / _FILE, text + "\n")
-    if out is not None:
-        print_message(f"written to {out}")
-    if json:
-        print(text)
-    else:
-        print_rows(result.rows(), headline=False)
-    return 1 if result.broken() else 0

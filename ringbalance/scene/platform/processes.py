@@ -23,7 +23,6 @@ from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
 from weakref import WeakSet
 
-from ringbalance.scene.faults import SceneError
 from ringbalance.scene.platform.memory import COLLECTED_AT
 
 _P = ParamSpec("_P")
@@ -139,16 +138,6 @@ def _result(executor: Executor, future: Future[_R], again: Callable[[], _R]) -> 
             _BROKEN.add(executor)
             _LOG.warning(_WORKER_ENDED)
     return again()
-
-
-def checked_workers(workers: int) -> int:
-    """The number of processes that the option `--workers` asks for. Raises: SceneError: below one."""
-    if workers < 1:
-        problem = "there is no process to work"
-        raise SceneError.of_option(
-            option="--workers", value=workers, problem=problem, allowed="a whole number of at least 1"
-        )
-    return workers
 
 
 @contextmanager

@@ -1,0 +1,353 @@
+"""The commands and their options, each declared once: for the shell, its `--help`, and the checks of values.
+
+Nothing is imported here that takes time, so that `--help` loads nothing from numpy down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from inspect import Parameter, cleandoc
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
+
+EXAMPLE_SCENES: Final = ("my_disc.toml", "other_disc.toml")
+REQUIRED: Final = Parameter.empty
+
+
+class Limits(NamedTuple):
+    """Whole numbers that an option takes, and the sentence about others."""
+
+    least: int
+    problem: str
+    allowed: str
+    most: int = 2**63 - 1
+
+
+class Option(NamedTuple):
+    """An option or an argument of a command."""
+
+    hint: Any
+    default: Any = None
+    text: str = ""
+    """Its line in `--help`; empty: it stands in the command's text."""
+    kind: Any = Parameter.KEYWORD_ONLY
+    limits: Limits | None = None
+    ending: str | None = None
+    """Ending of the name of a file that the command writes; empty: any; None: no such file."""
+    parsing: Mapping[str, Any] = {}
+    """Further arguments of `cyclopts.Parameter`."""
+
+
+class Command(NamedTuple):
+    """A command as its `--help` shows it, and the function that does its work."""
+
+    text: str
+    """Summary, and a line in `--help` for each of its own options."""
+    target: str
+    """Module and function: one that returns the exit code, or with `begin` one of the Python interface, which
+    gets the scene, and whose result is printed."""
+    options: Mapping[str, Option]
+    """By names of the target's arguments."""
+    example: str = ""
+    """Arguments; SCENE stands for a scene file."""
+    failure: str = ""
+    """Condition of exit code 1; empty: never given."""
+    begin: str = ""
+    """First text of the progress."""
+    headline: bool = True
+    """See `Rows.view`."""
+
+    @property
+    def summary(self) -> str:
+        """First sentence of its help."""
+        return " ".join(cleandoc(self.text).partition("\n\n")[0].split())
+
+    def epilogue(self, name: str) -> str:
+        """An example, the exit codes, and the page with the rest."""
+        example = " ".join(("ringbalance", name, self.example.replace("SCENE", EXAMPLE_SCENES[0]))).strip()
+        failed = f"1 {self.failure}; " if self.failure else ""
+        return (
+            f"Example: {example}\n\n"
+            f"Exit codes: 0 done; {failed}2 bad input, or output that cannot be written; 130 interrupted; "
+            "141 the reader of standard output went away.\n\n"
+            f"All options, files and JSON keys: docs/commands.md"
+        )
+
+
+_AT_LEAST_0: Final = Limits(0, "it is negative", "0 or more")
+_AT_LEAST_1: Final = Limits(1, "there is no process to work", "a whole number of at least 1")
+_GRID: Final = Limits(2, "no grid has so many points on an axis", "2 to 1001", 1001)
+_SEEDS: Final = Limits(0, "out of range", "a whole number from 0 to 2^63 - 1")
+_FLAG: Final = Option(bool, False)
+_PATH: Final = Option(Path | None)
+_TEXT: Final = Option(str | None)
+_ARGUMENT: Final = Option(Path, REQUIRED, kind=Parameter.POSITIONAL_OR_KEYWORD)
+_EFFORT: Final = Literal["light", "heavy"]
+_OPTIONS: Final = {
+    "scene": _ARGUMENT._replace(text="the scene file."),
+    **dict.fromkeys(("first", "second"), _ARGUMENT),
+    "case_ids": Option(str, (), kind=Parameter.VAR_POSITIONAL),
+    "json": _FLAG._replace(text="print one JSON document instead of tables."),
+    "out": Option(Path, Path("out")),
+    "save": Option(Path | None, ending=""),
+    "csv": Option(Path | None, ending=".csv"),
+    "plot": Option(Path | None, ending=".svg"),
+    "level": Option(_EFFORT, "light"),
+    "workers": Option(int | None, None, "processes; default one for each processor.", limits=_AT_LEAST_1),
+    "tolerance": _TEXT._replace(text='in place of the scene\'s, such as "0.5 %" or 0.005.'),
+    "models": Option(
+        Literal["finest"] | None,
+        text='"finest" takes the finest of all that is expensive, as at a tolerance of zero.',
+    ),
+    "law": Option(
+        str,
+        "calibrated",
+        'of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.',
+    ),
+    "rotor": Option(Literal["first", "second"] | None),
+    "seed": Option(int | None, limits=_SEEDS),
+    "remedies": Option(bool | None, parsing={"negative": "--no-remedies"}),
+    "to": Option(Literal["c", "st", "csv", "python", "fmi2", "fmi3"], REQUIRED),
+    "block": Option(Literal["law", "disc", "controller"], "law"),
+    "name": Option(str, ""),
+    "points": Option(int | None, limits=_GRID),
+    "vary": Option(list[str] | None, parsing={"consume_multiple": 1}),
+    "sample": Option(str, ""),
+    "runs": Option(int, 0, limits=_AT_LEAST_0),
+    "check": Option(int, 3, limits=_AT_LEAST_0),
+    "write": Option(list[int] | None, parsing={"consume_multiple": 1}),
+    "loss": Option(Literal["linear", "soft_l1"], "linear"),
+    **dict.fromkeys(("parameters", "next", "template"), _TEXT),
+    **dict.fromkeys(("plan", "cases", "data"), _PATH),
+    **dict.fromkeys(("pressure", "all_systems", "no_intervals", "no_figures", "list_", "mutations"), _FLAG),
+}
+"""By name; one name means the same in every command, up to a default."""
+
+
+def _options(names: str, **others: Option) -> dict[str, Option]:
+    """Options by their names, in the order of `--help`."""
+    return {name: others.get(name, _OPTIONS[name]) for name in names.split()}
+
+
+COMMANDS: Final[dict[str, Command]] = {
+    "report": Command(
+        """Verify, calibrate, simulate and draw: everything, into a report and its annex.
+
+        Args:
+            out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
+            level: "heavy" also runs the cases that take long.
+        """,
+        "ringbalance.reporting:report",
+        _options("scene out level tolerance models"),
+        "SCENE --out out",
+        "a check of the program failed (what becomes of the scene's requirements does not count)",
+    ),
+    "calibrate": Command(
+        """lambda, k and the flow law of a disc, with uncertainties.
+
+        Args:
+            save: also write the flow law to this file, for `simulate --law`.
+        """,
+        "ringbalance.calibration:calibrate",
+        _options("scene json save tolerance models"),
+        "SCENE --save law.json",
+        begin="pressure and moment over the fill range, losses of the tube ...",
+        headline=False,
+    ),
+    "simulate": Command(
+        """One closed-loop balancing run.
+
+        Args:
+            csv: also write every instant of the run to this file, a column for each quantity with its unit.
+            plot: also draw the run's figures on one sheet, an SVG file.
+            seed: of all random numbers, in place of the scene's.
+        """,
+        "ringbalance.face:simulate_file",
+        _options("scene law json csv plot seed tolerance models"),
+        "SCENE --plot run.svg",
+        "the run did not settle, or misses what the scene requires",
+    ),
+    "tune": Command(
+        """Settings of the controller chosen by runs of drawn devices, and the fraction that they serve.
+
+        Args:
+            pressure: search the gas pressure of a liquid ring even where the scene's meets what is required.
+            remedies: try valves that can be bought, too, for a scene that gives none. Default: where what is
+                required is not met, changes of the scene; --no-remedies tries nothing but settings.
+            save: write the scene with the recommended settings.
+        """,
+        "ringbalance.face:tune",
+        _options("scene law json pressure remedies save tolerance models"),
+        "SCENE --save tuned.toml",
+        "what the scene requires is not met with the best settings, or it is undecided",
+        begin="runs ...",
+    ),
+    "export": Command(
+        """The flow law for another program: C, FMI, structured text, a Python module, a table.
+
+        Args:
+            to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
+                text), python (a module that imports nothing of others), or csv (a grid).
+            block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
+                and the rotor's vibration), or controller (the scene's algorithm with its settings).
+            out: folder for the files.
+            name: of files and functions; default that of the scene.
+            points: of each axis of the grid of csv, 2 to 1001; default 41.
+            all_systems: units with libraries for Linux, macOS and Windows; needs the extra export-all.
+        """,
+        "ringbalance.export.command:export",
+        _options("scene to block out name points all_systems"),
+        "SCENE --to c --out law",
+    ),
+    "sweep": Command(
+        """Many designs: a row of answers for every point of a grid or a sample.
+
+        Args:
+            out: folder for table.csv, sweep.json, figures, and the answers that are kept.
+            vary: axes, such as tube.bore=0.5mm:2mm:30, gas.pressure=0.4MPa,0.7MPa or gas=valves.csv.
+            plan: a TOML file with vary and sample instead.
+            sample: sobol:N or latin:N points of the axes' ranges instead of every combination.
+            runs: drawn devices that every point is run as in closed loop at most, fewer where they decide; 0
+                for static answers alone.
+            no_intervals: leave out what the uncertain inputs do to static answers: most of their time.
+            check: rows of a liquid ring to calibrate, which measures what the array core leaves out.
+            no_figures: draw none.
+            write: rows whose scenes to write.
+            tolerance: in place of the scene's, such as "0.5 %" or 0.005: rows that err by more are named.
+        """,
+        "ringbalance.designs:sweep_file",
+        _options(
+            "scene out vary plan sample runs no_intervals check workers no_figures write tolerance json",
+            out=Option(Path, REQUIRED),
+        ),
+        "SCENE --vary tube.bore=0.5mm:2mm:30 --out sweep",
+    ),
+    "design": Command(
+        """The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.
+
+        Args:
+            scene: the scene file, with [requirement] and [design].
+            save: write the scene as designed, with its settings.
+        """,
+        "ringbalance.search:find_design",
+        _options("scene save workers json"),
+        "SCENE --save designed.toml",
+        "no design meets what the scene requires, or it is undecided",
+        begin="designs ...",
+    ),
+    "fit": Command(
+        """Parameters of a built disc from measurements, with intervals and what the data identify.
+
+        Args:
+            scene: the scene file of the disc as it was designed.
+            data: files of measurements (docs/fit.md), one kind in each.
+            parameters: names with commas between, such as "bore,extra_loss"; default those that the kinds of
+                data tell most about.
+            loss: "soft_l1" counts outliers less, and says which rows they are.
+            next: the parameter for which to say what to measure next; default the one that the data identify
+                least.
+            save: also write the fitted scene to this file, for all other commands.
+            plot: also draw the data against the fit on one sheet, an SVG file.
+            template: print an empty file of measurements of this kind, with explanations, and do nothing
+                else.
+        """,
+        "ringbalance.fitting:fit_files",
+        _options(
+            "scene data parameters loss next save plot json template",
+            scene=Option(Path | None, kind=Parameter.POSITIONAL_OR_KEYWORD),
+            data=Option(Path, (), kind=Parameter.VAR_POSITIONAL),
+            save=_PATH,
+        ),
+        "SCENE rig.csv --save fitted.toml",
+        "the fit does not describe its data",
+    ),
+    "verify": Command(
+        """The verification cases and the paper's claims, judged.
+
+        Args:
+            case_ids: ids of the cases; none for all.
+            cases: a folder with cases of your own (docs/verification-cases.md), which join the program's.
+            scene: scene file; default the liquid-ring paper's disc.
+            list_: name the cases and run none.
+            mutations: also build in each case's mutations, which must change its verdict.
+            level: "heavy" runs the cases that take long too.
+            workers: processes to spread the cases over.
+            data: a file of measurements (docs/measurements.md), predicted and judged instead of the cases.
+            json: print one JSON document instead of a table.
+        """,
+        "ringbalance.verification.command:verify",
+        _options(
+            "case_ids cases scene list_ mutations level json workers data",
+            scene=_PATH,
+            workers=Option(int, 1, limits=_AT_LEAST_1),
+        ),
+        "gci_celik2008 --mutations",
+        "a code verification failed, or a mutation was not noticed",
+    ),
+    "compare": Command(
+        """Two balancers on one rotor, side by side.
+
+        Args:
+            first: a scene file.
+            second: another scene file; the order does not matter.
+            rotor: "first" or "second", the scene whose rotor, vibration sensor and limit hold for both;
+                needed where the two scenes describe different rotors.
+            tolerance: in place of that of both scenes, such as "0.5 %" or 0.005.
+            json: print one JSON document instead of a table.
+        """,
+        "ringbalance.face:compare_under",
+        _options("first second law rotor json tolerance models"),
+        "SCENE other_disc.toml",
+        "one of the two does not settle the fraction of devices that is asked for, or it is undecided",
+        begin="both balancers on one rotor ...",
+        headline=False,
+    ),
+    "trade": Command(
+        """Speed against accuracy: designs a second and error of every model.
+
+        Args:
+            out: also write the document to trade.json in this folder.
+            level: "light" leaves out the meshes in three dimensions.
+        """,
+        "ringbalance.studies:trade_file",
+        _options("scene json out level tolerance models", out=_PATH, level=Option(_EFFORT, "heavy")),
+        "SCENE --level light",
+    ),
+    "extremes": Command(
+        """Limits of validity: where results stop, what is reported beyond, and whether the invariants hold
+        inside.
+
+        Args:
+            out: also write extremes.json to this folder; an interrupted run with the same folder resumes
+                where it stopped.
+            level: "heavy" judges thousands of points, for an hour or more.
+            workers: processes; default one for each core, at most two.
+        """,
+        "ringbalance.studies:extremes_file",
+        _options("scene json out level workers", out=_PATH),
+        "SCENE --out extremes",
+        "an invariant does not hold",
+    ),
+    "plot": Command(
+        """The off-screen 3-D pictures alone.
+
+        Args:
+            out: folder for figures/*.png and fields/*.vtu.
+        """,
+        "ringbalance.reporting:plot_file",
+        _options("scene out"),
+        "SCENE --out pictures",
+        "this machine cannot draw; the fields are written",
+    ),
+    "doctor": Command(
+        """What this machine gives the program, and what to do where something lacks.
+
+        Args:
+            json: print one JSON document instead of a table.
+        """,
+        "ringbalance.doctor:doctor",
+        _options("json"),
+        failure="something is broken",
+    ),
+}
+"""By name."""

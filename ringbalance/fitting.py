@@ -1,0 +1,168 @@
+"""Fits of a built disc to measurements, for Python and as a command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from os import PathLike
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Final
+
+from ringbalance.identification.criticism import Review
+from ringbalance.identification.documents import fit_document, fit_rows
+from ringbalance.identification.fitting import FitResult, FittedParameter, Loss, problem_of
+from ringbalance.identification.fitting import fit as fit_scene
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
+from ringbalance.identification.parameters import FitError
+from ringbalance.identification.reading import read_observations
+from ringbalance.identification.reading import template as template_of
+from ringbalance.identification.saving import save_result
+from ringbalance.results.result import Result, Rows
+from ringbalance.running import checked, print_result
+from ringbalance.scene import AnyScene, SceneError, load_scene
+from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.platform.files import check_file
+from ringbalance.scene.platform.terminal import activity, print_message
+
+_USAGE: Final = (
+    "ringbalance fit SCENE DATA.csv [DATA.csv ...], for example ringbalance fit my_disc.toml injections.csv; "
+    "ringbalance fit --template KIND prints an empty file of measurements"
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Fit(Result):
+    """A fit with the tests of its residuals and the measurement that would help most.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> data = rb.bundled_scene("liquid_ring_paper").parent / "measurements" / "trial_weight.csv"
+        >>> print(rb.fit(scene, data))
+        Pan's liquid-ring disc (liquid_ring_paper.toml), fitted to 7 measurements
+          influence_coefficient (0.011226 ± 0.000060) um/(g mm)
+          lag_angle (19.25 ± 0.31)°
+          nothing in the residuals speaks against the fit (4 tests, 5 % level)
+    """
+
+    result: FitResult
+    data: tuple[Observations, ...]
+    review: Review
+    next_measurement: NextMeasurement
+
+    @property
+    def parameters(self) -> tuple[FittedParameter, ...]:
+        """Each with its value and its interval (95 %), SI, and whether the data identify it."""
+        return self.result.parameters
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the fit describes the data, as they are read."""
+        return self.review.describes
+
+    def to_dict(self) -> dict[str, Any]:
+        """What `ringbalance fit --json` prints."""
+        return fit_document(
+            self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
+        )
+
+    def rows(self) -> Rows:
+        """Each parameter, whether the fit describes the data, and what else they say."""
+        return fit_rows(
+            self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
+        )
+
+
+@checked
+def fit(
+    scene: AnyScene,
+    data: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    parameters: Sequence[str] | None = None,
+    loss: Loss = "linear",
+    next: str | None = None,
+) -> Fit:
+    """Fit parameters of a built disc to files of measurements, with intervals and what the data identify.
+
+    Args: `data`: one file or several, one kind of measurement in each. `parameters`: names; default those
+        that the kinds of data inform. `loss`: "soft_l1" counts outliers less. `next`: the parameter for which
+        to find the next measurement; default the one that the data identify least.
+    Raises: SceneError: a scene, a file or a parameter that cannot be used.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> data = rb.bundled_scene("liquid_ring_paper").parent / "measurements" / "trial_weight.csv"
+        >>> [parameter.name for parameter in rb.fit(scene, data).parameters]
+        ['influence_coefficient', 'lag_angle']
+    """
+    files = [data] if isinstance(data, str | PathLike) else data
+    return _fit(scene, [Path(each) for each in files], parameters, loss, next)
+
+
+def _fit(
+    scene: AnyScene,
+    files: Sequence[Path],
+    parameters: Sequence[str] | None,
+    loss: Loss,
+    next: str | None,
+    option: str = "next",
+) -> Fit:
+    """Read, fit, judge and look ahead. Args: `option`: name of `next` in a message."""
+    observations = read_observations(files, scene=scene)
+    try:
+        names = [each.name for each in problem_of(scene, observations, parameters).parameters]
+        if next is not None and next not in names:
+            problem, allowed = f"this parameter is not fitted{did_you_mean(next, names)}", ", ".join(names)
+            raise SceneError.of_option(option=option, value=next, problem=problem, allowed=allowed)
+        result = fit_scene(scene, data=observations, parameters=parameters, loss=loss)
+    except FitError as error:
+        raise SceneError.of_file(scene.file, str(error)) from error
+    return Fit(
+        result=result,
+        data=observations,
+        review=Review.of(result),
+        next_measurement=next_measurement(result, next),
+    )
+
+
+def fit_files(options: SimpleNamespace) -> int:
+    """Run the command `fit`. Returns: Exit code: 1 when the fit does not describe its data."""
+    if options.template is not None:
+        print(template_of(options.template), end="")
+        return 0
+    if options.scene is None or not options.data:
+        raise SceneError.of_file(
+            "command line", f"{'DATA' if options.scene else 'SCENE'} is missing: {_USAGE}"
+        )
+    for written, read in product((options.plot, options.save), (options.scene, *options.data)):
+        if written and written.exists() and read.exists() and written.samefile(read):
+            problem = "the fitted scene would replace a file that is read here"
+            raise SceneError.of_option(
+                option="--save", value=str(written), problem=problem, allowed="another file"
+            )
+    if options.save is not None:
+        check_file(options.save)
+    if options.scene.suffix.lower() == ".csv":
+        problem = "this looks like a file of measurements, and the scene comes first"
+        raise SceneError.of_file(str(options.scene), f"{problem}: {_USAGE}")
+    given, names = load_scene(options.scene), None
+    if options.parameters is not None:
+        names = [name.strip() for name in options.parameters.split(",")]
+        if not all(names) or len(set(names)) < len(names):
+            problem = "it is not a list of different names with commas between"
+            allowed = 'such as "bore,extra_loss"'
+            raise SceneError.of_option(
+                option="--parameters", value=options.parameters, problem=problem, allowed=allowed
+            )
+    with activity("fit", "several starts, profiles of the likelihood ..."):
+        result = _fit(given, options.data, names, options.loss, options.next, option="--next")
+    print_result(result, json=options.json, headline=False)
+    if options.save is not None:
+        said = result.review.text
+        save_result(options.save, scene=given, result=result.result, data=result.data, said=said)
+        print_message(f"fitted scene written to {options.save}")
+    if options.plot is not None:
+        result.plot(options.plot)
+    return 0 if result.succeeded else 1

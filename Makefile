@@ -5,17 +5,27 @@ PYTHON_IN_VENV := $(VENV)/bin/python
 SCENE ?= scenes/liquid_ring_paper.toml
 OUT ?= out
 WORKERS ?= 2
-# What differs between Python versions shows here; a minute or so, for `make test-versions`.
+# Syntax and libraries of a Python between the oldest and the newest; a minute or so, for `make test-versions`.
 SHORT_TESTS := tests/scene tests/mesh tests/architecture tests/test_public_names.py tests/test_cli.py \
 	tests/physics/test_pressure.py tests/physics/test_tube_loss.py tests/reduced_model/test_paper_law.py \
 	tests/reduced_model/test_table.py tests/controller/test_loop.py tests/controller/test_compiled.py
+# What may differ with Python, NumPy or SciPy: files, processes, pickles and printed examples; solves, roots,
+# splines, linear algebra and compiled code.  What has failed under one version alone so far is among them or
+# a matter of types; fits, searches, judged devices and pages are this program's own code over all that.
+NUMBER_TESTS := tests/architecture tests/scene tests/results tests/mesh tests/physics tests/verification \
+	tests/test_cli.py tests/test_public_names.py tests/test_examples.py tests/test_python_interface.py \
+	tests/test_signals.py tests/export/test_fmu.py tests/export/test_compact.py tests/export/test_cli.py \
+	tests/reduced_model/test_paper_law.py tests/reduced_model/test_table.py \
+	tests/reduced_model/test_calibrated_law.py tests/reduced_model/test_calibration.py \
+	tests/controller/test_loop.py tests/controller/test_compiled.py tests/controller/test_linear_loop.py \
+	tests/identification/test_fit.py tests/design/test_sweep.py tests/reports/test_golden.py
 CODE := ringbalance mesh reduced_model verification reports tools benchmarks
 # One thread per process: the tests run side by side, and sums then come out the same on every machine.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-units test-versions lint style format bench bench-cfd pages docs dist lock clean
+.PHONY: help env report test test-numbers test-faults test-heavy test-short test-units test-versions lint style format bench bench-cfd pages docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -33,8 +43,11 @@ test: style ## lint, types and every test but the heavy ones and the faults
 	@# mypy takes a minute of one processor: beside the tests, not before them.
 	@mkdir -p build
 	@$(VENV)/bin/mypy >build/types.txt 2>&1 & types=$$!; \
-	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS); tests=$$?; \
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) $(TESTS); tests=$$?; \
 	wait $$types || { cat build/types.txt; exit 1; }; exit $$tests
+
+test-numbers: TESTS := $(NUMBER_TESTS)
+test-numbers: test ## lint, types and the tests of what may differ between versions of Python, NumPy and SciPy
 
 test-faults: env ## kills, damaged caches, odd environments: a few minutes, part of .ci/run
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults

@@ -1,13 +1,13 @@
-"""Runs the tests under every further supported Python of this machine: the oldest and the newest whole.
+"""Runs tests under every further supported Python of this machine.
 
     .venv/bin/python tools/other_pythons.py
 
 Supported are the versions that pyproject.toml's classifiers name.  Python is looked for as `python3.X` on
 the search path and among the versions of pyenv; one that does not start, or has no venv, does not count.
 The Python that runs this is left out, since `make test` has used it.  Of the others, the oldest and the
-newest that this machine has run `make test`, those between `make test-short`: their packages are the newest's
-(requirements/lock.txt), types included.  Pages are run by `make docs`, and under another Python by
-`make pages VENV=.venv-3.13`.  Each has an environment, `.venv-3.X`.
+newest that this machine has run `make test-numbers`, types included; those between, whose packages are those
+of the newest (requirements/lock.txt), `make test-short`.  Each has an environment, `.venv-3.X`.  Before a
+release, `make test pages VENV=.venv-3.13` runs everything under another Python.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def main() -> int:
     here = [version for version in versions if version == running or others[version]]
     for version, python in others.items():
         if python is not None:
-            target = "test" if version in (here[0], here[-1]) else "test-short"
+            target = "test-numbers" if version in (here[0], here[-1]) else "test-short"
             command = ["make", target, f"VENV=.venv-{version}", f"PYTHON={python}"]
             code = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
             if code != 0:

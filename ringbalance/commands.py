@@ -94,10 +94,8 @@ _OPTIONS: Final = {
     "plot": Option(Path | None, ending=".svg"),
     "level": Option(_EFFORT, "light"),
     "workers": Option(int | None, None, "processes; default one for each processor.", limits=_AT_LEAST_1),
-    "tolerance": _TEXT._replace(text='in place of the scene\'s, such as "0.5 %" or 0.005.'),
-    "models": Option(
-        Literal["finest"] | None,
-        text='"finest" takes the finest of all that is expensive, as at a tolerance of zero.',
+    "tolerance": _TEXT._replace(
+        text='in place of the scene\'s, such as "0.5 %" or 0.005; 0: the finest of all that is expensive.'
     ),
     "law": Option(
         str,
@@ -138,7 +136,7 @@ COMMANDS: Final[dict[str, Command]] = {
             level: "heavy" also runs the cases that take long.
         """,
         "ringbalance.reporting:report",
-        _options("scene out level tolerance models"),
+        _options("scene out level tolerance"),
         "SCENE --out out",
         "a check of the program failed (what becomes of the scene's requirements does not count)",
     ),
@@ -149,7 +147,7 @@ COMMANDS: Final[dict[str, Command]] = {
             save: also write the flow law to this file, for `simulate --law`.
         """,
         "ringbalance.calibration:calibrate",
-        _options("scene json save tolerance models"),
+        _options("scene json save tolerance"),
         "SCENE --save law.json",
         begin="pressure and moment over the fill range, losses of the tube ...",
         headline=False,
@@ -163,7 +161,7 @@ COMMANDS: Final[dict[str, Command]] = {
             seed: of all random numbers, in place of the scene's.
         """,
         "ringbalance.face:simulate_file",
-        _options("scene law json csv plot seed tolerance models"),
+        _options("scene law json csv plot seed tolerance"),
         "SCENE --plot run.svg",
         "the run did not settle, or misses what the scene requires",
     ),
@@ -177,7 +175,7 @@ COMMANDS: Final[dict[str, Command]] = {
             save: write the scene with the recommended settings.
         """,
         "ringbalance.face:tune",
-        _options("scene law json pressure remedies save tolerance models"),
+        _options("scene law json pressure remedies save tolerance"),
         "SCENE --save tuned.toml",
         "what the scene requires is not met with the best settings, or it is undecided",
         begin="runs ...",
@@ -292,11 +290,12 @@ COMMANDS: Final[dict[str, Command]] = {
             second: another scene file; the order does not matter.
             rotor: "first" or "second", the scene whose rotor, vibration sensor and limit hold for both;
                 needed where the two scenes describe different rotors.
-            tolerance: in place of that of both scenes, such as "0.5 %" or 0.005.
+            tolerance: in place of that of both scenes, such as "0.5 %" or 0.005; 0: the finest of all
+                that is expensive.
             json: print one JSON document instead of a table.
         """,
         "ringbalance.face:compare_under",
-        _options("first second law rotor json tolerance models"),
+        _options("first second law rotor json tolerance"),
         "SCENE other_disc.toml",
         "one of the two does not settle the fraction of devices that is asked for, or it is undecided",
         begin="both balancers on one rotor ...",
@@ -310,7 +309,7 @@ COMMANDS: Final[dict[str, Command]] = {
             level: "light" leaves out the meshes in three dimensions.
         """,
         "ringbalance.studies:trade_file",
-        _options("scene json out level tolerance models", out=_PATH, level=Option(_EFFORT, "heavy")),
+        _options("scene json out level tolerance", out=_PATH, level=Option(_EFFORT, "heavy")),
         "SCENE --level light",
     ),
     "extremes": Command(

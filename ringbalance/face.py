@@ -111,7 +111,7 @@ def simulate(
 
 def simulate_file(options: SimpleNamespace) -> int:
     """Run the command `simulate`. Returns: Exit code: 0 settled, with all that the scene requires."""
-    given = opened(options.scene, options.tolerance, options.models)
+    given = opened(options.scene, options.tolerance)
     if options.seed is not None:
         given = replace(given, run=replace(given.run, seed=options.seed))
     balancer = balancer_of(given, flow_law=law_for(given, options.law))

@@ -85,7 +85,7 @@ def report(options: SimpleNamespace) -> int:
     workers = min(_MOST_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
         finished = write_scene_report(
-            with_tolerance(given, tolerance=options.tolerance, models=options.models),
+            with_tolerance(given, options.tolerance),
             options.out,
             level=options.level,
             scene_text=text,

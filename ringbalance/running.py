@@ -17,7 +17,7 @@ from ringbalance.results.result import Result, print_rows
 from ringbalance.scene.changes import checked_scene, file_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.narrowing import AnyScene, Models, with_tolerance
+from ringbalance.scene.narrowing import AnyScene, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.registry import imported, registered
@@ -59,8 +59,7 @@ def run_command(name: str, /, **given: Any) -> int:
     target = imported(command.target)
     if not command.begin:
         return int(target(SimpleNamespace(**options)))
-    accuracy = {key: options[key] for key in ("tolerance", "models") if key in options}
-    options |= {key: opened(options[key], **accuracy) for key in _SCENES if key in options}
+    options |= {key: opened(options[key], options.get("tolerance")) for key in _SCENES if key in options}
     if options.get("workers", 1) is None:
         options["workers"] = os.cpu_count() or 1
     if "law" in options and "scene" in options:
@@ -103,9 +102,9 @@ def _check_options(declared: Mapping[str, Option], options: Mapping[str, Any]) -
         check_file(value, apart_from=options.get("scene"))
 
 
-def opened(path: Path, tolerance: str | None = None, models: Models | None = None) -> AnyScene:
-    """The scene of a file under the options that decide what is expensive."""
-    return with_tolerance(load_scene(path), tolerance=tolerance, models=models)
+def opened(path: Path, tolerance: str | None) -> AnyScene:
+    """The scene of a file with the tolerance of the option `--tolerance`."""
+    return with_tolerance(load_scene(path), tolerance)
 
 
 def law_for(scene: AnyScene, law: str) -> str | None:

@@ -43,7 +43,7 @@ def trade(
 
 def trade_file(options: SimpleNamespace) -> int:
     """Run the command `trade`."""
-    given = liquid_ring_scene(opened(options.scene, options.tolerance, options.models))
+    given = liquid_ring_scene(opened(options.scene, options.tolerance))
     file = options.out and options.out / "trade.json"
     if file is not None:
         check_file(file)

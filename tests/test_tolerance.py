@@ -1,4 +1,4 @@
-"""The options --tolerance and --models finest: what they decide, and what they refuse."""
+"""The option --tolerance: what it decides, and what it refuses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from ringbalance import cli
 from ringbalance.reduced_model.terms import ModelUsed, models_used
 from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene
-from ringbalance.scene.narrowing import FINEST, with_tolerance
+from ringbalance.scene.narrowing import with_tolerance
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 COMMANDS = (
@@ -39,13 +39,13 @@ def paper() -> Scene:
     ("text", "value"), [("0.5 %", 0.005), ("0.5%", 0.005), ("0.005", 0.005), ("1e-4", 1e-4)]
 )
 def test_a_tolerance_is_a_fraction_or_a_percentage(paper: Scene, text: str, value: float) -> None:
-    assert with_tolerance(paper, tolerance=text) == replace(paper, tolerance=value)
-    assert with_tolerance(paper) is paper
+    assert with_tolerance(paper, text) == replace(paper, tolerance=value)
+    assert with_tolerance(paper, None) is paper
 
 
-def test_finest_is_a_tolerance_of_zero(paper: Scene) -> None:
-    scene = with_tolerance(paper, models="finest")
-    assert scene.tolerance == FINEST == 0
+def test_a_tolerance_of_zero_models_everything(paper: Scene) -> None:
+    scene = with_tolerance(paper, "0")
+    assert scene.tolerance == with_tolerance(paper, "0 %").tolerance == 0
     assert by_term(scene)["gravity, mean over a turn"].modelled
     assert by_term(paper)["gravity, mean over a turn"].modelled
     assert by_term(scene)["surface tension"].model == "not modelled in this version"
@@ -54,10 +54,10 @@ def test_finest_is_a_tolerance_of_zero(paper: Scene) -> None:
     assert not by_term(weightless)["gravity, mean over a turn"].modelled
 
 
-@pytest.mark.parametrize("text", ["0", "1", "5", "-1 %", "nan", "inf", "1 mm", "0,5 %", "", "fine"])
+@pytest.mark.parametrize("text", ["1", "5", "-1 %", "nan", "inf", "1 mm", "0,5 %", "", "fine"])
 def test_other_tolerances_are_refused(paper: Scene, text: str) -> None:
-    with pytest.raises(SceneError, match=r'--tolerance = ".*".*allowed: a fraction above 0 and below 1'):
-        with_tolerance(paper, tolerance=text)
+    with pytest.raises(SceneError, match=r'--tolerance = ".*".*allowed: a fraction below 1'):
+        with_tolerance(paper, text)
 
 
 @pytest.mark.parametrize("words", COMMANDS)
@@ -65,11 +65,10 @@ def test_other_tolerances_are_refused(paper: Scene, text: str) -> None:
     ("options", "message"),
     [
         (("--tolerance", "7"), "--tolerance"),
-        (("--tolerance", "1 %", "--models", "finest"), "one of the two options"),
-        (("--models", "best"), '"finest"'),
+        (("--tolerance", "fine"), "0 takes the finest"),
     ],
 )
-def test_every_command_that_answers_takes_both_options(
+def test_every_command_that_answers_takes_the_option(
     words: tuple[str, ...], options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main([*words, *options]) == 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final, Literal, TypeAlias, TypeVar
+from typing import Final, TypeAlias, TypeVar
 
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
@@ -33,42 +33,30 @@ def liquid_ring_scene(scene: SceneFile) -> Scene:
     return scene_as(Scene, scene)
 
 
-Models = Literal["finest"]
-FINEST: Final = 0.0
-"""Tolerance at which all that is expensive is the finest."""
-ALLOWED: Final = 'a fraction above 0 and below 1, such as 0.005 or "0.5 %"'
+_ALLOWED: Final = 'a fraction below 1, such as 0.005 or "0.5 %"; 0 takes the finest of all that is expensive'
 
 
-def with_tolerance(scene: Kind, *, tolerance: str | None = None, models: Models | None = None) -> Kind:
-    """The scene with another tolerance; the same scene where neither option is given.
+def with_tolerance(scene: Kind, tolerance: str | None) -> Kind:
+    """The scene with the tolerance of an option, such as "0.5 %" or "0.005"; None: the same scene.
 
-    Args: `tolerance`: such as "0.5 %" or "0.005". `models`: "finest" for a tolerance of zero.
-    Raises: SceneError: no such tolerance, or both options.
+    Raises: SceneError: no such tolerance.
     """
-    if models is not None:
-        if tolerance is not None:
-            raise _error(
-                tolerance,
-                "--models finest is a tolerance of zero",
-                "one of the two options",
-            )
-        return replace(scene, tolerance=FINEST)
     return scene if tolerance is None else replace(scene, tolerance=read_tolerance(tolerance))
 
 
 def read_tolerance(text: str) -> float:
-    """Relative tolerance of an option's text. Raises: SceneError: no fraction above 0 and below 1."""
+    """Relative tolerance of an option's text. Raises: SceneError: no fraction from 0 to below 1."""
     try:
         value = float(text)
     except ValueError:
         try:
             value = parse_quantity(text, "share")
         except FieldError as error:
-            raise _error(text, error.problem, ALLOWED) from error
-    if not 0 < value < 1:
-        raise _error(text, "it must be above 0 and below 1", ALLOWED)
-    return value
+            raise _error(text, error.problem) from error
+    if not 0 <= value < 1:
+        raise _error(text, "it must be at least 0 and below 1")
+    return abs(value)
 
 
-def _error(value: str, problem: str, allowed: str) -> SceneError:
-    return SceneError.of_option(option="--tolerance", value=value, problem=problem, allowed=allowed)
+def _error(value: str, problem: str) -> SceneError:
+    return SceneError.of_option(option="--tolerance", value=value, problem=problem, allowed=_ALLOWED)

@@ -75,7 +75,7 @@ def test_as_many_knots_as_the_tolerance_asks_for(table_1_scene: Scene) -> None:
     right = (tube_loss(table_1_scene, u).k.value + 1) * u**2 / 2
     counts, errors = [], []
     for tolerance in (0.1, 0.01, 1e-3):
-        heads = TubeHeads.of(with_tolerance(table_1_scene, tolerance=str(tolerance)))
+        heads = TubeHeads.of(with_tolerance(table_1_scene, str(tolerance)))
         error = np.abs(roots_of(heads.siphon, u) ** 8 / right - 1)
         assert np.max(error) <= 1.5 * heads.interpolation_error
         counts.append(heads.siphon.knots.size)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ringbalance.interface import checked
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.law.paper_law import paper_law as paper_law_of
-from ringbalance.running import checked
 from ringbalance.scene.narrowing import AnyScene
 
 

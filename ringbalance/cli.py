@@ -33,7 +33,7 @@ from cyclopts import (
 )
 
 import ringbalance
-from ringbalance.commands import COMMANDS, EXAMPLE_SCENES, Command
+from ringbalance.commands import COMMANDS, EXAMPLE_SCENES, ShellCommand
 from ringbalance.scene.platform.display import LOG, displayed
 from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.scene.registry import registered
@@ -98,7 +98,7 @@ def _build_app() -> App:
     return app
 
 
-def _shell_function(name: str, command: Command) -> Callable[..., int]:
+def _shell_function(name: str, command: ShellCommand) -> Callable[..., int]:
     """The function from whose signature and docstring the shell's parser and `--help` of a command come."""
 
     def run(*arguments: Any, **options: Any) -> int:

@@ -23,7 +23,7 @@ class Limits(NamedTuple):
     most: int = 2**63 - 1
 
 
-class Option(NamedTuple):
+class ShellOption(NamedTuple):
     """An option or an argument of a command."""
 
     hint: Any
@@ -38,22 +38,20 @@ class Option(NamedTuple):
     """Further arguments of `cyclopts.Parameter`."""
 
 
-class Command(NamedTuple):
-    """A command as its `--help` shows it, and the function that does its work."""
+class ShellCommand(NamedTuple):
+    """A command as its `--help` shows it."""
 
     text: str
     """Summary, and a line in `--help` for each of its own options."""
-    target: str
-    """Module and function: one that returns the exit code, or with `begin` one of the Python interface, which
-    gets the scene, and whose result is printed."""
-    options: Mapping[str, Option]
-    """By names of the target's arguments."""
+    options: Mapping[str, ShellOption]
+    """By name."""
     example: str = ""
     """Arguments; SCENE stands for a scene file."""
     failure: str = ""
     """Condition of exit code 1; empty: never given."""
     begin: str = ""
-    """First text of the progress."""
+    """First text of the progress, where a function of the Python interface does the work; empty: a function of
+    its own takes the options and returns the exit code."""
     headline: bool = True
     """See `Rows.view`."""
 
@@ -78,43 +76,45 @@ _AT_LEAST_0: Final = Limits(0, "it is negative", "0 or more")
 _AT_LEAST_1: Final = Limits(1, "there is no process to work", "a whole number of at least 1")
 _GRID: Final = Limits(2, "no grid has so many points on an axis", "2 to 1001", 1001)
 _SEEDS: Final = Limits(0, "out of range", "a whole number from 0 to 2^63 - 1")
-_FLAG: Final = Option(bool, False)
-_PATH: Final = Option(Path | None)
-_TEXT: Final = Option(str | None)
-_ARGUMENT: Final = Option(Path, REQUIRED, kind=Parameter.POSITIONAL_OR_KEYWORD)
+_FLAG: Final = ShellOption(bool, False)
+_PATH: Final = ShellOption(Path | None)
+_TEXT: Final = ShellOption(str | None)
+_ARGUMENT: Final = ShellOption(Path, REQUIRED, kind=Parameter.POSITIONAL_OR_KEYWORD)
 _EFFORT: Final = Literal["light", "heavy"]
 _OPTIONS: Final = {
     "scene": _ARGUMENT._replace(text="the scene file."),
     **dict.fromkeys(("first", "second"), _ARGUMENT),
-    "case_ids": Option(str, (), kind=Parameter.VAR_POSITIONAL),
+    "case_ids": ShellOption(str, (), kind=Parameter.VAR_POSITIONAL),
     "json": _FLAG._replace(text="print one JSON document instead of tables."),
-    "out": Option(Path, Path("out")),
-    "save": Option(Path | None, ending=""),
-    "csv": Option(Path | None, ending=".csv"),
-    "plot": Option(Path | None, ending=".svg"),
-    "level": Option(_EFFORT, "light"),
-    "workers": Option(int | None, None, "processes; default one for each processor.", limits=_AT_LEAST_1),
+    "out": ShellOption(Path, Path("out")),
+    "save": ShellOption(Path | None, ending=""),
+    "csv": ShellOption(Path | None, ending=".csv"),
+    "plot": ShellOption(Path | None, ending=".svg"),
+    "level": ShellOption(_EFFORT, "light"),
+    "workers": ShellOption(
+        int | None, None, "processes; default one for each processor.", limits=_AT_LEAST_1
+    ),
     "tolerance": _TEXT._replace(
         text='in place of the scene\'s, such as "0.5 %" or 0.005; 0: the finest of all that is expensive.'
     ),
-    "law": Option(
+    "law": ShellOption(
         str,
         "calibrated",
         'of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.',
     ),
-    "rotor": Option(Literal["first", "second"] | None),
-    "seed": Option(int | None, limits=_SEEDS),
-    "remedies": Option(bool | None, parsing={"negative": "--no-remedies"}),
-    "to": Option(Literal["c", "st", "csv", "python", "fmi2", "fmi3"], REQUIRED),
-    "block": Option(Literal["law", "disc", "controller"], "law"),
-    "name": Option(str, ""),
-    "points": Option(int | None, limits=_GRID),
-    "vary": Option(list[str] | None, parsing={"consume_multiple": 1}),
-    "sample": Option(str, ""),
-    "runs": Option(int, 0, limits=_AT_LEAST_0),
-    "check": Option(int, 3, limits=_AT_LEAST_0),
-    "write": Option(list[int] | None, parsing={"consume_multiple": 1}),
-    "loss": Option(Literal["linear", "soft_l1"], "linear"),
+    "rotor": ShellOption(Literal["first", "second"] | None),
+    "seed": ShellOption(int | None, limits=_SEEDS),
+    "remedies": ShellOption(bool | None, parsing={"negative": "--no-remedies"}),
+    "to": ShellOption(Literal["c", "st", "csv", "python", "fmi2", "fmi3"], REQUIRED),
+    "block": ShellOption(Literal["law", "disc", "controller"], "law"),
+    "name": ShellOption(str, ""),
+    "points": ShellOption(int | None, limits=_GRID),
+    "vary": ShellOption(list[str] | None, parsing={"consume_multiple": 1}),
+    "sample": ShellOption(str, ""),
+    "runs": ShellOption(int, 0, limits=_AT_LEAST_0),
+    "check": ShellOption(int, 3, limits=_AT_LEAST_0),
+    "write": ShellOption(list[int] | None, parsing={"consume_multiple": 1}),
+    "loss": ShellOption(Literal["linear", "soft_l1"], "linear"),
     **dict.fromkeys(("parameters", "next", "template"), _TEXT),
     **dict.fromkeys(("plan", "cases", "data"), _PATH),
     **dict.fromkeys(("pressure", "all_systems", "no_intervals", "no_figures", "list_", "mutations"), _FLAG),
@@ -122,37 +122,35 @@ _OPTIONS: Final = {
 """By name; one name means the same in every command, up to a default."""
 
 
-def _options(names: str, **others: Option) -> dict[str, Option]:
+def _options(names: str, **others: ShellOption) -> dict[str, ShellOption]:
     """Options by their names, in the order of `--help`."""
     return {name: others.get(name, _OPTIONS[name]) for name in names.split()}
 
 
-COMMANDS: Final[dict[str, Command]] = {
-    "report": Command(
+COMMANDS: Final[dict[str, ShellCommand]] = {
+    "report": ShellCommand(
         """Verify, calibrate, simulate and draw: everything, into a report and its annex.
 
         Args:
             out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
             level: "heavy" also runs the cases that take long.
         """,
-        "ringbalance.reporting:report",
         _options("scene out level tolerance"),
         "SCENE --out out",
         "a check of the program failed (what becomes of the scene's requirements does not count)",
     ),
-    "calibrate": Command(
+    "calibrate": ShellCommand(
         """lambda, k and the flow law of a disc, with uncertainties.
 
         Args:
             save: also write the flow law to this file, for `simulate --law`.
         """,
-        "ringbalance.calibration:calibrate",
         _options("scene json save tolerance"),
         "SCENE --save law.json",
         begin="pressure and moment over the fill range, losses of the tube ...",
         headline=False,
     ),
-    "simulate": Command(
+    "simulate": ShellCommand(
         """One closed-loop balancing run.
 
         Args:
@@ -160,12 +158,11 @@ COMMANDS: Final[dict[str, Command]] = {
             plot: also draw the run's figures on one sheet, an SVG file.
             seed: of all random numbers, in place of the scene's.
         """,
-        "ringbalance.face:simulate_file",
         _options("scene law json csv plot seed tolerance"),
         "SCENE --plot run.svg",
         "the run did not settle, or misses what the scene requires",
     ),
-    "tune": Command(
+    "tune": ShellCommand(
         """Settings of the controller chosen by runs of drawn devices, and the fraction that they serve.
 
         Args:
@@ -174,13 +171,12 @@ COMMANDS: Final[dict[str, Command]] = {
                 required is not met, changes of the scene; --no-remedies tries nothing but settings.
             save: write the scene with the recommended settings.
         """,
-        "ringbalance.face:tune",
         _options("scene law json pressure remedies save tolerance"),
         "SCENE --save tuned.toml",
         "what the scene requires is not met with the best settings, or it is undecided",
         begin="runs ...",
     ),
-    "export": Command(
+    "export": ShellCommand(
         """The flow law for another program: C, FMI, structured text, a Python module, a table.
 
         Args:
@@ -193,11 +189,10 @@ COMMANDS: Final[dict[str, Command]] = {
             points: of each axis of the grid of csv, 2 to 1001; default 41.
             all_systems: units with libraries for Linux, macOS and Windows; needs the extra export-all.
         """,
-        "ringbalance.export.command:export",
         _options("scene to block out name points all_systems"),
         "SCENE --to c --out law",
     ),
-    "sweep": Command(
+    "sweep": ShellCommand(
         """Many designs: a row of answers for every point of a grid or a sample.
 
         Args:
@@ -213,27 +208,25 @@ COMMANDS: Final[dict[str, Command]] = {
             write: rows whose scenes to write.
             tolerance: in place of the scene's, such as "0.5 %" or 0.005: rows that err by more are named.
         """,
-        "ringbalance.designs:sweep_file",
         _options(
             "scene out vary plan sample runs no_intervals check workers no_figures write tolerance json",
-            out=Option(Path, REQUIRED),
+            out=ShellOption(Path, REQUIRED),
         ),
         "SCENE --vary tube.bore=0.5mm:2mm:30 --out sweep",
     ),
-    "design": Command(
+    "design": ShellCommand(
         """The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.
 
         Args:
             scene: the scene file, with [requirement] and [design].
             save: write the scene as designed, with its settings.
         """,
-        "ringbalance.search:find_design",
         _options("scene save workers json"),
         "SCENE --save designed.toml",
         "no design meets what the scene requires, or it is undecided",
         begin="designs ...",
     ),
-    "fit": Command(
+    "fit": ShellCommand(
         """Parameters of a built disc from measurements, with intervals and what the data identify.
 
         Args:
@@ -249,17 +242,16 @@ COMMANDS: Final[dict[str, Command]] = {
             template: print an empty file of measurements of this kind, with explanations, and do nothing
                 else.
         """,
-        "ringbalance.fitting:fit_files",
         _options(
             "scene data parameters loss next save plot json template",
-            scene=Option(Path | None, kind=Parameter.POSITIONAL_OR_KEYWORD),
-            data=Option(Path, (), kind=Parameter.VAR_POSITIONAL),
+            scene=ShellOption(Path | None, kind=Parameter.POSITIONAL_OR_KEYWORD),
+            data=ShellOption(Path, (), kind=Parameter.VAR_POSITIONAL),
             save=_PATH,
         ),
         "SCENE rig.csv --save fitted.toml",
         "the fit does not describe its data",
     ),
-    "verify": Command(
+    "verify": ShellCommand(
         """The verification cases and the paper's claims, judged.
 
         Args:
@@ -273,16 +265,15 @@ COMMANDS: Final[dict[str, Command]] = {
             data: a file of measurements (docs/measurements.md), predicted and judged instead of the cases.
             json: print one JSON document instead of a table.
         """,
-        "ringbalance.verification.command:verify",
         _options(
             "case_ids cases scene list_ mutations level json workers data",
             scene=_PATH,
-            workers=Option(int, 1, limits=_AT_LEAST_1),
+            workers=ShellOption(int, 1, limits=_AT_LEAST_1),
         ),
         "gci_celik2008 --mutations",
         "a code verification failed, or a mutation was not noticed",
     ),
-    "compare": Command(
+    "compare": ShellCommand(
         """Two balancers on one rotor, side by side.
 
         Args:
@@ -294,25 +285,23 @@ COMMANDS: Final[dict[str, Command]] = {
                 that is expensive.
             json: print one JSON document instead of a table.
         """,
-        "ringbalance.face:compare_under",
         _options("first second law rotor json tolerance"),
         "SCENE other_disc.toml",
         "one of the two does not settle the fraction of devices that is asked for, or it is undecided",
         begin="both balancers on one rotor ...",
         headline=False,
     ),
-    "trade": Command(
+    "trade": ShellCommand(
         """Speed against accuracy: designs a second and error of every model.
 
         Args:
             out: also write the document to trade.json in this folder.
             level: "light" leaves out the meshes in three dimensions.
         """,
-        "ringbalance.studies:trade_file",
-        _options("scene json out level tolerance", out=_PATH, level=Option(_EFFORT, "heavy")),
+        _options("scene json out level tolerance", out=_PATH, level=ShellOption(_EFFORT, "heavy")),
         "SCENE --level light",
     ),
-    "extremes": Command(
+    "extremes": ShellCommand(
         """Limits of validity: where results stop, what is reported beyond, and whether the invariants hold
         inside.
 
@@ -322,29 +311,26 @@ COMMANDS: Final[dict[str, Command]] = {
             level: "heavy" judges thousands of points, for an hour or more.
             workers: processes; default one for each core, at most two.
         """,
-        "ringbalance.studies:extremes_file",
         _options("scene json out level workers", out=_PATH),
         "SCENE --out extremes",
         "an invariant does not hold",
     ),
-    "plot": Command(
+    "plot": ShellCommand(
         """The off-screen 3-D pictures alone.
 
         Args:
             out: folder for figures/*.png and fields/*.vtu.
         """,
-        "ringbalance.reporting:plot_file",
         _options("scene out"),
         "SCENE --out pictures",
         "this machine cannot draw; the fields are written",
     ),
-    "doctor": Command(
+    "doctor": ShellCommand(
         """What this machine gives the program, and what to do where something lacks.
 
         Args:
             json: print one JSON document instead of a table.
         """,
-        "ringbalance.doctor:doctor",
         _options("json"),
         failure="something is broken",
     ),

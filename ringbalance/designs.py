@@ -15,7 +15,7 @@ from ringbalance.design.axes import plan_of, plan_of_file, plan_of_texts
 from ringbalance.design.static import EMPTY, REFUSED, static_rows
 from ringbalance.design.sweep import STORE, Sweep, check_rows, run_sweep
 from ringbalance.design.work import Progress
-from ringbalance.running import check_counts, checked, print_result
+from ringbalance.interface import check_counts, checked, print_result
 from ringbalance.scene import AnyScene, load_scene
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.faults import Fault, SceneError

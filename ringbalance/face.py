@@ -19,9 +19,9 @@ from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
+from ringbalance.interface import checked, law_for, opened
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.results.result import csv_text, print_rows
-from ringbalance.running import checked, law_for, opened
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.terminal import activity

@@ -20,8 +20,8 @@ from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import read_observations
 from ringbalance.identification.reading import template as template_of
 from ringbalance.identification.saving import save_result
+from ringbalance.interface import checked, print_result
 from ringbalance.results.result import Result, Rows
-from ringbalance.running import checked, print_result
 from ringbalance.scene import AnyScene, SceneError, load_scene
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.platform.files import check_file

@@ -10,10 +10,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
+from ringbalance.interface import checked
 from ringbalance.reports.pictures import process
 from ringbalance.reports.report import Report
 from ringbalance.reports.report import write_report as write_scene_report
-from ringbalance.running import checked
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import with_tolerance

@@ -7,8 +7,8 @@ from concurrent.futures import Executor
 
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import Design, run_design
+from ringbalance.interface import checked
 from ringbalance.results.result import Presentation
-from ringbalance.running import checked
 from ringbalance.scene import AnyScene
 
 

@@ -9,7 +9,7 @@ from json import dumps
 from types import SimpleNamespace
 from typing import Final
 
-from ringbalance.running import checked, opened, print_result
+from ringbalance.interface import checked, opened, print_result
 from ringbalance.scene import AnyScene, load_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import check_file, staged, write_whole

@@ -18,7 +18,8 @@ import pytest
 from cyclopts import CycloptsError, UnknownOptionError
 
 from ringbalance import __version__, cli, streams
-from ringbalance.commands import COMMANDS, Command
+from ringbalance.commands import COMMANDS, ShellCommand
+from ringbalance.running import TARGETS
 from ringbalance.scene import Fault, SceneError, bundled_scene
 
 ROOT = Path(__file__).parents[1]
@@ -189,7 +190,8 @@ def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException | int], 
         module = ModuleType("acting_command")
         module.act = act  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "acting_command", module)
-        monkeypatch.setitem(COMMANDS, "act", Command("acts", "acting_command:act", {}))
+        monkeypatch.setitem(COMMANDS, "act", ShellCommand("acts", {}))
+        monkeypatch.setitem(TARGETS, "act", "acting_command:act")
         return cli.main(["act"])
 
     return run_it

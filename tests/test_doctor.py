@@ -28,7 +28,7 @@ def lacks(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     return take
 
 
-def by_name() -> dict[str, doctor.Check]:
+def by_name() -> dict[str, doctor.MachineCheck]:
     return {check.name: check for check in doctor.checks()}
 
 

@@ -33,7 +33,7 @@ from typing import Any, Final
 
 import ringbalance as rb
 from ringbalance import cli
-from ringbalance.commands import COMMANDS
+from ringbalance.running import TARGETS
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FENCE: Final = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -259,8 +259,8 @@ def _load() -> None:
     os.environ["COLUMNS"] = "100"
     # Pages run side by side, so that none starts processes of its own to do so.
     os.cpu_count = lambda: 1
-    for command in COMMANDS.values():
-        import_module(command.target.partition(":")[0])
+    for target in TARGETS.values():
+        import_module(target.partition(":")[0])
     rb.simulate(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
 
 

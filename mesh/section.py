@@ -49,7 +49,7 @@ class NoPlaneWavesError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Section:
+class LiquidSection:
     """The liquid's cross-section."""
 
     mesh: Any
@@ -58,7 +58,9 @@ class Section:
     """Largest distance of the liquid from the shaft, m."""
 
 
-def middle_section(geometry: ChamberGeometry, *, surface_radius: float, coarse: bool = False) -> Section:
+def middle_section(
+    geometry: ChamberGeometry, *, surface_radius: float, coarse: bool = False
+) -> LiquidSection:
     """Section of the liquid outside a concentric surface, half-way along the shaft.
 
     Args: `surface_radius`: a, m. `coarse`: by the corners of the cells alone, on chords twice as long.
@@ -88,7 +90,7 @@ def middle_section(geometry: ChamberGeometry, *, surface_radius: float, coarse: 
     by_name = {
         name: pairs.reshape(-1, 2)[names[names >= 0][cut] == number] for number, name in enumerate(body.names)
     }
-    return Section(mesh=_with_boundaries(mesh, by_name), scale=scale)
+    return LiquidSection(mesh=_with_boundaries(mesh, by_name), scale=scale)
 
 
 def _crossings(simplices: IntArray, above: BoolArray) -> tuple[IntArray, IntArray]:

@@ -36,8 +36,8 @@ from ringbalance.reports.sections import begun, collected_beside, completed
 from ringbalance.results.numbers import given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.keys.declaration import Entries, Key, keys_of
-from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.keys.schema import Table
+from ringbalance.scene.keys.fields import ValueReader
+from ringbalance.scene.keys.schema import TableSchema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import InputUncertainty, SceneFile
 from ringbalance.scene.platform.processes import Workers
@@ -292,7 +292,7 @@ def _value(value: Any, entry: Key, origin: str) -> str:
     return ", ".join(str(text).replace("*", " ") for text in texts)
 
 
-def _width(uncertain: InputUncertainty, tables: Mapping[str, Table]) -> str:
+def _width(uncertain: InputUncertainty, tables: Mapping[str, TableSchema]) -> str:
     if uncertain.relative:
         return with_unit(short(100 * uncertain.half_width), "%")
     table, key = uncertain.quantity.split(".")
@@ -300,7 +300,7 @@ def _width(uncertain: InputUncertainty, tables: Mapping[str, Table]) -> str:
     return _written(uncertain.half_width, keys_of(record)[key].takes) if record else ""
 
 
-def _written(value: Any, takes: Reader | Entries, *, digits: int = 6) -> str:
+def _written(value: Any, takes: ValueReader | Entries, *, digits: int = 6) -> str:
     if isinstance(value, tuple):
         return ", ".join(_written(item, takes, digits=digits) for item in value)
     if isinstance(value, SpeedPoint):

@@ -24,7 +24,7 @@ from ringbalance.results.numbers import plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError, did_you_mean
-from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
@@ -317,7 +317,7 @@ def _values(scene: SceneFile, path: str, given: Any) -> tuple[str, Range | list[
     return path, [_checked(path, each, reader) for each in given]
 
 
-def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: Reader) -> None:
+def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: ValueReader) -> None:
     """Raises: SceneError: bare numbers that are all as far from the scene's own value as a wrong unit is."""
     table, _, key = path.partition(".")
     own, dimension = getattr(getattr(scene, table), key, None), reader.dimension
@@ -334,7 +334,7 @@ def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: Rea
         )
 
 
-def _range(path: str, text: str, reader: Reader) -> Range:
+def _range(path: str, text: str, reader: ValueReader) -> Range:
     low, high, *more = text.split(":")
     log = bool(more) and more[-1] == "log"
     counts = more[:-1] if log else more
@@ -346,14 +346,14 @@ def _range(path: str, text: str, reader: Reader) -> Range:
     return Range(low=ends[0], high=ends[1], count=int(counts[0]) if counts else None, log=log)
 
 
-def _read(path: str, text: str, reader: Reader) -> Any:
+def _read(path: str, text: str, reader: ValueReader) -> Any:
     try:
         return reader.read(as_toml(text, reader))
     except FieldError as error:
         raise _fault(f"{path}={text}", error.problem, error.allowed) from error
 
 
-def _checked(path: str, value: Any, reader: Reader) -> Any:
+def _checked(path: str, value: Any, reader: ValueReader) -> Any:
     """A value of a list as a scene takes it: numbers in SI."""
     if not isinstance(value, str):
         return value
@@ -361,12 +361,12 @@ def _checked(path: str, value: Any, reader: Reader) -> Any:
     return read if isinstance(read, int | float) else value
 
 
-def _reader(scene: SceneFile, path: str) -> Reader:
+def _reader(scene: SceneFile, path: str) -> ValueReader:
     """Raises: SceneError: the scene's kind has no such key, or one with a table in it."""
     schema: Schema = scene_kind(scene.balancer).schema
     table, _, key = str(path).partition(".")
     declared = schema.tables[table].keys.get(key) if table in schema.tables else None
-    if declared is None or key == ORIGIN or not isinstance(declared.takes, Reader):
+    if declared is None or key == ORIGIN or not isinstance(declared.takes, ValueReader):
         known = [f"{name}.{each}" for name, content in schema.tables.items() for each in content.keys]
         problem = f"a scene of this kind has no such key{did_you_mean(str(path), known)}"
         raise _fault(str(path), problem, "TABLE.KEY=VALUES, or TABLE=FILE.csv")

@@ -19,7 +19,7 @@ from ringbalance.identification.tables import (
 )
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.keys.declaration import Key
-from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.units import FieldError
 
@@ -54,8 +54,8 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
         key = keys.get(name)
         if name == NAME and key is None:
             continue
-        if key is None or name == ORIGIN or not isinstance(key.takes, Reader):
-            known = [each for each, other in keys.items() if isinstance(other.takes, Reader)]
+        if key is None or name == ORIGIN or not isinstance(key.takes, ValueReader):
+            known = [each for each, other in keys.items() if isinstance(other.takes, ValueReader)]
             problem = f"[{table}] of a scene has no such key{did_you_mean(name, known)}"
             faults.append(content.head_fault(head, problem, ", ".join((*known, NAME))))
         elif name in columns:
@@ -73,7 +73,7 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
     return Choices(names=content.texts(NAME) if NAME in content.heads and NAME not in keys else (), rows=rows)
 
 
-def as_toml(text: str, reader: Reader) -> Any:
+def as_toml(text: str, reader: ValueReader) -> Any:
     """Text as a scene file would have it, where a key without unit takes a number."""
     if reader.dimension is None:
         for number in (int, float):
@@ -97,7 +97,7 @@ def _parsed(file: Path) -> Table:
     return table
 
 
-def _column(table: Table, head: str, unit: str, reader: Reader) -> tuple[list[Any], list[Fault]]:
+def _column(table: Table, head: str, unit: str, reader: ValueReader) -> tuple[list[Any], list[Fault]]:
     """Values of a column as a scene takes them, and the errors of its cells."""
     values: list[Any] = []
     faults: list[Fault] = []

@@ -38,7 +38,7 @@ from skfem.mapping import MappingIsoparametric
 from skfem.models.poisson import mass, unit_load
 
 from ringbalance.mesh.chamber import FREE_SURFACE, chamber_mesh
-from ringbalance.mesh.section import Section, middle_section
+from ringbalance.mesh.section import LiquidSection, middle_section
 from ringbalance.physics.pressure.solve import stiffness
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
@@ -112,7 +112,7 @@ def imported_system(
     Args: `coarse`: on the corners of the cells alone.
     Raises: ValueError: as `middle_section`.
     """
-    section: Section = middle_section(geometry, surface_radius=surface_radius, coarse=coarse)
+    section: LiquidSection = middle_section(geometry, surface_radius=surface_radius, coarse=coarse)
     return section_system(section.mesh, ends=2 * section.scale / width), section.scale
 
 

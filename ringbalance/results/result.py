@@ -68,7 +68,7 @@ class Table:
         return [2 * sum(bool(_NUMBER.match(cell)) for cell in cells) > len(cells) for cells in filled]
 
 
-class _ModelUsed(Protocol):
+class _TermUsed(Protocol):
     """A physical term as an answer lists it."""
 
     @property
@@ -88,7 +88,7 @@ class _ModelUsed(Protocol):
         """Relative to the result; None: unknown."""
 
 
-def models_table(models_used: Iterable[_ModelUsed]) -> Table:
+def models_table(models_used: Iterable[_TermUsed]) -> Table:
     """The physical terms of an answer with their models."""
     rows = [
         (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)

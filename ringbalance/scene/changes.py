@@ -17,7 +17,7 @@ from typing import Any, Final
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.declaration import Entries, Key
-from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.loader import CHANGED, nameless_scene, scene_of
@@ -236,9 +236,9 @@ def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None
         table[ORIGIN] = before if stated == before else stated
 
 
-def _plain(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> tuple[Any, float]:
+def _plain(value: Any, takes: ValueReader | Entries | Mapping[str, Key] | None) -> tuple[Any, float]:
     """A number in SI with its standard deviation; a quantity that no key takes as text, for its error."""
-    unit = DIMENSIONS[takes.dimension].si_unit if isinstance(takes, Reader) and takes.dimension else ""
+    unit = DIMENSIONS[takes.dimension].si_unit if isinstance(takes, ValueReader) and takes.dimension else ""
     try:
         return plain_number(value, unit)
     except ValueError:
@@ -250,7 +250,9 @@ def _as_usual(key: Key | None) -> str | None:
     return f"1 {key.usual_unit}" if key is not None and key.usual_unit else None
 
 
-def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None, *, like: object = None) -> Any:
+def _written(
+    value: Any, takes: ValueReader | Entries | Mapping[str, Key] | None, *, like: object = None
+) -> Any:
     """A value as a scene file would have it: a number for a quantity with a unit is one in SI.
 
     Args: `like`: what stands there now, or would usually; its unit is kept.
@@ -264,9 +266,9 @@ def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None, *, 
         }
     if isinstance(value, list | tuple):
         each_written = [_written(each, takes, like=like) for each in value]
-        single = isinstance(takes, Reader) and takes.one_for_all and len(value) == 1
+        single = isinstance(takes, ValueReader) and takes.one_for_all and len(value) == 1
         return each_written[0] if single else each_written
-    dimension = takes.dimension if isinstance(takes, Reader) else None
+    dimension = takes.dimension if isinstance(takes, ValueReader) else None
     if dimension is None or isinstance(value, bool) or not isinstance(value, int | float):
         return value
     return written_like(value, like, dimension)

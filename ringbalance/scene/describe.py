@@ -40,7 +40,7 @@ class Row:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Line:
+class _SceneLine:
     path: str
     shown: Shown
     dimension: str
@@ -64,7 +64,7 @@ _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """Tables, and single paths, of which the groups consist."""
 
 
-def _declared() -> Iterator[_Line]:
+def _declared() -> Iterator[_SceneLine]:
     for name, table in LIQUID_RING.tables.items():
         if table.record is not None:
             keys = keys_of(table.record)
@@ -74,12 +74,12 @@ def _declared() -> Iterator[_Line]:
         yield _line(key, entry, None)
 
 
-def _line(path: str, entry: Shown, key: Key | None) -> _Line:
+def _line(path: str, entry: Shown, key: Key | None) -> _SceneLine:
     dimension = key.takes.dimension if key is not None else None
-    return _Line(path=path, shown=entry, dimension=entry.dimension or dimension or "")
+    return _SceneLine(path=path, shown=entry, dimension=entry.dimension or dimension or "")
 
 
-_LINES: Mapping[str, _Line] = MappingProxyType({line.path: line for line in _declared()})
+_LINES: Mapping[str, _SceneLine] = MappingProxyType({line.path: line for line in _declared()})
 
 
 def scene_table(scene: Scene) -> tuple[Row, ...]:
@@ -93,12 +93,12 @@ def scene_table(scene: Scene) -> tuple[Row, ...]:
     )
 
 
-def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
+def _lines_of(parts: tuple[str, ...]) -> Iterator[_SceneLine]:
     paths = (path for part in parts for path in _LINES if path == part or path.startswith(f"{part}."))
     return (_LINES[path] for path in dict.fromkeys(paths))
 
 
-def _line_at(path: str) -> _Line:
+def _line_at(path: str) -> _SceneLine:
     """How a value of any kind of scene is described; by its path where its declaration has no name for it."""
     if path in _LINES:
         return _LINES[path]
@@ -108,8 +108,8 @@ def _line_at(path: str) -> _Line:
         takes = keys[key].takes if key in keys else None
         if takes is not None and takes.dimension:
             unit = kind.usual_units.get(takes.dimension, DIMENSIONS[takes.dimension].si_unit)
-            return _Line(path=path, shown=Shown(path, unit), dimension=takes.dimension)
-    return _Line(path=path, shown=Shown(path), dimension="")
+            return _SceneLine(path=path, shown=Shown(path, unit), dimension=takes.dimension)
+    return _SceneLine(path=path, shown=Shown(path), dimension="")
 
 
 def usual_unit(path: str) -> str:
@@ -147,14 +147,14 @@ def setting_text(path: str, value: object) -> str:
     return str(value)
 
 
-def _short_text(line: _Line, value: float) -> str:
+def _short_text(line: _SceneLine, value: float) -> str:
     if not line.dimension:
         # Whole numbers count something, or are a seed: every digit counts.
         return f"{value if isinstance(value, int) else format(value, '.4g')} {line.shown.unit}".rstrip()
     return format_quantity(value, line.dimension, _suited_unit(line, value), digits=4)
 
 
-def _suited_unit(line: _Line, *values: float) -> str:
+def _suited_unit(line: _SceneLine, *values: float) -> str:
     """The usual unit; seconds where minutes would need many digits."""
     unit = line.shown.unit
     texts = [shortest_quantity(each, unit) for each in values if each] if unit == "min" else []
@@ -174,7 +174,7 @@ def scene_lines(scene: AnyScene) -> Iterator[str]:
         yield ", ".join(f"{path} {setting_text(path, _value(scene, path))}" for path in paths)
 
 
-def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:
+def _rows(scene: Scene, group: str, line: _SceneLine) -> Iterator[Row]:
     value = _value(scene, line.path)
     if value is None and not line.shown.absent:
         return
@@ -198,7 +198,7 @@ def _value(scene: AnyScene, path: str) -> Any:
     return value
 
 
-def _written(line: _Line, value: Any) -> str:
+def _written(line: _SceneLine, value: Any) -> str:
     if line.dimension:
         values = value if isinstance(value, tuple) else (value,)
         unit = _suited_unit(line, *values)
@@ -215,7 +215,7 @@ def _bend(bend: Bend) -> str:
     return f"{format_quantity(bend.angle, 'angle', 'deg')} on {radius}"
 
 
-def _spread(scene: Scene, line: _Line) -> str:
+def _spread(scene: Scene, line: _SceneLine) -> str:
     given = [
         each
         for each in scene.uncertainty

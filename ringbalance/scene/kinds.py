@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.reading import Reading, TableRead, read_document
+from ringbalance.scene.keys.reading import SceneReading, TableRead, read_document
 from ringbalance.scene.keys.schema import Schema
 from ringbalance.scene.registry import registered
 from ringbalance.scene.units import format_quantity
@@ -23,7 +23,7 @@ class _Reads(Protocol):
         folder: Path,
         derived: Mapping[str, Any],
         before: Mapping[str, TableRead],
-    ) -> tuple[Reading, tuple[Fault, ...]]: ...
+    ) -> tuple[SceneReading, tuple[Fault, ...]]: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,14 +52,14 @@ _DIMENSIONS = {"mm": "length", "um": "length", "deg": "angle", "kPa": "pressure"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Contradiction:
     """What is wrong with a combination of values."""
 
     problem: str
     allowed: str
 
 
-Rule = Callable[..., Finding | None]
+Rule = Callable[..., Contradiction | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,20 +69,23 @@ class Check:
     rule: Rule
     needs: tuple[str, ...]
     """Paths of the rule's arguments; the first is the one to be changed."""
-    when: Callable[[Reading], bool]
+    when: Callable[[SceneReading], bool]
     """Whether the rule applies to a scene."""
     moot: tuple[Rule, ...]
     """Rules before it whose failure makes this one pointless, so that one error does not raise others."""
 
 
 def check(
-    rule: Rule, *needs: str, when: Callable[[Reading], bool] = lambda _: True, moot: tuple[Rule, ...] = ()
+    rule: Rule,
+    *needs: str,
+    when: Callable[[SceneReading], bool] = lambda _: True,
+    moot: tuple[Rule, ...] = (),
 ) -> Check:
     """Bind a rule to paths "table.key"."""
     return Check(rule=rule, needs=needs, when=when, moot=moot)
 
 
-def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault]:
+def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[Fault]:
     """One error for each check that fails; `checks` in order, each after those that make it pointless."""
     failed: set[Rule] = set()
     values = reading.values
@@ -97,12 +100,14 @@ def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault
             yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)
 
 
-def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Callable[..., tuple[Reading, tuple[Fault, ...]]]:
+def reader_of(
+    schema: Schema, checks: tuple[Check, ...]
+) -> Callable[..., tuple[SceneReading, tuple[Fault, ...]]]:
     """How a kind of scene is read that consists of its keys and rules alone; see `SceneKind.read`."""
 
     def read(
         document: Mapping[str, Any], *, file: str, before: Mapping[str, TableRead], **_: object
-    ) -> tuple[Reading, tuple[Fault, ...]]:
+    ) -> tuple[SceneReading, tuple[Fault, ...]]:
         reading, faults = read_document(document, file=file, schema=schema, before=before)
         reading = reading.completed()
         return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, checks))
@@ -118,11 +123,11 @@ def written(value: float, unit: str) -> str:
 def limit_above_noise(noise_key: str, unit: str) -> Rule:
     """The rule that a limit is above the standard deviation of what is measured."""
 
-    def above(limit: float, noise: float) -> Finding | None:
+    def above(limit: float, noise: float) -> Contradiction | None:
         if limit > noise:
             return None
         least = written(noise, unit)
-        return Finding(
+        return Contradiction(
             problem=f"the limit is below the sensor noise ({noise_key} {least})", allowed=f"above {least}"
         )
 

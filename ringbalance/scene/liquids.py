@@ -17,7 +17,7 @@ from numpy.polynomial.chebyshev import chebval
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, did_you_mean
-from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.keys.reading import SceneReading
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.units import FieldError
@@ -216,7 +216,7 @@ def _water_series() -> FloatArray:
     return np.array([[float(value) for value in row.values()] for row in rows])
 
 
-def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
+def with_liquid(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
     """The liquid's values, as far as they can be known, what is given outright first; and what is wrong."""
     if "liquid" in reading.broken or not reading.given("liquid"):
         return reading, ()
@@ -226,11 +226,11 @@ def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     return reading.adding(_liquid_values(reading, looked_up)), faults
 
 
-def _incomplete(reading: Reading) -> bool:
+def _incomplete(reading: SceneReading) -> bool:
     return reading.lacks(_DENSITY) or reading.lacks(_VISCOSITY)
 
 
-def _faults(reading: Reading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
+def _faults(reading: SceneReading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
     if liquid is not None:
         return _temperature_faults(reading, liquid)
     if not _incomplete(reading) or "liquid.name" in reading.broken:
@@ -246,7 +246,7 @@ def _faults(reading: Reading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
     return (reading.fault(path, problem="it is needed for a liquid without a known name", allowed=allowed),)
 
 
-def _temperature_faults(reading: Reading, liquid: KnownLiquid) -> tuple[Fault, ...]:
+def _temperature_faults(reading: SceneReading, liquid: KnownLiquid) -> tuple[Fault, ...]:
     held = f"{liquid.name} at {liquid.held}"
     path = "liquid.temperature"
     if reading.known(path):
@@ -262,7 +262,7 @@ def _temperature_faults(reading: Reading, liquid: KnownLiquid) -> tuple[Fault, .
     return (reading.fault(path, problem=problem, allowed=f"{held}; or {_OUTRIGHT}"),)
 
 
-def _looked_up(reading: Reading, liquid: KnownLiquid) -> Liquid | None:
+def _looked_up(reading: SceneReading, liquid: KnownLiquid) -> Liquid | None:
     temperature = reading.values.get("liquid.temperature")
     if temperature is None and len(liquid.temperatures) == 1 and reading.lacks("liquid.temperature"):
         temperature = liquid.temperatures[0]
@@ -271,7 +271,7 @@ def _looked_up(reading: Reading, liquid: KnownLiquid) -> Liquid | None:
     return liquid_at(name=liquid.name, temperature=temperature)
 
 
-def _liquid_values(reading: Reading, looked_up: Liquid | None) -> dict[str, Any]:
+def _liquid_values(reading: SceneReading, looked_up: Liquid | None) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if looked_up is not None:
         found = {
@@ -292,7 +292,9 @@ def _liquid_values(reading: Reading, looked_up: Liquid | None) -> dict[str, Any]
     )
 
 
-def _uncertainties(reading: Reading, values: dict[str, Any], looked_up: Liquid | None) -> dict[str, float]:
+def _uncertainties(
+    reading: SceneReading, values: dict[str, Any], looked_up: Liquid | None
+) -> dict[str, float]:
     known = (0.0, 0.0)
     if looked_up is not None:
         known = (looked_up.density_uncertainty, looked_up.viscosity_uncertainty)
@@ -312,7 +314,7 @@ def _relative(values: dict[str, Any], key: str, *, otherwise: float) -> float:
     return float(width if relative else width / values[f"liquid.{key}"])
 
 
-def _source_of(reading: Reading, looked_up: Liquid | None) -> str:
+def _source_of(reading: SceneReading, looked_up: Liquid | None) -> str:
     named = {"density": _DENSITY, "kinematic viscosity": _VISCOSITY, "vapour pressure": _VAPOUR}
     outright = [name for name, path in named.items() if reading.known(path)]
     given = f"{', '.join(outright)} given outright" if outright else ""

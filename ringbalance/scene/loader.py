@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from typing import Any, Final
 
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean
-from ringbalance.scene.keys.reading import Reading, TableRead
+from ringbalance.scene.keys.reading import SceneReading, TableRead
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
@@ -125,7 +125,7 @@ def _checked_reading(
     folder: Path,
     derived: Mapping[str, Any],
     before: CheckedValues | None,
-) -> Reading:
+) -> SceneReading:
     kind = _kind(document)
     tables: Mapping[str, TableRead] = before.tables if before and _kind(before.document) == kind else {}
     reading, found = scene_kind(kind).read(document, file=file, folder=folder, derived=derived, before=tables)
@@ -135,7 +135,7 @@ def _checked_reading(
     return reading
 
 
-def _records(reading: Reading, before: CheckedValues | None) -> dict[str, Any]:
+def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, Any]:
     """What results depend on: tolerance, uncertainties, and a record of each table.
 
     A record's fields are named after keys, and an absent key is the default or None.  One with the values of
@@ -178,7 +178,7 @@ def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
     )
 
 
-def _uncertainty(reading: Reading) -> Iterator[InputUncertainty]:
+def _uncertainty(reading: SceneReading) -> Iterator[InputUncertainty]:
     """By key, or by "table.key" where [uncertainty] has a table for each table."""
     for key in reading.schema.tables["uncertainty"].keys:
         stated = reading.values.get(f"uncertainty.{key}")
@@ -190,7 +190,7 @@ def _uncertainty(reading: Reading) -> Iterator[InputUncertainty]:
             yield InputUncertainty(quantity=quantity, half_width=width, relative=relative)
 
 
-def _defaulted(reading: Reading) -> tuple[str, ...]:
+def _defaulted(reading: SceneReading) -> tuple[str, ...]:
     """Paths "table.key" whose value is a default; what was looked up for a known liquid is none."""
     return tuple(
         path
@@ -201,7 +201,7 @@ def _defaulted(reading: Reading) -> tuple[str, ...]:
     )
 
 
-def _values_hash(reading: Reading) -> str:
+def _values_hash(reading: SceneReading) -> str:
     """SHA-256 of the values that decide results."""
     values = {
         path: value.digest if path == "disc.geometry" else value
@@ -214,7 +214,7 @@ def _values_hash(reading: Reading) -> str:
     return hashlib.sha256(repr(sorted(values.items())).encode()).hexdigest()
 
 
-def _origins(reading: Reading) -> Iterator[tuple[str, ShownOrigin]]:
+def _origins(reading: SceneReading) -> Iterator[tuple[str, ShownOrigin]]:
     """Origin of each key, by path."""
     for name, table in reading.schema.tables.items():
         stated = reading.values.get(f"{name}.{ORIGIN}", {})
@@ -225,7 +225,7 @@ def _origins(reading: Reading) -> Iterator[tuple[str, ShownOrigin]]:
                 yield path, stated.get(key, "given") if reading.given(path) else absent
 
 
-def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
+def _origin_faults(reading: SceneReading, found: Iterable[Fault]) -> Iterator[Fault]:
     """One error for each origin of a value that does not stand in the file, unless the value has one."""
     told = {(fault.table, fault.key) for fault in found}
     for name in reading.schema.tables:

@@ -23,8 +23,8 @@ from ringbalance.scene.keys.declaration import (
     unused,
 )
 from ringbalance.scene.keys.fields import Length, PositiveLength
-from ringbalance.scene.keys.reading import Reading, read_document
-from ringbalance.scene.keys.schema import LIQUID_RING, Schema, Table
+from ringbalance.scene.keys.reading import SceneReading, read_document
+from ringbalance.scene.keys.schema import LIQUID_RING, Schema, TableSchema
 from ringbalance.scene.loop_models import RequirementSettings
 
 
@@ -49,17 +49,17 @@ class Plate:
 
 
 SCHEMA = Schema(
-    top={}, tables={"plate": Table(text="a plate", keys=keys_of(Plate), record=Plate)}, scene=dict
+    top={}, tables={"plate": TableSchema(text="a plate", keys=keys_of(Plate), record=Plate)}, scene=dict
 )
 
 
-def _read(**plate: Any) -> tuple[Reading, tuple[Fault, ...]]:
+def _read(**plate: Any) -> tuple[SceneReading, tuple[Fault, ...]]:
     reading, faults = read_document({"plate": plate}, file="plate.toml", schema=SCHEMA)
     reading = reading.completed()
     return reading, (*faults, *reading.missing_faults())
 
 
-def _plate(reading: Reading) -> Mapping[str, Any]:
+def _plate(reading: SceneReading) -> Mapping[str, Any]:
     return {field.name: reading.values.get(f"plate.{field.name}") for field in fields(Plate)}
 
 

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.kinds import Finding, limit_above_noise
+from ringbalance.scene.kinds import Contradiction, limit_above_noise
 from ringbalance.scene.models import Bend
 from ringbalance.scene.rules import shape, working
 
@@ -43,7 +43,7 @@ BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
         RULES["sequence_complete"](("A", "C", "B", "E"), 4),
     ],
 )
-def test_at_or_beyond_the_limit_is_found(finding: Finding | None) -> None:
+def test_at_or_beyond_the_limit_is_found(finding: Contradiction | None) -> None:
     assert finding is not None
     assert finding.problem
     assert finding.allowed
@@ -77,7 +77,7 @@ def test_at_or_beyond_the_limit_is_found(finding: Finding | None) -> None:
         RULES["sequence_complete"](("D", "C", "B", "A"), 4),
     ],
 )
-def test_up_to_the_limit_is_allowed(finding: Finding | None) -> None:
+def test_up_to_the_limit_is_allowed(finding: Contradiction | None) -> None:
     assert finding is None
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.keys.declaration import keys_of
-from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.models import Gas
 from ringbalance.scene.units import (
     DIMENSIONS,
@@ -173,7 +173,7 @@ def test_no_unit_of_another_size_is_suggested(text: str, dimension: str) -> None
 )
 def test_a_unit_may_say_how_its_pressure_is_counted(key: str, text: str, pressure: float) -> None:
     reader = keys_of(Gas)[key].takes
-    assert isinstance(reader, Reader)
+    assert isinstance(reader, ValueReader)
     assert reader.read(text) == pytest.approx(pressure)
 
 

@@ -44,10 +44,10 @@ from ringbalance.scene.keys.fields import (
     Velocity,
     quantity,
 )
-from ringbalance.scene.keys.schema import ORIGIN, Schema, Table
+from ringbalance.scene.keys.schema import ORIGIN, Schema, TableSchema
 from ringbalance.scene.kinds import (
     Check,
-    Finding,
+    Contradiction,
     Rule,
     SceneKind,
     check,
@@ -234,17 +234,17 @@ def eccentric_scene(scene: SceneFile) -> EccentricScene:
 
 
 _TABLES = {
-    "rotor": Table.of(EccentricRotor, "the rotor on its bearing, and its speed"),
-    "imbalance": Table.of(Imbalance, "the imbalance to be balanced"),
-    "masses": Table.of(EccentricMasses, "the two eccentric masses on their track"),
-    "motor": Table.of(Motor, "motor and gears of each mass"),
-    "sensor": Table.of(EccentricSensor, "the sensors; exact when left out"),
-    "imbalance_filter": Table.of(ImbalanceFilter, "the Kalman filter that finds the imbalance"),
-    "friction_filter": Table.of(FrictionFilter, "the extended Kalman filter that finds the friction"),
-    "lqr": Table.of(Lqr, "the regulator that moves the masses"),
-    "fine_tuning": Table.of(FineTuning, "the search by trial for a smaller vibration"),
-    "supervisor": Table.of(Supervisor, "the order of the stages, and when each ends"),
-    "requirement": Table.of(EccentricRequirement, "what is required of the balancer"),
+    "rotor": TableSchema.of(EccentricRotor, "the rotor on its bearing, and its speed"),
+    "imbalance": TableSchema.of(Imbalance, "the imbalance to be balanced"),
+    "masses": TableSchema.of(EccentricMasses, "the two eccentric masses on their track"),
+    "motor": TableSchema.of(Motor, "motor and gears of each mass"),
+    "sensor": TableSchema.of(EccentricSensor, "the sensors; exact when left out"),
+    "imbalance_filter": TableSchema.of(ImbalanceFilter, "the Kalman filter that finds the imbalance"),
+    "friction_filter": TableSchema.of(FrictionFilter, "the extended Kalman filter that finds the friction"),
+    "lqr": TableSchema.of(Lqr, "the regulator that moves the masses"),
+    "fine_tuning": TableSchema.of(FineTuning, "the search by trial for a smaller vibration"),
+    "supervisor": TableSchema.of(Supervisor, "the order of the stages, and when each ends"),
+    "requirement": TableSchema.of(EccentricRequirement, "what is required of the balancer"),
 }
 ECCENTRIC_MASS = Schema.of(
     _TABLES,
@@ -257,70 +257,70 @@ ECCENTRIC_MASS = Schema.of(
 _ROUNDING = 1e-9
 
 
-def _imbalance_in_rotor(imbalance: float, rotor: float) -> Finding | None:
+def _imbalance_in_rotor(imbalance: float, rotor: float) -> Contradiction | None:
     """m_im <= m_r, since the imbalance is a part of the rotor."""
     if imbalance <= rotor:
         return None
     whole = written(rotor, "kg")
-    return Finding(
+    return Contradiction(
         problem=f"the imbalance is a part of the rotor's mass ({whole}), so it cannot be heavier",
         allowed=f"at least 0 kg and at most {whole}",
     )
 
 
-def _masses_fit_track(arc: float, radius: float) -> Finding | None:
+def _masses_fit_track(arc: float, radius: float) -> Contradiction | None:
     """Both masses fit on the track: l <= pi r_b."""
     limit = math.pi * radius
     if arc <= limit * (1 + _ROUNDING):
         return None
-    return Finding(
+    return Contradiction(
         problem="two masses of this length do not fit on the track",
         allowed=f"above 0 mm and at most pi * guide_radius = {written(limit, 'mm')}",
     )
 
 
-def _masses_apart(angles: tuple[float, float], arc: float, radius: float) -> Finding | None:
+def _masses_apart(angles: tuple[float, float], arc: float, radius: float) -> Contradiction | None:
     """The masses do not overlap at the start: |phi_1 - phi_2| >= l / r_b around the circle."""
     apart, least = abs(math.remainder(angles[0] - angles[1], 2 * math.pi)), arc / radius
     if apart >= least * (1 - _ROUNDING):
         return None
     width = written(least, "deg")
-    return Finding(
+    return Contradiction(
         problem=f"the masses overlap: they are {written(apart, 'deg')} apart, each {width} wide",
         allowed=f"angles at least arc_length / guide_radius = {width} apart",
     )
 
 
-def _profile_in_order(profile: tuple[SpeedPoint, ...]) -> Finding | None:
+def _profile_in_order(profile: tuple[SpeedPoint, ...]) -> Contradiction | None:
     """The profile has a corner, and its times increase."""
     allowed = "at least one { time, speed }, in order of time, each time once"
     if not profile:
-        return Finding(problem="it has no entry", allowed=allowed)
+        return Contradiction(problem="it has no entry", allowed=allowed)
     for place, (before, after) in enumerate(pairwise(profile), start=2):
         if after.time <= before.time:
             late, early = written(after.time, "s"), written(before.time, "s")
             problem = f"entry {place} ({late}) does not come after the one before ({early})"
-            return Finding(problem=problem, allowed=allowed)
+            return Contradiction(problem=problem, allowed=allowed)
     return None
 
 
-def _step_is_multiple(step: float, base: float) -> Finding | None:
+def _step_is_multiple(step: float, base: float) -> Contradiction | None:
     """A step is a whole multiple of the sensor's."""
     times = round(step / base)
     if times >= 1 and abs(step / base - times) <= 1e-6 * times:
         return None
     first, second, third = (written(count * base, "s") for count in (1, 2, 3))
-    return Finding(
+    return Contradiction(
         problem=f"it is not a whole multiple of the step of [sensor] ({first})",
         allowed=f"{first}, {second}, {third} ...",
     )
 
 
-def _moves_in_order(stop: float, step: float) -> Finding | None:
+def _moves_in_order(stop: float, step: float) -> Contradiction | None:
     """The smallest trial move is not longer than the first."""
     if stop <= step:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the smallest trial move must not be longer than the first, step ({written(step, 'deg')})",
         allowed=f"above 0 deg and at most {written(step, 'deg')}",
     )
@@ -331,11 +331,11 @@ def _widths_below(names: tuple[str, ...]) -> Rule:
 
     def below(
         widths: Mapping[str, tuple[float, bool]], *values: float | tuple[float, float]
-    ) -> Finding | None:
+    ) -> Contradiction | None:
         for name, value in zip(names, values, strict=True):
             width, relative = widths.get(name, (0.0, True))
             if not relative and width > min(value if isinstance(value, tuple) else (value,)):
-                return Finding(
+                return Contradiction(
                     problem=f"the uncertainty of {name} is larger than {name} itself",
                     allowed="at most the quantity itself, or below 100 %",
                 )

@@ -18,9 +18,9 @@ from ringbalance.mesh.faceting import SAFETY, faceting
 from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.pressure.solve import (
+    BoundarySide,
     PressureSolution,
     RotatingLiquid,
-    Side,
     quadratic_basis,
     side,
     solve_on,
@@ -168,11 +168,11 @@ def solved_ring(
     )
 
 
-def _mean(wall: Side, nodal: FloatArray) -> float:
+def _mean(wall: BoundarySide, nodal: FloatArray) -> float:
     return float(np.sum(wall.weights * wall.at_points(nodal)) / wall.weights.sum())
 
 
-def _load(wall: Side, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
+def _load(wall: BoundarySide, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
     """With a doubt of the pressure by the walls' facets, Pa."""
     force, still = ((wall.area * wall.at_points(values)).sum(axis=(1, 2)) for values in (nodal, exact))
     area = float(wall.weights.sum())

@@ -160,7 +160,7 @@ def _pull(gravity: float, shaft: Shaft, angle: float) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Sample:
+class _TurnMeans:
     """Means over a turn on one mesh; zeros where a solve failed."""
 
     values: FloatArray
@@ -181,13 +181,13 @@ def _on_meshes(
     angles: FloatArray,
     x: float,
     meshes: tuple[tuple[int, ...], ...],
-) -> tuple[_Sample, ...]:
+) -> tuple[_TurnMeans, ...]:
     """Samples on every mesh, finest first, each starting from the surfaces of the coarser one."""
     if x == 0:
         half = float(half_angle(disc=disc, radius=disc.outer_radius))
         drop = turn[0].density * disc.outer_radius * np.sin(half) / half
-        return (_Sample(values=np.array([0.0, 0.0, 0.0, drop, 0.0])),) * len(meshes)
-    found: list[_Sample] = []
+        return (_TurnMeans(values=np.array([0.0, 0.0, 0.0, drop, 0.0])),) * len(meshes)
+    found: list[_TurnMeans] = []
     for cells, coarser in zip(meshes[::-1], (None, *meshes[:0:-1]), strict=True):
         halves = coarser is not None and all(n == 2 * m for n, m in zip(cells, coarser, strict=True))
         found.append(_turn_mean(disc, turn, angles, x, cells, found[-1].surfaces if halves else ()))
@@ -201,7 +201,7 @@ def _turn_mean(
     x: float,
     cells: tuple[int, ...],
     starts: Sequence[FloatArray],
-) -> _Sample:
+) -> _TurnMeans:
     """Solve on one mesh at every angle of gravity over half a turn and take the mean over the whole turn.
 
     Args: `starts`: surfaces on half the cells, one per angle, or none.
@@ -211,7 +211,7 @@ def _turn_mean(
         start = refined_surface(starts[k]) if starts else None
         solution = _solved(disc, liquid, x, cells, start)
         if not solution.status.ok:
-            return _Sample(values=np.zeros(len(QUANTITIES)), status=solution.status)
+            return _TurnMeans(values=np.zeros(len(QUANTITIES)), status=solution.status)
         solutions.append(solution)
     rows = np.array(
         [
@@ -223,7 +223,7 @@ def _turn_mean(
     if angles.size > 1:
         weights[[0, -1]] /= 2
     extra = [s.statistics.extra for s in solutions]
-    return _Sample(
+    return _TurnMeans(
         values=weights @ rows,
         ripple=np.abs(2 * (weights * np.cos(angles)) @ rows[:, 1:3]) if angles.size > 1 else np.zeros(2),
         surfaces=tuple(s.chamber.surface_radius for s in solutions) if turn[0].gravity else (),
@@ -252,7 +252,7 @@ def _collected(
     liquid: RotatingLiquid,
     fills: FloatArray,
     meshes: tuple[tuple[int, ...], ...],
-    samples: Sequence[tuple[_Sample, ...]],
+    samples: Sequence[tuple[_TurnMeans, ...]],
 ) -> RingQuantities:
     values = np.array([[sample.values for sample in levels] for levels in samples])
     sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in meshes]

@@ -63,7 +63,7 @@ def stiffness(basis: Any) -> csr_matrix:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Side:
+class BoundarySide:
     """Quadrature points of one named boundary of a mesh, in the mesh's unit of length.
 
     A side is integrated on its own facets: a facet basis of scikit-fem looks for each point in its cell by
@@ -106,7 +106,7 @@ class Side:
         return coo_matrix(entries, shape=(unknowns, unknowns)).tocsr()
 
 
-def side(mesh: Any, boundary: str) -> Side:
+def side(mesh: Any, boundary: str) -> BoundarySide:
     """A boundary of a mesh of quadratic cells, by its name."""
     facets = mesh.boundaries[boundary]
     corners, edges = mesh.facets, mesh.dofs.edge_dofs
@@ -123,7 +123,7 @@ def side(mesh: Any, boundary: str) -> Side:
     inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
     outward = mesh.p[:, corners[:, facets]].mean(axis=1) - inside
     area *= np.sign(np.einsum("xfq,xf->fq", area, outward))
-    return Side(
+    return BoundarySide(
         nodes=nodes, values=values, points=np.einsum("xnf,nq->xfq", mesh.doflocs[:, nodes], values), area=area
     )
 
@@ -273,11 +273,11 @@ class PressureSolution:
     status: Status
     statistics: Statistics
 
-    def side(self, boundary: str) -> Side:
+    def side(self, boundary: str) -> BoundarySide:
         """Quadrature points of one boundary, in the mesh's unit."""
         return side(self.chamber.mesh, boundary)
 
-    def surface_flux(self, surface: Side) -> FloatArray:
+    def surface_flux(self, surface: BoundarySide) -> FloatArray:
         """n . grad p at the points of the free surface, Pa/m."""
         nodal = np.zeros(self.pressure.size)
         nodal[self.chamber.grid[0]] = self.surface_gradient

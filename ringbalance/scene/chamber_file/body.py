@@ -11,7 +11,7 @@ import numpy as np
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.elements import CELL_KINDS, CORNERS, FACET_KINDS, MOST_NODES, dimension
 from ringbalance.scene.chamber_file.record import CellKind
-from ringbalance.scene.kinds import Finding
+from ringbalance.scene.kinds import Contradiction
 
 _KINDS: Final = f"cells of one kind: {', '.join(CELL_KINDS)}"
 _MOST_SHOWN: Final = 4
@@ -22,14 +22,14 @@ _FARTHEST: Final = 1e9
 class MeshFileError(Exception):
     """A mesh that cannot be used. Args: `findings`: what is wrong, at least one."""
 
-    def __init__(self, findings: Iterable[Finding]) -> None:
+    def __init__(self, findings: Iterable[Contradiction]) -> None:
         self.findings = tuple(findings)
         super().__init__("; ".join(each.problem for each in self.findings))
 
     @classmethod
     def of(cls, problem: str, allowed: str = "") -> MeshFileError:
         """The error of a file in which nothing further can be looked at."""
-        return cls([Finding(problem=problem, allowed=allowed)])
+        return cls([Contradiction(problem=problem, allowed=allowed)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +128,7 @@ class Body:
         )
 
 
-def _wrong_kinds(contents: Contents, solid: list[int]) -> Iterator[Finding]:
+def _wrong_kinds(contents: Contents, solid: list[int]) -> Iterator[Contradiction]:
     counts: dict[str, int] = {}
     for kind, nodes in (contents.blocks[number] for number in solid):
         if len(nodes):
@@ -136,31 +136,33 @@ def _wrong_kinds(contents: Contents, solid: list[int]) -> Iterator[Finding]:
     total = sum(counts.values())
     if max(total, len(contents.points)) > MOST_NODES:
         problem = f"it has {len(contents.points)} nodes and {total} cells, more than can be checked"
-        yield Finding(problem=problem, allowed=f"up to {MOST_NODES} of each; a larger mesh size")
+        yield Contradiction(problem=problem, allowed=f"up to {MOST_NODES} of each; a larger mesh size")
     if not total:
         there = "only lines and surface elements" if contents.blocks else "no elements"
-        yield Finding(problem=f"it has no cells, {there}: not a mesh of a volume", allowed=_KINDS)
+        yield Contradiction(problem=f"it has no cells, {there}: not a mesh of a volume", allowed=_KINDS)
     known = (*CELL_KINDS, *FACET_KINDS.values())
     unknown = dict.fromkeys(kind for kind, _ in contents.blocks if dimension(kind) > 1 and kind not in known)
     for kind in unknown:
-        yield Finding(problem=f"it has elements of the kind {kind}", allowed=f"{_KINDS}, and their facets")
+        yield Contradiction(
+            problem=f"it has elements of the kind {kind}", allowed=f"{_KINDS}, and their facets"
+        )
     if len(counts) > 1:
         mixture = "; ".join(f"{count} {kind}" for kind, count in counts.items())
-        yield Finding(problem=f"it mixes kinds of cells: {mixture}", allowed=_KINDS)
+        yield Contradiction(problem=f"it mixes kinds of cells: {mixture}", allowed=_KINDS)
 
 
-def _wrong_nodes(contents: Contents) -> Iterator[Finding]:
+def _wrong_nodes(contents: Contents) -> Iterator[Contradiction]:
     points = contents.points
     wrong = ~np.isfinite(points).all(axis=1)
     if wrong.any():
-        yield Finding(problem=f"coordinates are no finite numbers ({wrong.sum()} nodes)", allowed="")
+        yield Contradiction(problem=f"coordinates are no finite numbers ({wrong.sum()} nodes)", allowed="")
     elif points.size and np.abs(points).max() > _FARTHEST:
-        yield Finding(problem=f"a coordinate is above {_FARTHEST:g}", allowed="")
+        yield Contradiction(problem=f"a coordinate is above {_FARTHEST:g}", allowed="")
     for kind, nodes in contents.blocks:
         lost = ((nodes < 0) | (nodes >= len(points))).any(axis=1)
         if lost.any():
             problem = f"{kind} elements have nodes that the file does not give ({lost.sum()})"
-            yield Finding(problem=problem, allowed="")
+            yield Contradiction(problem=problem, allowed="")
 
 
 def _cell_names(contents: Contents, solid: list[int]) -> Iterator[tuple[str, BoolArray]]:

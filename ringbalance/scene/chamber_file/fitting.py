@@ -18,8 +18,8 @@ from ringbalance.scene.chamber_file.body import Body
 from ringbalance.scene.chamber_file.elements import corners_of, edges_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL, PORT, Axis, MeshUnit
 from ringbalance.scene.keys.derivations import even_number_of_chambers
-from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.kinds import Finding, failed_checks, written
+from ringbalance.scene.keys.reading import SceneReading
+from ringbalance.scene.kinds import Contradiction, failed_checks, written
 from ringbalance.scene.rules.shape import DRAWING_ROUNDING, SIZE_CHECKS
 from ringbalance.scene.units import DIMENSIONS
 
@@ -47,7 +47,7 @@ def placed(
     *,
     axis: Axis,
     middle: float | None,
-) -> tuple[Placed, tuple[Finding, ...]]:
+) -> tuple[Placed, tuple[Contradiction, ...]]:
     """A body turned so that z is the shaft and x the middle of the chamber, and why it cannot lie there.
 
     Args: `surface`: the outer facets. `middle`: angle of the chamber's middle, rad, in the plane
@@ -124,15 +124,17 @@ def _from_origin(first: FloatArray, last: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(nearest[:, 0], nearest[:, 1]), dtype=np.float64)
 
 
-def _about_axis(body: Body, inner: float, outer: float, extent: float, node: int) -> Iterator[Finding]:
+def _about_axis(body: Body, inner: float, outer: float, extent: float, node: int) -> Iterator[Contradiction]:
     if extent > math.pi * (1 + DRAWING_ROUNDING) or inner <= 1e-6 * outer:
         what = "touches the shaft's axis" if inner <= 1e-6 * outer else "reaches round the shaft's axis"
         problem = f"the chamber {what}: it takes {written(extent, 'deg')}, and its node nearest to the axis "
         problem += f"lies {body.at(np.array([node]))}"
-        yield Finding(problem=problem, allowed="one chamber beside the axis; see mesh_axis and the origin")
+        yield Contradiction(
+            problem=problem, allowed="one chamber beside the axis; see mesh_axis and the origin"
+        )
 
 
-def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[Finding]:
+def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[Contradiction]:
     """The outer wall reaches farther out than the inner wall, and has the outermost nodes."""
     if OUTER_WALL not in boundaries:
         return
@@ -143,12 +145,12 @@ def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[F
         name = next(name for name, each in boundaries.items() if radius[each].max() == highest)
         problem = f'"{OUTER_WALL}" reaches to a radius of {written(float(wall.max()), "mm")}, but "{name}" '
         problem += f"to {written(highest, 'mm')}: names exchanged, or the shaft is not mesh_axis"
-        yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
+        yield Contradiction(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
     elif _facing(points, boundaries[OUTER_WALL]) < _LEAST_FACING:
         problem = (
             f'"{OUTER_WALL}" lies along the radius, no part of it holds liquid outward: a plate or an end'
         )
-        yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
+        yield Contradiction(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
 
 
 def _facing(points: FloatArray, facets: IntArray) -> float:
@@ -177,13 +179,13 @@ _FRAME: Final = [0, 1, 2, -1]
 
 
 def unfitting(
-    reading: Reading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
-) -> Iterator[Finding]:
+    reading: SceneReading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
+) -> Iterator[Contradiction]:
     """What does not fit between the mesh and other keys of the scene."""
     extent = found.dimensions["central_angle"]
     if reading.lacks("disc.chambers") and even_number_of_chambers(extent) is None:
         problem = f"chambers is needed: the mesh takes {written(extent, 'deg')}, no even part of 360 deg"
-        yield Finding(problem=problem, allowed="chambers in [disc]")
+        yield Contradiction(problem=problem, allowed="chambers in [disc]")
     chambers = reading.values.get("disc.chambers") or even_number_of_chambers(extent)
     if chambers is not None:
         yield from _opening_findings(body, found.points, chambers=chambers)
@@ -207,8 +209,8 @@ def unfitting(
 
 
 def _scale_findings(
-    reading: Reading, dimensions: Mapping[str, float], *, unit: str, port: float | None
-) -> Iterator[Finding]:
+    reading: SceneReading, dimensions: Mapping[str, float], *, unit: str, port: float | None
+) -> Iterator[Contradiction]:
     """Lengths of the scene that no chamber of this size has, and the units in which they would fit.
 
     A length that fits no unit is an error of its own, not one of scale.
@@ -228,14 +230,14 @@ def _scale_findings(
     allowed = " or ".join(f'mesh_unit = "{name}"' for name in fitting)
     if not reading.given("disc.mesh_unit"):
         allowed = " or ".join(f'a STEP file in "{name}"' for name in fitting)
-    yield Finding(
+    yield Contradiction(
         problem=f"{problem}wrong scale; {reason}",
         allowed=allowed or f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m",
     )
 
 
 def _misfit(
-    reading: Reading, dimensions: Mapping[str, float], *, factor: float, port: float | None
+    reading: SceneReading, dimensions: Mapping[str, float], *, factor: float, port: float | None
 ) -> str | None:
     """Why a chamber so many times as large cannot be; None where it can."""
     sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
@@ -248,7 +250,7 @@ def _misfit(
     return None if fault is None else f"[{fault.table}] {fault.key} = {fault.value}: {fault.problem}"
 
 
-def _opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Iterator[Finding]:
+def _opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Iterator[Contradiction]:
     """Nodes outside the sector that a chamber has at most. Args: `points`: as placed."""
     half = math.pi / chambers
     angle = np.abs(np.arctan2(points[:, 1], points[:, 0]))
@@ -258,12 +260,14 @@ def _opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Itera
         problem = f"nodes lie outside the opening angle, 360 deg / {chambers} chambers about the middle "
         problem += f"({len(wrong)}); farthest: {body.at(worst)}"
         limit = written(half, "deg")
-        yield Finding(problem=problem, allowed=f"within {limit} on both sides of the middle (mesh_middle)")
+        yield Contradiction(
+            problem=problem, allowed=f"within {limit} on both sides of the middle (mesh_middle)"
+        )
 
 
 def _port_findings(
     points: FloatArray, boundaries: Mapping[str, IntArray], dimensions: Mapping[str, float], *, port: float
-) -> Iterator[Finding]:
+) -> Iterator[Contradiction]:
     """A port's radius beside the named port."""
     if PORT not in boundaries:
         return
@@ -273,12 +277,12 @@ def _port_findings(
     if not low - rounding <= port <= high + rounding:
         where = f"from {written(low, 'mm')} to {written(high, 'mm')}"
         problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {where}'
-        yield Finding(problem=problem, allowed="a radius on the port, or no port_radius")
+        yield Contradiction(problem=problem, allowed="a radius on the port, or no port_radius")
 
 
 def _covered_findings(
     body: Body, points: FloatArray, *, radii: Mapping[str, float], fill: float
-) -> Iterator[Finding]:
+) -> Iterator[Contradiction]:
     """Ports that the liquid leaves free at the start, and a gas inlet that it covers when it is most.
 
     Args: `radii`: of "port_radius" and "inlet_radius", as far as known. `fill`: greatest fill ratio of a
@@ -293,8 +297,8 @@ def _covered_findings(
         if name == "port_radius" and outside > fill / 2:
             problem = f"at the start (fill {fill / 2:.3g}) the liquid does not cover {name}, "
             problem += f"{written(radius, 'mm')}: {100 * outside:.3g} % of the chamber lies outside it"
-            yield Finding(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
+            yield Contradiction(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
         if name == "inlet_radius" and outside < fill:
             problem = f"at max_fill_ratio ({fill:.3g}) the liquid covers {name}, {written(radius, 'mm')}: "
             problem += f"{100 * outside:.3g} % of the chamber lies outside it"
-            yield Finding(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")
+            yield Contradiction(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")

@@ -22,8 +22,8 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry, MeshKeys
 from ringbalance.scene.chamber_file.soundness import Facets, boundaries_of, oriented
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
-from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.kinds import Finding
+from ringbalance.scene.keys.reading import SceneReading
+from ringbalance.scene.kinds import Contradiction
 from ringbalance.scene.platform.files import read_bounded
 from ringbalance.scene.uncertain import SHAPE
 from ringbalance.scene.units import DIMENSIONS
@@ -37,7 +37,7 @@ _COARSEST, _FINEST = 1 / 6, 1 / 40
 _LARGEST_FILE: Final = 2**28
 
 
-def with_chamber(reading: Reading, *, folder: Path) -> tuple[Reading, tuple[Fault, ...]]:
+def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, tuple[Fault, ...]]:
     """The reading with the geometry and the dimensions of the mesh that it names, and all errors of it."""
     keys = [f"disc.{key}" for key in keys_of(MeshKeys)]
     if not reading.given("disc.mesh"):
@@ -53,27 +53,29 @@ def with_chamber(reading: Reading, *, folder: Path) -> tuple[Reading, tuple[Faul
     return (unknown, superfluous) if superfluous else (known, ())
 
 
-def _mesh_faults(reading: Reading, error: MeshFileError | MemoryError) -> Iterator[Fault]:
+def _mesh_faults(reading: SceneReading, error: MeshFileError | MemoryError) -> Iterator[Fault]:
     """One error for each finding; what a file calls its parts is printable in it."""
-    scarce = Finding(problem="memory does not suffice to check a mesh of this size", allowed="a coarser mesh")
+    scarce = Contradiction(
+        problem="memory does not suffice to check a mesh of this size", allowed="a coarser mesh"
+    )
     for each in error.findings if isinstance(error, MeshFileError) else (scarce,):
         problem = "".join(letter if letter.isprintable() else "?" for letter in each.problem)
         yield reading.fault("disc.mesh", problem=problem, allowed=each.allowed)
 
 
-def _pointless(reading: Reading, path: str) -> Fault:
+def _pointless(reading: SceneReading, path: str) -> Fault:
     problem = "it has no meaning without mesh"
     return reading.fault(path, problem=problem, allowed="mesh as well, or leave the key out")
 
 
-def _superfluous(reading: Reading) -> Iterator[Fault]:
+def _superfluous(reading: SceneReading) -> Iterator[Fault]:
     for key in SHAPE:
         if reading.given(f"disc.{key}"):
             allowed = "either mesh or this key; the mesh decides"
             yield reading.fault(f"disc.{key}", problem="it follows from the mesh", allowed=allowed)
 
 
-def _unit_faults(reading: Reading) -> Iterator[Fault]:
+def _unit_faults(reading: SceneReading) -> Iterator[Fault]:
     path = "disc.mesh_unit"
     if not reading.known("disc.mesh"):
         return
@@ -85,7 +87,7 @@ def _unit_faults(reading: Reading) -> Iterator[Fault]:
         yield reading.fault(path, problem=problem, allowed=reading.allowed(path))
 
 
-def _following(reading: Reading, geometry: ChamberGeometry, found: Placed) -> Reading:
+def _following(reading: SceneReading, geometry: ChamberGeometry, found: Placed) -> SceneReading:
     values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
     port = port_radius(found.points, geometry.boundaries)
     if port is not None and reading.lacks(PORT_RADIUS):
@@ -93,7 +95,7 @@ def _following(reading: Reading, geometry: ChamberGeometry, found: Placed) -> Re
     return reading.following({**values, "disc.geometry": geometry})
 
 
-def _chamber(reading: Reading, folder: Path) -> tuple[ChamberGeometry, Placed]:
+def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
     path = folder / name

@@ -252,7 +252,7 @@ _SKIPPED: Final = re.compile(r"(surface|line|volume)\d+|_.*|", re.IGNORECASE)
 
 
 @dataclass
-class _Parts:
+class _MeshContent:
     """What was read so far; names in small letters."""
 
     nodes: list[FloatArray] = field(default_factory=list)
@@ -274,7 +274,7 @@ def _read_abaqus(content: bytes) -> Contents:
     Source: Abaqus keywords reference, *NODE, *ELEMENT, *ELSET, *SURFACE; faces of solid elements as its
         element library numbers them.
     """
-    parts = _Parts()
+    parts = _MeshContent()
     for keyword, options, data in _keywords(content.decode("utf-8", errors="replace")):
         if keyword == "step":
             break
@@ -336,7 +336,7 @@ def _refuse_unread(keyword: str, options: dict[str, str]) -> None:
             raise MeshFileError.of(f"*{keyword.upper()} has the option {option}, which is not read", names)
 
 
-def _add(parts: _Parts, keyword: str, options: dict[str, str], data: list[str]) -> None:
+def _add(parts: _MeshContent, keyword: str, options: dict[str, str], data: list[str]) -> None:
     if keyword == "instance" and data:
         raise MeshFileError.of(
             "*INSTANCE moves the part", "a part in its final place, or a mesh without parts"
@@ -387,7 +387,7 @@ def _kind(name: str) -> str:
     return kind
 
 
-def _set(data: list[str], generate: bool, parts: _Parts) -> IntArray:
+def _set(data: list[str], generate: bool, parts: _MeshContent) -> IntArray:
     """Numbers of elements in a set: listed, as first, last and step, or by the names of other sets."""
     words = [word.strip().lower() for line in data for word in line.split(",") if word.strip()]
     listed = [word for word in words if word.isdigit()]
@@ -402,13 +402,13 @@ def _set(data: list[str], generate: bool, parts: _Parts) -> IntArray:
     return every[inside]
 
 
-def _numbers_in(name: str, parts: _Parts) -> IntArray:
+def _numbers_in(name: str, parts: _MeshContent) -> IntArray:
     """Numbers of the elements that a set, or *ELEMENT with its option, has under a name."""
     named = [rows[:, 0] for _, block, rows in parts.elements if block == name]
     return np.concatenate([np.empty(0, dtype=np.int64), *named, *parts.sets.get(name, [])])
 
 
-def _marks(parts: _Parts) -> Iterator[Mark]:
+def _marks(parts: _MeshContent) -> Iterator[Mark]:
     """Names of elements; a set of cells matters as `chamber` only."""
     names = dict.fromkeys([*parts.sets, *(name for _, name, _ in parts.elements)])
     for name in (each for each in names if not _SKIPPED.fullmatch(each)):
@@ -418,7 +418,7 @@ def _marks(parts: _Parts) -> Iterator[Mark]:
                 yield Mark(name=name, block=block, where=np.isin(rows[:, 0], numbers))
 
 
-def _sides(parts: _Parts) -> Iterator[tuple[str, IntArray]]:
+def _sides(parts: _MeshContent) -> Iterator[tuple[str, IntArray]]:
     """Name and facets of each line of a *SURFACE, as numbers of nodes."""
     for name, first, side in parts.surfaces:
         one = first.isdigit() and len(first) < 16

@@ -30,7 +30,7 @@ from ringbalance.scene.chamber_file.elements import (
 )
 from ringbalance.scene.chamber_file.record import KNOWN_NAMES, OUTER_WALL, VOLUME, WALLS
 from ringbalance.scene.faults import closest, did_you_mean
-from ringbalance.scene.kinds import Finding
+from ringbalance.scene.kinds import Contradiction
 from ringbalance.scene.toml import toml_text
 
 _SAME: Final = 1e-7
@@ -72,7 +72,7 @@ class Facets:
             shared=counts > 2,
         )
 
-    def findings(self, body: Body) -> Iterator[Finding]:
+    def findings(self, body: Body) -> Iterator[Contradiction]:
         """What is wrong with how cells hang together."""
         ordered = np.sort(body.cells, axis=1)
         twice = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
@@ -89,10 +89,10 @@ class Facets:
         yield from _about(body, "nodes belong to no cell", unused, allowed)
 
 
-def _about(body: Body, what: str, entities: IntArray, allowed: str) -> Iterator[Finding]:
+def _about(body: Body, what: str, entities: IntArray, allowed: str) -> Iterator[Contradiction]:
     """An error about some nodes, or about entities that are given as rows of nodes; none without any."""
     if len(entities):
-        yield Finding(problem=f"{what} ({len(entities)}): {body.at(entities)}", allowed=allowed)
+        yield Contradiction(problem=f"{what} ({len(entities)}): {body.at(entities)}", allowed=allowed)
 
 
 def _same_rows(rows: IntArray) -> IntArray:
@@ -105,19 +105,19 @@ def _same_rows(rows: IntArray) -> IntArray:
     return np.asarray(order[1:][same], dtype=np.int64)
 
 
-def _same_cells(body: Body) -> Iterator[Finding]:
+def _same_cells(body: Body) -> Iterator[Contradiction]:
     again = _same_rows(np.sort(body.corners, axis=1))
     yield from _about(body, "cells stand in the file twice", body.corners[again], "each cell once")
 
 
-def _crowded_facets(body: Body, facets: Facets) -> Iterator[Finding]:
+def _crowded_facets(body: Body, facets: Facets) -> Iterator[Contradiction]:
     shared = np.flatnonzero(facets.shared)
     _, first = np.unique(facets.keys[shared], return_index=True)
     rows = facets.nodes[shared[first], : facets.corners]
     yield from _about(body, "facets belong to more than two cells", rows, "at most two cells at a facet")
 
 
-def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
+def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
     """Nodes at one place that are not the same node: the body has a slit there."""
     nodes = np.unique(facets.nodes[facets.outer])
     points = body.points[nodes]
@@ -128,7 +128,7 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     yield from _about(body, "nodes lie where another node lies already", twice, allowed)
 
 
-def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
+def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
     """Nodes that lie on a facet of which they are no corner."""
     middles = np.unique(body.cells[:, CORNERS[body.kind] :])
     mixed = np.intersect1d(middles, body.corners)
@@ -173,7 +173,7 @@ def _inside(at: FloatArray, one: FloatArray, two: FloatArray) -> BoolArray:
     return np.asarray(flat & (shares > -_ON).all(axis=1) & (shares < 1 - _ON).all(axis=1), dtype=np.bool_)
 
 
-def _several_volumes(body: Body, facets: Facets) -> Iterator[Finding]:
+def _several_volumes(body: Body, facets: Facets) -> Iterator[Contradiction]:
     order = np.argsort(facets.keys, kind="stable")
     meet = np.flatnonzero(facets.keys[order[1:]] == facets.keys[order[:-1]])
     one, two = facets.cells[order[meet]], facets.cells[order[meet + 1]]
@@ -182,10 +182,10 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Finding]:
     if count > 1:
         _, first = np.unique(part, return_index=True)
         problem = f"it falls into {count} separate volumes, which begin {body.at(body.corners[first])}"
-        yield Finding(problem=problem, allowed="one chamber, whose cells meet at facets")
+        yield Contradiction(problem=problem, allowed="one chamber, whose cells meet at facets")
 
 
-def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
+def _pinched(body: Body, facets: Facets) -> Iterator[Contradiction]:
     """Edges at which the outer surface meets itself."""
     edges = np.sort(edges_of(facets.nodes[facets.outer, : facets.corners]).reshape(-1, 2), axis=1)
     different, counts = np.unique(edges, axis=0, return_counts=True)
@@ -199,7 +199,7 @@ _FLAT: Final = 1e-9
 """Jacobian over the cube of the longest diagonal below which a cell has no volume that rounding leaves."""
 
 
-def oriented(body: Body) -> tuple[Body, tuple[Finding, ...]]:
+def oriented(body: Body) -> tuple[Body, tuple[Contradiction, ...]]:
     """The body with positive cells, and cells that are inverted, folded or flat.
 
     A body whose every cell is negative was written in the other orientation, and is turned round.
@@ -234,7 +234,9 @@ def _jacobians(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
     return found[0], found[1], found[2]
 
 
-def _misshapen(body: Body, *, flat: BoolArray, inverted: BoolArray, folded: BoolArray) -> Iterator[Finding]:
+def _misshapen(
+    body: Body, *, flat: BoolArray, inverted: BoolArray, folded: BoolArray
+) -> Iterator[Contradiction]:
     yield from _about(
         body,
         "cells are degenerate, without volume",
@@ -267,7 +269,7 @@ def _mirrored(kind: str) -> IntArray:
     return np.array([nodes.index([y, x, z]) for x, y, z in nodes], dtype=np.int64)
 
 
-def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tuple[Finding, ...]]:
+def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tuple[Contradiction, ...]]:
     """Facets of a body by name, each as its cell has them, and what is wrong with the names."""
     wrong = [*_volume_names(body), *_missing(body)]
     sides = facets.outer[np.argsort(facets.keys[facets.outer], kind="stable")]
@@ -297,7 +299,7 @@ def _places(body: Body, facets: Facets, named: NamedFacets, keys: IntArray) -> t
     return at, (keys[at] == wanted) & (corners.shape[1] == facets.corners)
 
 
-def _volume_names(body: Body) -> Iterator[Finding]:
+def _volume_names(body: Body) -> Iterator[Contradiction]:
     """All cells belong to the volume, or none has a name; a single group of cells is the volume."""
     groups = dict(body.cell_names)
     volume = next(iter(groups)) if len(groups) == 1 else VOLUME
@@ -312,7 +314,7 @@ def _volume_names(body: Body) -> Iterator[Finding]:
         yield from _about(body, what, body.corners[~inside], f"every cell in {toml_text(volume)}")
 
 
-def _unknown(body: Body, facets: Facets, sides: IntArray, held: BoolArray) -> Iterator[Finding]:
+def _unknown(body: Body, facets: Facets, sides: IntArray, held: BoolArray) -> Iterator[Contradiction]:
     """Facets of an unknown name that have no known one beside it. Args: `held`: as names times `sides`."""
     for each in body.named:
         if each.name not in KNOWN_NAMES:
@@ -323,7 +325,7 @@ def _unknown(body: Body, facets: Facets, sides: IntArray, held: BoolArray) -> It
             yield from _about(body, what, each.corners[alone], ", ".join(KNOWN_NAMES))
 
 
-def _missing(body: Body) -> Iterator[Finding]:
+def _missing(body: Body) -> Iterator[Contradiction]:
     """An error where no facet is the outer wall, with the names that the file does have."""
     names = dict.fromkeys(each.name for each in body.named)
     if any(closest(name, KNOWN_NAMES) == OUTER_WALL for name in names):
@@ -331,17 +333,17 @@ def _missing(body: Body) -> Iterator[Finding]:
     volumes = [name for name, _ in body.cell_names]
     if OUTER_WALL in (*body.lesser, *volumes):
         what = "lines or points" if OUTER_WALL in body.lesser else "cells"
-        yield Finding(
+        yield Contradiction(
             problem=f'"{OUTER_WALL}" names {what}, not facets', allowed="a name of surface elements"
         )
         return
     there = dict.fromkeys([*names, *volumes, *body.lesser, *body.other_names])
     listed = ", ".join(map(toml_text, there)) or "none"
     problem = f'no facets have the name "{OUTER_WALL}"; names in the file: {listed[:300]}'
-    yield Finding(problem=problem, allowed=f'a named boundary "{OUTER_WALL}" (Gmsh: Physical Surface)')
+    yield Contradiction(problem=problem, allowed=f'a named boundary "{OUTER_WALL}" (Gmsh: Physical Surface)')
 
 
-def _no_facets(body: Body, facets: Facets, named: NamedFacets, real: BoolArray) -> Iterator[Finding]:
+def _no_facets(body: Body, facets: Facets, named: NamedFacets, real: BoolArray) -> Iterator[Contradiction]:
     """Named elements that are no outer facet: between two cells, or of no cell."""
     _, side = _places(body, facets, named, np.sort(facets.keys))
     for wrong, what in ((side & ~real, "lie between two cells"), (~side, "are no side of any cell")):
@@ -349,7 +351,9 @@ def _no_facets(body: Body, facets: Facets, named: NamedFacets, real: BoolArray) 
         yield from _about(body, what, named.corners[wrong], "facets of the chamber's surface")
 
 
-def _other_middles(body: Body, cell: IntArray, named: NamedFacets, real: BoolArray) -> Iterator[Finding]:
+def _other_middles(
+    body: Body, cell: IntArray, named: NamedFacets, real: BoolArray
+) -> Iterator[Contradiction]:
     """Facets of second order whose mid-side nodes are not those of their cell."""
     nodes = named.nodes[real]
     if cell.shape[1] == nodes.shape[1]:

@@ -17,7 +17,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from ringbalance.scene.keys.fields import Reader, choice
+from ringbalance.scene.keys.fields import ValueReader, choice
 from ringbalance.scene.units import DIMENSIONS, unit_of
 
 Part = TypeVar("Part")
@@ -71,7 +71,7 @@ class Entries:
 class Key:
     """One key of a scene file."""
 
-    takes: Reader | Entries
+    takes: ValueReader | Entries
     presence: Presence
     uncertain: bool = False
     """Whether [uncertainty] may have its half-width."""
@@ -199,9 +199,9 @@ def _parts(hint: Any) -> Iterator[Any]:
         yield from _parts(inner)
 
 
-def _takes(hint: Any) -> Reader | Entries:
+def _takes(hint: Any) -> ValueReader | Entries:
     for part in _parts(hint):
-        if isinstance(part, Reader):
+        if isinstance(part, ValueReader):
             return part
         if get_origin(part) is Literal:
             return choice(part)

@@ -22,7 +22,7 @@ LEAST_CHAMBERS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reader:
+class ValueReader:
     """How the values of one key are read."""
 
     read: Callable[[object], Any]
@@ -72,7 +72,7 @@ POSITIVE = Bounds(above=0)
 NOT_NEGATIVE = Bounds(at_least=0)
 
 
-def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
+def quantity(dimension: str, bounds: Bounds | None = None) -> ValueReader:
     """Reader of text such as "44.5 mm", of a key of `DIMENSIONS`; bounds in SI, None for any sign."""
     kind = DIMENSIONS[dimension]
     limits = bounds or Bounds()
@@ -89,16 +89,16 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
             )
         return number
 
-    return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
+    return ValueReader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
 
 
-def _pressure(bounds: Bounds, *, gauge: bool) -> Reader:
+def _pressure(bounds: Bounds, *, gauge: bool) -> ValueReader:
     """Reader of a gauge or an absolute pressure, in whose unit that may be marked: "7 barg", "1 bara"."""
     plain = quantity("pressure", bounds)
     return replace(plain, read=lambda value: plain.read(counted_pressure(value, gauge=gauge)))
 
 
-def _balance_grade() -> Reader:
+def _balance_grade() -> ValueReader:
     """Reader of a balance quality grade of ISO 21940-11, m/s: "G 2.5", or the velocity it stands for."""
     plain = quantity("velocity", POSITIVE)
     allowed = f'a grade such as "G 2.5", or {plain.allowed}'
@@ -110,12 +110,12 @@ def _balance_grade() -> Reader:
         except FieldError as error:
             raise FieldError(error.problem, allowed) from None
 
-    return Reader(
+    return ValueReader(
         read=read, allowed=allowed, summary='a grade such as "G 2.5" or "2.5 mm/s"', dimension="velocity"
     )
 
 
-def angle_of_turn() -> Reader:
+def angle_of_turn() -> ValueReader:
     """Reader of a phase or lag, rad; beyond a full turn either way it is wrapped to within half a turn."""
     allowed = f'an angle such as "{DIMENSIONS["angle"].example}", in {DIMENSIONS["angle"].unit_names}'
 
@@ -124,10 +124,10 @@ def angle_of_turn() -> Reader:
         # 360 deg is the full turn itself, however it was rounded.
         return angle if abs(angle) <= 2 * math.pi * (1 + 1e-12) else math.remainder(angle, 2 * math.pi)
 
-    return Reader(read=read, allowed=allowed, summary="an angle", dimension="angle")
+    return ValueReader(read=read, allowed=allowed, summary="an angle", dimension="angle")
 
 
-def share(bounds: Bounds, *, example: float) -> Reader:
+def share(bounds: Bounds, *, example: float) -> ValueReader:
     """Reader of a share of one: a bare number or a percentage."""
     allowed = f'a share {bounds}, such as {example:g} or "{100 * example:g} %"'
 
@@ -137,10 +137,10 @@ def share(bounds: Bounds, *, example: float) -> Reader:
             raise FieldError(f"it must be {bounds}", allowed)
         return number
 
-    return Reader(read=read, allowed=allowed, summary=f"a share {bounds}, bare or in %")
+    return ValueReader(read=read, allowed=allowed, summary=f"a share {bounds}, bare or in %")
 
 
-def number(bounds: Bounds) -> Reader:
+def number(bounds: Bounds) -> ValueReader:
     """Reader of a bare number that has no unit."""
     allowed = f"a bare number {bounds}".replace("number at", "number of at").strip()
 
@@ -150,7 +150,7 @@ def number(bounds: Bounds) -> Reader:
             raise FieldError(f"it must be {bounds}", allowed)
         return plain
 
-    return Reader(read=read, allowed=allowed, summary=allowed)
+    return ValueReader(read=read, allowed=allowed, summary=allowed)
 
 
 def _number(value: object, allowed: str) -> float:
@@ -173,7 +173,7 @@ def _whole(value: object, allowed: str) -> int:
     return value
 
 
-def chamber_count() -> Reader:
+def chamber_count() -> ValueReader:
     """Reader of the number of chambers: even, at least two pairs, and no more than there are letters for."""
     allowed = f"an even whole number from {LEAST_CHAMBERS} to {len(LETTERS)}"
 
@@ -187,10 +187,10 @@ def chamber_count() -> Reader:
             raise FieldError(f"it must lie from {LEAST_CHAMBERS} to {len(LETTERS)}", allowed)
         return count
 
-    return Reader(read=read, allowed=allowed, summary=allowed)
+    return ValueReader(read=read, allowed=allowed, summary=allowed)
 
 
-def whole(lowest: int, highest: int, *, highest_text: str = "") -> Reader:
+def whole(lowest: int, highest: int, *, highest_text: str = "") -> ValueReader:
     """Reader of a whole number; `highest_text` is the highest as people write it."""
     interval = f"from {lowest} to {highest_text or highest}"
     allowed = f"a whole number {interval}"
@@ -201,10 +201,10 @@ def whole(lowest: int, highest: int, *, highest_text: str = "") -> Reader:
             raise FieldError(f"it must lie {interval}", allowed)
         return count
 
-    return Reader(read=read, allowed=allowed, summary=allowed)
+    return ValueReader(read=read, allowed=allowed, summary=allowed)
 
 
-def each_of(reader: Reader, *, example: str, count: int = 0) -> Reader:
+def each_of(reader: ValueReader, *, example: str, count: int = 0) -> ValueReader:
     """Reader of a list of values of one sort, as many as `count` unless it is zero; its values are tuples."""
     size = f"a list of {count}" if count else "a list"
     allowed = f"{size} such as {example}; each {reader.allowed}"
@@ -221,10 +221,10 @@ def each_of(reader: Reader, *, example: str, count: int = 0) -> Reader:
             raise FieldError(f"entry {place}: {error.problem}", error.allowed) from error
 
     summary = f"{size}, each {reader.summary}"
-    return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
+    return ValueReader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
 
 
-def _one_or_each(reader: Reader, *, example: str) -> Reader:
+def _one_or_each(reader: ValueReader, *, example: str) -> ValueReader:
     """Reader of one value, or of a list of one for each chamber; its values are tuples."""
     listed, more = each_of(reader, example=example), "or a list of one for each chamber"
 
@@ -241,12 +241,12 @@ def _one_or_each(reader: Reader, *, example: str) -> Reader:
     )
 
 
-def choice(words: Any) -> Reader:
+def choice(words: Any) -> ValueReader:
     """Reader of one of a few words, which a `Literal` lists."""
     return one_of(lambda: get_args(words))
 
 
-def one_of(words: Callable[[], tuple[str, ...]]) -> Reader:
+def one_of(words: Callable[[], tuple[str, ...]]) -> ValueReader:
     """Reader of one of the words that are there when it reads."""
 
     def quoted() -> str:
@@ -260,10 +260,10 @@ def one_of(words: Callable[[], tuple[str, ...]]) -> Reader:
             raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", quoted())
         return value
 
-    return Reader(read=read, allowed=quoted(), summary=quoted())
+    return ValueReader(read=read, allowed=quoted(), summary=quoted())
 
 
-def text() -> Reader:
+def text() -> ValueReader:
     """Reader of text on one line."""
     allowed = f"text on one line, up to {_LONGEST_NAME} characters"
 
@@ -274,10 +274,10 @@ def text() -> Reader:
             raise FieldError("it is empty, too long or not printable", allowed)
         return value
 
-    return Reader(read=read, allowed=allowed, summary=allowed)
+    return ValueReader(read=read, allowed=allowed, summary=allowed)
 
 
-def chamber_letters() -> Reader:
+def chamber_letters() -> ValueReader:
     """Reader of the order in which chambers are tried: different capital letters."""
     allowed = 'a list of chamber letters, each once, such as ["A", "C", "B", "D"]'
 
@@ -291,10 +291,10 @@ def chamber_letters() -> Reader:
             raise FieldError("a chamber stands in it more than once", allowed)
         return tuple(letters)
 
-    return Reader(read=read, allowed=allowed, summary=allowed)
+    return ValueReader(read=read, allowed=allowed, summary=allowed)
 
 
-def half_width(dimension: str | None) -> Reader:
+def half_width(dimension: str | None) -> ValueReader:
     """Reader of an expanded uncertainty (95 %): a percentage, or in the unit of the quantity's dimension.
 
     Its values are (half-width, whether it is relative); SI when it is not.
@@ -314,7 +314,7 @@ def half_width(dimension: str | None) -> Reader:
             raise FieldError("an uncertainty must be at least 0 and below 100 %", allowed)
         return width, relative
 
-    return Reader(read=read, allowed=allowed, summary=f"a percentage, or {name}")
+    return ValueReader(read=read, allowed=allowed, summary=f"a percentage, or {name}")
 
 
 OneLine = Annotated[str, text()]

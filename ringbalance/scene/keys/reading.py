@@ -44,7 +44,7 @@ class TableRead:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class SceneReading:
     """What is known of a scene file so far; paths are "table.key", or "key" at the top level."""
 
     file: str
@@ -62,11 +62,11 @@ class Reading:
     tables: Mapping[str, TableRead] = field(default_factory=dict)
     """Of the document, by name."""
 
-    def adding(self, values: Mapping[str, Any]) -> Reading:
+    def adding(self, values: Mapping[str, Any]) -> SceneReading:
         """Copy with more values, SI, by path."""
         return replace(self, values={**self.values, **values})
 
-    def following(self, values: Mapping[str, Any]) -> Reading:
+    def following(self, values: Mapping[str, Any]) -> SceneReading:
         """Copy with more values that another file gives."""
         return replace(self.adding(values), derived=self.derived | frozenset(values))
 
@@ -116,7 +116,7 @@ class Reading:
             value = format_quantity(value, key.takes.dimension, key.usual_unit)
         return f"{toml_text(value)} ({source})"
 
-    def completed(self) -> Reading:
+    def completed(self) -> SceneReading:
         """Fill in the defaults that follow from other values, as far as those are known.
 
         What a default follows from is there already, because a key is declared after it; a needed key follows
@@ -152,7 +152,7 @@ class Reading:
 
 def read_document(
     document: Mapping[str, Any], *, file: str, schema: Schema, before: Mapping[str, TableRead] | None = None
-) -> tuple[Reading, tuple[Fault, ...]]:
+) -> tuple[SceneReading, tuple[Fault, ...]]:
     """What could be read of a TOML document, and an error for each value, key or table that could not.
 
     Args: `before`: tables of another document that this one was made from.
@@ -175,7 +175,7 @@ def read_document(
     }
     if broken:
         values = {path: value for path, value in values.items() if not {path, path.split(".")[0]} & broken}
-    reading = Reading(
+    reading = SceneReading(
         file=file, document=document, values=values, broken=broken, schema=schema, tables=tables
     )
     # A key that is missing where a misspelt one was meant for it is one error, not two.

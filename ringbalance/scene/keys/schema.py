@@ -24,7 +24,7 @@ _UNCERTAINTY = "expanded uncertainties (95 %) of the inputs"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class TableSchema:
     """One table of a scene file."""
 
     text: str
@@ -33,7 +33,7 @@ class Table:
     """What is made of it; None when the scene has its values elsewhere."""
 
     @classmethod
-    def of(cls, record: type, text: str) -> Table:
+    def of(cls, record: type, text: str) -> TableSchema:
         """A table that becomes a record. Args: `text`: what it describes."""
         return cls(text=text, keys=keys_of(record), record=record)
 
@@ -44,7 +44,7 @@ class Schema:
 
     top: Mapping[str, Key]
     """Keys before the first table."""
-    tables: Mapping[str, Table]
+    tables: Mapping[str, TableSchema]
     scene: Callable[..., Any]
     """What is made of it all."""
 
@@ -89,11 +89,11 @@ class Schema:
     @classmethod
     def of(
         cls,
-        tables: Mapping[str, Table],
+        tables: Mapping[str, TableSchema],
         *,
         balancer: Presence,
         scene: Callable[..., Any],
-        uncertainty: Table | None = None,
+        uncertainty: TableSchema | None = None,
     ) -> Schema:
         """The schema of a kind of balancer, with what every scene file has.
 
@@ -115,13 +115,13 @@ class Schema:
         )
 
 
-def _disc() -> Table:
+def _disc() -> TableSchema:
     """The dimensions of its chambers, or the mesh of one from which they follow."""
     dimensions, mesh = keys_of(models.Disc), keys_of(MeshKeys)
-    return Table(text="the balancing disc", keys={**dimensions, **mesh}, record=models.Disc)
+    return TableSchema(text="the balancing disc", keys={**dimensions, **mesh}, record=models.Disc)
 
 
-def _rotor() -> Table:
+def _rotor() -> TableSchema:
     """Amplitude and phase are entries of one key, and two fields of the record."""
     vibration = Key(
         takes=Entries(record=loop_models.Vibration, keys=keys_of(loop_models.Vibration), example=""),
@@ -130,7 +130,7 @@ def _rotor() -> Table:
             "{ amplitude, phase } before balancing, zero-to-peak",
         ),
     )
-    return Table(
+    return TableSchema(
         text="the rotor as the balancer sees it",
         keys={**keys_of(loop_models.Rotor), "initial_vibration": vibration},
         record=loop_models.Rotor,
@@ -145,23 +145,23 @@ def _half_width_of(table: str, key: Key) -> Key:
     )
 
 
-def _uncertainty(tables: Mapping[str, Table]) -> Table:
+def _uncertainty(tables: Mapping[str, TableSchema]) -> TableSchema:
     keys = {
         name: _half_width_of(table, key)
         for table, content in tables.items()
         for name, key in content.keys.items()
         if key.uncertain
     }
-    return Table(text=_UNCERTAINTY, keys=keys)
+    return TableSchema(text=_UNCERTAINTY, keys=keys)
 
 
-def _uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
+def _uncertainty_by_table(tables: Mapping[str, TableSchema]) -> TableSchema:
     """[uncertainty] with a table of half-widths for each table, where tables share names of keys."""
     keys = {
         table: {name: _half_width_of(table, key) for name, key in content.keys.items() if key.uncertain}
         for table, content in tables.items()
     }
-    return Table(
+    return TableSchema(
         text=_UNCERTAINTY,
         keys={
             table: Key(
@@ -174,7 +174,7 @@ def _uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
     )
 
 
-def _origins(table: Table) -> Key:
+def _origins(table: TableSchema) -> Key:
     meaning = unused("given", "where the value comes from")
     each = Key(takes=choice(Origin), presence=meaning)
     return Key(
@@ -191,14 +191,14 @@ _TOLERANCE = Key(
     ),
 )
 _RUN = {
-    "run": Table.of(loop_models.RunSettings, "a simulation's seed and end"),
-    "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
-    "fitted": Table.of(
+    "run": TableSchema.of(loop_models.RunSettings, "a simulation's seed and end"),
+    "accuracy": TableSchema(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
+    "fitted": TableSchema.of(
         Fitted,
         "what a fit leaves uncertain, jointly: standard deviations of the values in this file, and how they "
         "go together; `ringbalance fit --save` writes it",
     ),
-    "measured": Table.of(
+    "measured": TableSchema.of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
     ),
 }
@@ -206,18 +206,18 @@ _RUN = {
 
 _LIQUID_RING = {
     "disc": _disc(),
-    "liquid": Table.of(models.Liquid, "the balancing liquid"),
-    "tube": Table.of(models.Tube, "the tube that connects two opposite chambers"),
-    "gas": Table.of(models.Gas, "the gas that drives the liquid"),
-    "environment": Table.of(loop_models.Environment, "gravity and how the shaft lies in it"),
+    "liquid": TableSchema.of(models.Liquid, "the balancing liquid"),
+    "tube": TableSchema.of(models.Tube, "the tube that connects two opposite chambers"),
+    "gas": TableSchema.of(models.Gas, "the gas that drives the liquid"),
+    "environment": TableSchema.of(loop_models.Environment, "gravity and how the shaft lies in it"),
     "rotor": _rotor(),
-    "sensor": Table.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
-    "controller": Table.of(loop_models.ControllerSettings, "the control algorithm"),
-    "requirement": Table.of(
+    "sensor": TableSchema.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
+    "controller": TableSchema.of(loop_models.ControllerSettings, "the control algorithm"),
+    "requirement": TableSchema.of(
         loop_models.RequirementSettings,
         "what is required of the balancer; reports compare it with what is reached",
     ),
-    "design": Table.of(DesignSettings, "what `ringbalance design` may choose"),
+    "design": TableSchema.of(DesignSettings, "what `ringbalance design` may choose"),
 }
 LIQUID_RING = Schema.of(
     _LIQUID_RING,

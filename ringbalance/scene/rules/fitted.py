@@ -11,7 +11,7 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, closest
 from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT, ErrorCause, FittedQuantity
-from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.keys.reading import SceneReading
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import DIMENSIONS
@@ -21,7 +21,7 @@ _ROUND_OFF: Final = 1e-6
 """Of a correlation: files have at least seven digits."""
 
 
-def fitted_faults(reading: Reading) -> Iterator[Fault]:
+def fitted_faults(reading: SceneReading) -> Iterator[Fault]:
     """One error for each quantity, unit or list of correlations that cannot be; else one for all of them."""
     quantities: tuple[FittedQuantity, ...] = reading.values.get("fitted.quantities", ())
     wrong = [
@@ -45,7 +45,7 @@ def fitted_faults(reading: Reading) -> Iterator[Fault]:
 _Said = tuple[str, str] | None
 
 
-def _name(reading: Reading, each: FittedQuantity, before: list[str]) -> _Said:
+def _name(reading: SceneReading, each: FittedQuantity, before: list[str]) -> _Said:
     """Whether the scene has such an uncertain quantity, once."""
     if each.quantity in before:
         return "it stands there twice", "each quantity once"
@@ -66,13 +66,13 @@ def _name(reading: Reading, each: FittedQuantity, before: list[str]) -> _Said:
     return None
 
 
-def _uncertain(reading: Reading) -> list[str]:
+def _uncertain(reading: SceneReading) -> list[str]:
     """Paths of all quantities that may be uncertain."""
     tables = reading.schema.tables.items()
     return [f"{name}.{key}" for name, table in tables for key, each in table.keys.items() if each.uncertain]
 
 
-def _unit(reading: Reading, each: FittedQuantity) -> _Said:
+def _unit(reading: SceneReading, each: FittedQuantity) -> _Said:
     path = _PATH.fullmatch(each.quantity)
     if path is None or f"{path[1]}.{path[2]}" not in _uncertain(reading):
         allowed: tuple[str, ...] = (NO_UNIT,)
@@ -91,7 +91,7 @@ def _row(each: FittedQuantity, place: int, count: int) -> _Said:
     return None
 
 
-def _matrix(reading: Reading, correlations: FloatArray) -> Iterator[Fault]:
+def _matrix(reading: SceneReading, correlations: FloatArray) -> Iterator[Fault]:
     """Symmetric, and no combination with a negative variance, within round-off."""
     apart = np.abs(correlations - correlations.T)
     if np.max(apart) > _ROUND_OFF:
@@ -105,6 +105,6 @@ def _matrix(reading: Reading, correlations: FloatArray) -> Iterator[Fault]:
         yield _fault(reading, "quantities", f"smallest eigenvalue {least:.3g}", problem, allowed)
 
 
-def _fault(reading: Reading, key: str, value: object, problem: str, allowed: str) -> Fault:
+def _fault(reading: SceneReading, key: str, value: object, problem: str, allowed: str) -> Fault:
     text = toml_text(value) if not isinstance(value, tuple) else toml_text(list(value))
     return Fault(file=reading.file, table="fitted", key=key, value=text, problem=problem, allowed=allowed)

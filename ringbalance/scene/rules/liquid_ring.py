@@ -11,7 +11,7 @@ from ringbalance.scene.chamber_file.record import MeshKeys
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.keys.reading import Reading, TableRead, read_document
+from ringbalance.scene.keys.reading import SceneReading, TableRead, read_document
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.kinds import SceneKind, failed_checks
 from ringbalance.scene.liquids import with_liquid
@@ -26,7 +26,7 @@ def _read(
     folder: Path,
     derived: Mapping[str, Any],
     before: Mapping[str, TableRead],
-) -> tuple[Reading, tuple[Fault, ...]]:
+) -> tuple[SceneReading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=LIQUID_RING, before=before)
     if derived:
         reading = reading.following(derived)
@@ -40,7 +40,7 @@ def _read(
     return reading, (*faults, *missing, *liquid_faults, *failed, *working.uncertainty_faults(reading))
 
 
-def _shortest_length(reading: Reading) -> Mapping[str, float]:
+def _shortest_length(reading: SceneReading) -> Mapping[str, float]:
     """With a given k the length matters for the liquid's inertia only: that of the shortest tube is used."""
     hump_settled = reading.known("tube.hump_radius") or reading.lacks("tube.hump_radius")
     settled = reading.known("tube.drag_coefficient", "tube.port_radius") and hump_settled
@@ -53,7 +53,7 @@ def _shortest_length(reading: Reading) -> Mapping[str, float]:
     return {"tube.length": length}
 
 
-def _needed_by_others(reading: Reading) -> Iterator[Fault]:
+def _needed_by_others(reading: SceneReading) -> Iterator[Fault]:
     if reading.given("tube") and reading.lacks("tube.length") and reading.lacks("tube.drag_coefficient"):
         yield reading.missing("tube.length", "k cannot be calculated without it")
     if reading.values.get("tube.entrance") == "rounded" and reading.lacks("tube.entrance_radius"):

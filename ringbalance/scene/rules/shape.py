@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 from ringbalance.scene.keys.derivations import even_number_of_chambers, shortest_path, swept_area
-from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.kinds import Check, Finding, check, written
+from ringbalance.scene.keys.reading import SceneReading
+from ringbalance.scene.kinds import Check, Contradiction, check, written
 from ringbalance.scene.models import Bend
 
 _ROUNDING = 1e-9
@@ -22,28 +22,28 @@ DRAWING_ROUNDING = 1e-5
 """Relative: "1.5708 rad" is a right angle."""
 
 
-def _radii_in_order(inner: float, outer: float) -> Finding | None:
+def _radii_in_order(inner: float, outer: float) -> Contradiction | None:
     """R1 < R2."""
     if inner < outer:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the inner radius must be smaller than outer_radius ({written(outer, 'mm')})",
         allowed=f"above 0 mm and below {written(outer, 'mm')}",
     )
 
 
-def _chamber_has_depth(inner: float, outer: float) -> Finding | None:
+def _chamber_has_depth(inner: float, outer: float) -> Contradiction | None:
     """R2 - R1 >= 1e-8 R2."""
     least = _SHALLOWEST * outer
     if outer - inner >= least:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the chamber is too shallow to be resolved: outer_radius is {written(outer, 'mm')}",
         allowed=f"at least {_SHALLOWEST:g} of outer_radius, {written(least, 'mm')}, below outer_radius",
     )
 
 
-def _fill_has_depth(share: float, inner: float, outer: float) -> Finding | None:
+def _fill_has_depth(share: float, inner: float, outer: float) -> Contradiction | None:
     """The ring at max_fill_ratio is at least 1e-8 R2 deep: R2 - sqrt(R2^2 - x (R2^2 - R1^2)).
 
     Geometry without plates, which at most halve the depth.
@@ -52,14 +52,14 @@ def _fill_has_depth(share: float, inner: float, outer: float) -> Finding | None:
     if share >= lowest:
         return None
     # The allowed value is rounded up, so that what the message names passes.
-    return Finding(
+    return Contradiction(
         problem=f"the ring would be shallower than {_SHALLOWEST:g} of outer_radius "
         f"({written(outer, 'mm')}), too shallow to be resolved",
         allowed=f"at least {min(1.0, 1.01 * lowest):.3g} for this disc, at most 1",
     )
 
 
-def _chamber_wide_enough(angle: float, thickness: float, inner: float, outer: float) -> Finding | None:
+def _chamber_wide_enough(angle: float, thickness: float, inner: float, outer: float) -> Contradiction | None:
     """The opening between the plates is at least 1/2000 of the depth: 2 R1 (theta/2 - asin(t/R1)).
 
     Rounding in elongated cells grows with the square of depth over opening.
@@ -67,40 +67,40 @@ def _chamber_wide_enough(angle: float, thickness: float, inner: float, outer: fl
     lowest = 2 * math.asin(thickness / inner) + _NARROWEST * (outer - inner) / inner
     if angle >= lowest:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the chamber's opening at inner_radius ({written(inner, 'mm')}) is below 1/2000 of its "
         "depth, too narrow to be resolved",
         allowed=f"at least {written(1.001 * lowest, 'deg')} for these radii and this plate_thickness",
     )
 
 
-def _plates_leave_room(thickness: float, inner: float, angle: float) -> Finding | None:
+def _plates_leave_room(thickness: float, inner: float, angle: float) -> Contradiction | None:
     """The plates leave an opening at the inner radius: asin(t/R1) < theta/2."""
     limit = inner * math.sin(min(angle, math.pi) / 2)
     if thickness < limit:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the plates close the chamber at inner_radius ({written(inner, 'mm')})",
         allowed=f"at least 0 mm and below inner_radius * sin(central_angle / 2) = {written(limit, 'mm')}",
     )
 
 
-def _chambers_fit(angle: float, chambers: int) -> Finding | None:
+def _chambers_fit(angle: float, chambers: int) -> Contradiction | None:
     """n theta <= 2 pi, within the rounding of a drawing."""
     limit = 2 * math.pi / chambers
     if angle <= limit * (1 + DRAWING_ROUNDING):
         return None
-    return Finding(
+    return Contradiction(
         problem=f"{chambers} chambers of this angle do not fit into 360 deg",
         allowed=f"above 0 deg and at most 360 deg / chambers = {written(limit, 'deg')}",
     )
 
 
-def _chambers_even(angle: float) -> Finding | None:
+def _chambers_even(angle: float) -> Contradiction | None:
     """2 pi / theta is an even whole number."""
     if even_number_of_chambers(angle) is not None:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"360 deg / central_angle = {2 * math.pi / angle:.6g} is not an even number of chambers, at "
         "least four",
         allowed="90 deg, 60 deg, 45 deg, 36 deg ... (13.8462 deg for 26 chambers at the most), or at most "
@@ -108,22 +108,22 @@ def _chambers_even(angle: float) -> Finding | None:
     )
 
 
-def _fills_share_the_liquid(initial: float, share: float) -> Finding | None:
+def _fills_share_the_liquid(initial: float, share: float) -> Contradiction | None:
     """Two opposite chambers of equal fill share max_fill_ratio."""
     if abs(2 * initial - share) <= _ROUNDING * share:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"two opposite chambers start with equal fills that add up to max_fill_ratio ({share:g})",
         allowed=f"{share / 2:g}, or leave the key out",
     )
 
 
-def _port_in_chamber(port: float, inner: float, outer: float) -> Finding | None:
+def _port_in_chamber(port: float, inner: float, outer: float) -> Contradiction | None:
     """R1 < r_p <= R2."""
     if inner < port <= outer:
         return None
     inside = f"above inner_radius ({written(inner, 'mm')})"
-    return Finding(
+    return Contradiction(
         problem="the port lies outside the chamber",
         allowed=f"{inside} and at most outer_radius ({written(outer, 'mm')})",
     )
@@ -131,7 +131,7 @@ def _port_in_chamber(port: float, inner: float, outer: float) -> Finding | None:
 
 def _port_under_liquid(
     port: float, initial: float, inner: float, outer: float, angle: float, thickness: float
-) -> Finding | None:
+) -> Contradiction | None:
     """At the start the ports lie under the liquid: what lies outside r_p holds less than the fill.
 
     A port inside the outer wall is allowed: liquid outside it stays in its chamber.
@@ -140,7 +140,7 @@ def _port_under_liquid(
     if outside < initial:
         return None
     larger = f", or max_fill_ratio above {2 * outside:.3g}" if 2 * outside < 1 else ""
-    return Finding(
+    return Contradiction(
         problem=f"at the start (fill {initial:.3g}) the liquid does not cover the port: {outside:.3g} of the "
         "chamber lies outside it, so gas would pass through the tube in place of liquid",
         allowed=f"nearer to outer_radius ({written(outer, 'mm')}){larger}",
@@ -149,18 +149,18 @@ def _port_under_liquid(
 
 def _inlet_above_liquid(
     inlet: float, largest: float, inner: float, outer: float, angle: float, thickness: float
-) -> Finding | None:
+) -> Contradiction | None:
     """R1 <= r_i < R2, and the liquid of a pair in one chamber leaves the gas inlet free."""
     if not inner <= inlet < outer:
         inside = f"at least inner_radius ({written(inner, 'mm')})"
-        return Finding(
+        return Contradiction(
             problem="the gas inlet lies outside the chamber",
             allowed=f"{inside} and below outer_radius ({written(outer, 'mm')})",
         )
     outside = _fraction_outside(inlet, inner, outer, angle, thickness)
     if largest < outside:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"at max_fill_ratio ({largest:.3g}) the liquid covers the gas inlet: {outside:.3g} of the "
         "chamber lies outside it",
         allowed=f"nearer to inner_radius ({written(inner, 'mm')}), or max_fill_ratio below {outside:.3g}",
@@ -175,94 +175,98 @@ def _fraction_outside(radius: float, inner: float, outer: float, angle: float, t
     return float((within[2] - within[1]) / (within[2] - within[0]))
 
 
-def _crest_in_disc(crest: float, outer: float) -> Finding | None:
+def _crest_in_disc(crest: float, outer: float) -> Contradiction | None:
     """r_m < R2, which holds for a crest inside any port."""
     if crest < outer:
         return None
     most = f"which is at most outer_radius ({written(outer, 'mm')})"
-    return Finding(
+    return Contradiction(
         problem="the siphon crest lies outside the port, and outside the chamber's outer wall too",
         allowed=f"above 0 mm and below port_radius, {most}",
     )
 
 
-def _crest_inside_port(crest: float, port: float) -> Finding | None:
+def _crest_inside_port(crest: float, port: float) -> Contradiction | None:
     """r_m < r_p."""
     if crest < port:
         return None
-    return Finding(
+    return Contradiction(
         problem="the siphon crest lies outside the port, but it is the smallest radius on the path",
         allowed=f"above 0 mm and below port_radius ({written(port, 'mm')}), or leave the key out",
     )
 
 
-def _bore_fits_bends(bore: float, bends: tuple[Bend, ...]) -> Finding | None:
+def _bore_fits_bends(bore: float, bends: tuple[Bend, ...]) -> Contradiction | None:
     """The inner side of each bend has a radius of its own: d/2 <= radius of the centre line."""
     tightest = min((bend.radius for bend in bends), default=math.inf)
     if bore <= 2 * tightest * (1 + _ROUNDING):
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the bore is wider than the tightest of the bends allows (radius {written(tightest, 'mm')})",
         allowed=f"above 0 mm and at most twice that radius, {written(2 * tightest, 'mm')}",
     )
 
 
-def _bore_fits_chamber(bore: float, width: float, inner: float, outer: float) -> Finding | None:
+def _bore_fits_chamber(bore: float, width: float, inner: float, outer: float) -> Contradiction | None:
     """Some wall of the chamber is as large as the bore."""
     limit = max(width, outer - inner)
     if bore <= limit:
         return None
-    return Finding(
+    return Contradiction(
         problem="no wall of the chamber is large enough for this bore",
         allowed=f"above 0 mm and at most {written(limit, 'mm')}, the larger of axial_width and "
         "outer_radius - inner_radius",
     )
 
 
-def _roughness_fits_bore(roughness: float, bore: float) -> Finding | None:
+def _roughness_fits_bore(roughness: float, bore: float) -> Contradiction | None:
     """Roughness below d/2."""
     if roughness < bore / 2:
         return None
-    return Finding(
+    return Contradiction(
         problem="a roughness of half the bore closes the tube",
         allowed=f"at least 0 um and below bore / 2 = {written(bore / 2, 'mm')}",
     )
 
 
-def _length_holds_bends(length: float, bends: tuple[Bend, ...]) -> Finding | None:
+def _length_holds_bends(length: float, bends: tuple[Bend, ...]) -> Contradiction | None:
     """L >= sum of the bends' arcs, each angle times radius."""
     arcs = math.fsum(bend.angle * bend.radius for bend in bends)
     if length >= arcs * (1 - _ROUNDING):
         return None
-    return Finding(
+    return Contradiction(
         problem="the tube is shorter than the arcs of its bends together",
         allowed=f"at least {written(arcs, 'mm')}, the sum of angle * radius over the bends",
     )
 
 
-def _length_reaches_over_crest(length: float, angle: float, port: float, crest: float) -> Finding | None:
+def _length_reaches_over_crest(
+    length: float, angle: float, port: float, crest: float
+) -> Contradiction | None:
     """As `_length_reaches`, over the crest."""
     return _length_reaches(length, angle, port, crest)
 
 
-def _length_reaches(length: float, angle: float, port: float, crest: float | None = None) -> Finding | None:
+def _length_reaches(
+    length: float, angle: float, port: float, crest: float | None = None
+) -> Contradiction | None:
     """L >= the shortest path between ports anywhere in opposite chambers, at least pi - theta apart."""
     separation = max(math.pi - angle, 0.0)
     shortest = shortest_path(port_radius=port, hump_radius=crest, separation=separation)
     if length >= shortest * (1 - _ROUNDING):
         return None
     over = "" if crest is None else f" over the siphon crest at {written(crest, 'mm')}"
-    return Finding(
+    return Contradiction(
         problem=f"the tube cannot reach the opposite port{over}",
         allowed=f"at least {written(shortest, 'mm')}, the shortest path from chamber to opposite chamber",
     )
 
 
-def _entrance_has_radius(radius: float, entrance: str) -> Finding | None:
+def _entrance_has_radius(radius: float, entrance: str) -> Contradiction | None:
     """Only a rounded entrance has a radius."""
     if entrance == "rounded" or radius == 0:
         return None
-    return Finding(
+    return Contradiction(
         problem=f'a {entrance} entrance has no radius (entrance = "{entrance}")',
         allowed='leave the key out, or entrance = "rounded"',
     )
@@ -278,7 +282,7 @@ _NO_CHAMBER = (*_NO_DEPTH, _plates_leave_room, _chamber_wide_enough, _fill_has_d
 _NO_PATH = (_port_in_chamber, _crest_in_disc, _crest_inside_port)
 
 
-def _drawn(reading: Reading) -> bool:
+def _drawn(reading: SceneReading) -> bool:
     """Whether the keys give the chamber; a mesh is looked at itself."""
     return not reading.known("disc.geometry")
 

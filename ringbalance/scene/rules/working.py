@@ -25,8 +25,8 @@ from typing import Final
 
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.fields import LETTERS
-from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.kinds import Check, Finding, check, limit_above_noise, written
+from ringbalance.scene.keys.reading import SceneReading
+from ringbalance.scene.kinds import Check, Contradiction, check, limit_above_noise, written
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
@@ -57,23 +57,23 @@ def bulk_modulus(liquid: Liquid) -> float:
     return _WATER if liquid.name.casefold() == "water" else _OTHER
 
 
-def _rim_holds(speed: float, outer: float) -> Finding | None:
+def _rim_holds(speed: float, outer: float) -> Contradiction | None:
     """omega R2 <= 1 km/s."""
     if speed * outer <= _LARGEST_RIM_SPEED:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the rim would move at {speed * outer:.4g} m/s, which no disc withstands",
         allowed=f"above 0 rpm and at most {_rpm(_LARGEST_RIM_SPEED / outer)}, {_LARGEST_RIM_SPEED:g} m/s at "
         f"outer_radius ({written(outer, 'mm')})",
     )
 
 
-def _gas_column_holds(speed: float, outer: float, temperature: float) -> Finding | None:
+def _gas_column_holds(speed: float, outer: float, temperature: float) -> Contradiction | None:
     """(omega R2)^2 <= R T/2."""
     fastest = math.sqrt(2 * _LARGEST_EXPONENT * AIR_CONSTANT * temperature)
     if speed * outer <= fastest:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the rim would move at {speed * outer:.4g} m/s, too fast to know the gas pressure on the "
         'liquid from one on the shaft (gas.measured_at = "shaft")',
         allowed=f"at most {_rpm(fastest / outer)}, {fastest:.3g} m/s at outer_radius with this "
@@ -85,86 +85,86 @@ def _rpm(speed: float) -> str:
     return f"{_ROUNDED * speed * 30 / math.pi:.4g} rpm"
 
 
-def _on_shaft(reading: Reading) -> bool:
+def _on_shaft(reading: SceneReading) -> bool:
     return bool(reading.values.get("gas.measured_at") == "shaft")
 
 
-def _liquid_stays_liquid(vapour: float, ambient: float) -> Finding | None:
+def _liquid_stays_liquid(vapour: float, ambient: float) -> Contradiction | None:
     """Vapour pressure below ambient pressure, both absolute."""
     if vapour < ambient:
         return None
     limit = written(ambient, "kPa")
-    return Finding(
+    return Contradiction(
         problem=f"the liquid boils: its vapour pressure reaches ambient_pressure ({limit})",
         allowed=f"at least 0 kPa and below {limit}, absolute",
     )
 
 
-def _temperature_below_boiling(_temperature: float, vapour: float, ambient: float) -> Finding | None:
+def _temperature_below_boiling(_temperature: float, vapour: float, ambient: float) -> Contradiction | None:
     """Vapour pressure at the given temperature below ambient pressure."""
     if vapour < ambient:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the liquid boils: its vapour pressure at this temperature is {written(vapour, 'kPa')}",
         allowed=f"a temperature at which it is below ambient_pressure ({written(ambient, 'kPa')})",
     )
 
 
-def _gas_times_in_order(minimum: float, maximum: float) -> Finding | None:
+def _gas_times_in_order(minimum: float, maximum: float) -> Contradiction | None:
     if minimum < maximum:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"minimum_gas_time must be shorter than maximum_gas_time ({written(maximum, 's')})",
         allowed=f"at least 0 s and below {written(maximum, 's')}",
     )
 
 
-def _period_covers_lag(period: float, lag: float) -> Finding | None:
+def _period_covers_lag(period: float, lag: float) -> Contradiction | None:
     """The sampling period is not shorter than the valve's lag."""
     if period >= lag:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"the next sample would be taken before the valve has moved (valve_lag {written(lag, 's')})",
         allowed=f"at least {written(lag, 's')}",
     )
 
 
-def _trial_time_executed(step: float, minimum: float, maximum: float) -> Finding | None:
+def _trial_time_executed(step: float, minimum: float, maximum: float) -> Contradiction | None:
     """A valve-open time lies between the shortest and the longest that are executed."""
     if minimum <= step <= maximum:
         return None
     least = f"minimum_gas_time ({written(minimum, 's')})"
-    return Finding(
+    return Contradiction(
         problem="a valve-open time of this length is never executed",
         allowed=f"from {least} to maximum_gas_time ({written(maximum, 's')})",
     )
 
 
-def _steps_in_order(short: float, long: float) -> Finding | None:
+def _steps_in_order(short: float, long: float) -> Contradiction | None:
     if short <= long:
         return None
-    return Finding(
+    return Contradiction(
         problem=f"short_step must not be longer than long_step ({written(long, 's')})",
         allowed=f"above 0 s and at most {written(long, 's')}",
     )
 
 
-def _sequence_complete(sequence: tuple[str, ...], chambers: int) -> Finding | None:
+def _sequence_complete(sequence: tuple[str, ...], chambers: int) -> Contradiction | None:
     """Every chamber stands in the sequence once."""
     letters = LETTERS[:chambers]
     if sorted(sequence) == list(letters):
         return None
-    return Finding(
+    return Contradiction(
         problem=f"each of the {chambers} chambers must stand in it once",
         allowed=f"the letters {', '.join(letters)} in any order",
     )
 
 
-def _one_for_each(offsets: tuple[float, ...] | None, chambers: int) -> Finding | None:
+def _one_for_each(offsets: tuple[float, ...] | None, chambers: int) -> Contradiction | None:
     """One time for all chambers, or one for each."""
     if offsets is None or len(offsets) in (1, chambers):
         return None
-    return Finding(
+    return Contradiction(
         problem=f"a list of {len(offsets)} times for {chambers} chambers",
         allowed=f"one time for all, or a list of {chambers} in the order of the letters",
     )
@@ -176,7 +176,7 @@ _GAS_TIMES = ("controller.minimum_gas_time", "controller.maximum_gas_time")
 _TRIAL_TIMES = ("controller.first_trial", "controller.long_step", "controller.short_step")
 
 
-def _by_trial(reading: Reading) -> bool:
+def _by_trial(reading: SceneReading) -> bool:
     return bool(reading.values.get("controller.kind") == "trial")
 
 
@@ -204,7 +204,7 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-def uncertainty_faults(reading: Reading) -> Iterator[Fault]:
+def uncertainty_faults(reading: SceneReading) -> Iterator[Fault]:
     """One error for each uncertainty of a quantity that the scene lacks, or that is larger than it."""
     for path in reading.tables["uncertainty"].values:
         key = path.removeprefix("uncertainty.")
@@ -229,5 +229,5 @@ def uncertainty_faults(reading: Reading) -> Iterator[Fault]:
             yield reading.fault(path, problem=problem, allowed="at most the quantity itself, or below 100 %")
 
 
-def _may_be_unused(reading: Reading, path: str) -> bool:
+def _may_be_unused(reading: SceneReading, path: str) -> bool:
     return reading.schema.key_at(tuple(path.split("."))).presence.kind == "unused"

@@ -15,7 +15,7 @@ from ringbalance.scene.keys.fields import (
     Turn,
     quantity,
 )
-from ringbalance.scene.keys.schema import Schema, Table
+from ringbalance.scene.keys.schema import Schema, TableSchema
 from ringbalance.scene.kinds import SceneKind, reader_of
 from ringbalance.scene.origins import SceneFile
 
@@ -62,9 +62,9 @@ class BallScene(SceneFile):
 
 _SCHEMA = Schema.of(
     {
-        "rotor": Table.of(Rotor, "the rotor"),
-        "balls": Table.of(Balls, "the balls in their race"),
-        "vibration": Table.of(Vibration, "what is required"),
+        "rotor": TableSchema.of(Rotor, "the rotor"),
+        "balls": TableSchema.of(Balls, "the balls in their race"),
+        "vibration": TableSchema.of(Vibration, "what is required"),
     },
     balancer=needed('"ball"'),
     scene=BallScene,

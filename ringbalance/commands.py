@@ -50,8 +50,8 @@ class ShellCommand(NamedTuple):
     failure: str = ""
     """Condition of exit code 1; empty: never given."""
     begin: str = ""
-    """First text of the progress, where a function of the Python interface does the work; empty: a function of
-    its own takes the options and returns the exit code."""
+    """First text of the progress, where a function of the Python interface does the work; empty: the command
+    has a function of its own, which takes the options and returns the exit code."""
     headline: bool = True
     """See `Rows.view`."""
 

@@ -61,7 +61,7 @@ class Table:
         )
 
     def name_faults(self, suggestions: Collection[str] = ()) -> Iterator[Fault]:
-        """Heads that are no name with a unit, and names that stand twice. Args: `known`: names to suggest."""
+        """Heads that are no name with a unit, and names that stand twice. Args: `suggestions`: names."""
         names = [split_head(head) for head in self.heads]
         for head, name in zip(self.heads, names, strict=True):
             if name is None or not _NAME.fullmatch(name[0]):
@@ -103,7 +103,7 @@ class Table:
 
 
 def data_fault(file: str, position: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
-    """One error of a file of measurements. Args: `place`: such as 'line 3' or 'kind'; may be empty."""
+    """One error of a file of measurements. Args: `position`: such as 'line 3' or 'kind'; may be empty."""
     return Fault(file=file, key=position, value=value, problem=problem, allowed=allowed)
 
 

@@ -61,7 +61,10 @@ class Table:
         )
 
     def name_faults(self, suggestions: Collection[str] = ()) -> Iterator[Fault]:
-        """Heads that are no name with a unit, and names that stand twice. Args: `suggestions`: names."""
+        """Heads that are no name with a unit, and names that stand twice.
+
+        Args: `suggestions`: columns that the kind of data may have.
+        """
         names = [split_head(head) for head in self.heads]
         for head, name in zip(self.heads, names, strict=True):
             if name is None or not _NAME.fullmatch(name[0]):

@@ -6,8 +6,7 @@ versions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from datetime import date
 from functools import partial
@@ -32,7 +31,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
 from ringbalance.reports.section import Record, Work, ring_of
-from ringbalance.reports.sections import begun, collected_beside, completed
+from ringbalance.reports.sections import sections_of
 from ringbalance.results.numbers import given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.keys.declaration import Entries, Key, keys_of
@@ -40,14 +39,15 @@ from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import TableSchema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import InputUncertainty, SceneFile
+from ringbalance.scene.platform.jobs import Job, answers_of
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.scene.units import DIMENSIONS
 from ringbalance.verification import papers
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
-from ringbalance.verification.result import CaseResult, merge_saved
-from ringbalance.verification.runner import cases_under_way, paper_scene
+from ringbalance.verification.result import merge_saved
+from ringbalance.verification.runner import case_jobs, paper_scene
 
 Progress = Callable[[str], None]
 
@@ -65,7 +65,7 @@ def collect_evidence(
     scene_text: str = "",
     saved: Sequence[Mapping[str, Any]] = (),
     pool: Workers | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda _: None,
 ) -> Record:
     """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
 
@@ -73,18 +73,33 @@ def collect_evidence(
     results of heavy cases, which take the place of those not run. `pool`: runs cases beside this process.
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
-    tell = progress or (lambda _: None)
-    work = Work(scene=scene, level=level)
-    # Before the cases, the last of which this process takes when it has nothing else to do.
-    apart = begun(work, pool)
-    with _cases_of_report(scene, level=level, pool=pool) as judged_cases:
-        study = _STUDIES.get(scene.balancer, _plain_study)(scene, tell)
-        sections = collected_beside(work, apart, tell)
-        tell("verification")
-        verification, kept = judged_cases(tell)
-    sections = completed(sections, apart, work, pool)
+    ids = [case.id for case in load_cases() if case.paper == scene.balancer]
+    kept = kept_cases() if level == "light" else {}
+    wanted, heavy = [name for name in ids if name not in kept], level == "heavy"
+    cases = case_jobs(wanted, scene=ring_of(scene) or paper_scene(), level=level, mutations=heavy)
+    sections, work = sections_of(scene.balancer), Work(scene=scene, level=level)
+    study = partial(_STUDIES.get(scene.balancer, _plain_study), scene)
+    # The longest first, and behind it what is short: a worker that is at work does not give those back.
+    jobs = [
+        *(job for section in sections.values() for job in section.jobs(work)),
+        Job(name="study", title="Pressure, law and runs", do=study),
+        *cases,
+    ]
+    # A worker does not know a balancer that was registered in this process.
+    answers = dict(answers_of(jobs, pool if scene.balancer in _STUDIES else None, progress))
+    ran = {
+        # Wall time does not reproduce, and no verdict hangs on it.
+        each.definition.id: {key: value for key, value in each.to_dict().items() if key != "time_s"}
+        for job in cases
+        for each in answers[job.name]
+    }
+    if level == "light":
+        _keep(ran, kept)
+    collected = {name: answers[name] for name in sections if answers.get(name) is not None}
     # What a section measured by the clock does not reproduce.
-    clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
+    clocked = {name: record.pop("times") for name, record in collected.items() if "times" in record}
+    verification = [ran[name] if name in ran else kept[name]["record"] for name in ids]
+    dates = {name: kept[name]["date"] for name in ids if name not in ran}
     return {
         "format": FORMAT,
         "level": level,
@@ -92,12 +107,12 @@ def collect_evidence(
         "versions": versions(),
         "scene": _scene_record(scene, scene_text),
         "seeds": {"run": scene.run.seed},
-        **study,
-        **sections,
+        **answers["study"],
+        **collected,
         "verification": merge_saved(verification, saved),
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
         "provenance": provenance(),
-        "times": {"date": date.today().isoformat(), "kept_cases": kept} | clocked,
+        "times": {"date": date.today().isoformat(), "kept_cases": dates} | clocked,
     }
 
 
@@ -116,13 +131,10 @@ def _scene_record(scene: AnyScene, text: str) -> Record:
     }
 
 
-def _ring_study(scene: Scene, tell: Progress) -> Record:
+def _ring_study(scene: Scene) -> Record:
     """What several sections of a liquid ring look at."""
-    tell("pressure field")
     field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
-    tell("calibration")
     calibration = calibration_of(scene)
-    tell("closed loop")
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
     return {
         "limit_m": scene.controller.limit,
@@ -137,41 +149,6 @@ def _ring_study(scene: Scene, tell: Progress) -> Record:
         "flow_law": _flow_law(scene, calibration),
         "closed_loop": {name: simulate(scene, model).to_dict() for name, model in models.items()},
     }
-
-
-@contextmanager
-def _cases_of_report(
-    scene: AnyScene, *, level: Level, pool: Workers | None
-) -> Iterator[Callable[[Progress], tuple[list[Record], dict[str, str]]]]:
-    """Start the cases of a report that no earlier one has kept; they run beside the body.
-
-    Yields: What waits for them, to be called in the body: records of all cases, and the date of each that an
-    earlier report has kept.
-    """
-    ids = [case.id for case in load_cases() if case.paper == scene.balancer]
-    kept = kept_cases() if level == "light" else {}
-    wanted = [name for name in ids if name not in kept]
-
-    def finished(under_way: Iterator[CaseResult], tell: Progress) -> tuple[list[Record], dict[str, str]]:
-        ran = {case["id"]: case for case in _finished(under_way, len(wanted), tell)}
-        if level == "light":
-            _keep(ran, kept)
-        records = [ran[name] if name in ran else kept[name]["record"] for name in ids]
-        return records, {name: kept[name]["date"] for name in ids if name not in ran}
-
-    if not wanted:
-        yield partial(finished, iter(()))
-        return
-    options: Record = {"level": level, "mutations": level == "heavy", "workers": pool}
-    with cases_under_way(wanted, scene=ring_of(scene) or paper_scene(), **options) as under_way:
-        yield partial(finished, under_way)
-
-
-def _finished(under_way: Iterator[CaseResult], count: int, tell: Progress) -> Iterator[Record]:
-    """Records of the cases as they come; wall time does not reproduce, and no verdict hangs on it."""
-    for number, result in enumerate(under_way, start=1):
-        tell(f"case {number} of {count}: {result.definition.title}")
-        yield {key: value for key, value in result.to_dict().items() if key != "time_s"}
 
 
 def _keep(ran: Mapping[str, Record], kept: Mapping[str, Record]) -> None:
@@ -223,9 +200,8 @@ def _flow_law(scene: Scene, calibration: Calibration) -> Record:
     }
 
 
-def _plain_study(scene: SceneFile, tell: Progress) -> Record:
+def _plain_study(scene: SceneFile) -> Record:
     """One run of any balancer as its scene says, as `simulate` shows it, and what the scene demands."""
-    tell("run")
     balancer = balancer_of(scene)
     run = balancer.run({}, AS_GIVEN, trace=True).traced[0].run
     return {
@@ -235,9 +211,8 @@ def _plain_study(scene: SceneFile, tell: Progress) -> Record:
     }
 
 
-def _eccentric_study(scene: EccentricScene, tell: Progress) -> Record:
+def _eccentric_study(scene: EccentricScene) -> Record:
     """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
-    tell("run")
     run, balancer = simulate_eccentric(scene), balancer_of(scene)
     several = balancer.run({}, Draws.block(FRESH, _TRACED), trace=True)
     truth = {

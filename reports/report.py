@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -22,10 +22,11 @@ from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, drawn
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record, ring_of
-from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of, views_of
+from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene
 from ringbalance.scene.platform.files import staged
+from ringbalance.scene.platform.jobs import Job, answers_of
 from ringbalance.scene.platform.memory import seldom_collected
 from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.evidence import Level
@@ -59,19 +60,11 @@ class Report:
         return terminal_lines(self.evidence) + ([] if pictures["drawn"] else [pictures["text"]])
 
 
-def _views(path: Path, evidence: Record, pool: Workers | None) -> dict[str, Record | None]:
-    """What the pages show, made by a worker, too; what it has not begun, this process makes.
-
-    Args: `path`: file of the evidence.
-    """
-    if pool is None:
-        return views_of(evidence)
-    names = (CASES_VIEW, *sections_of(evidence["balancer"]))
-    under_way = {name: pool.submit(_view_at, name, path) for name in names}
-    return {
-        name: pool.taken(future, partial(view_of, name, evidence))
-        for name, future in reversed(under_way.items())
-    }
+def _views(path: Path, balancer: str, pool: Workers | None) -> Iterator[tuple[str, Record | None]]:
+    """What the pages show, by section and of the cases. Args: `path`: file of the evidence."""
+    # The cases have most figures.
+    names = (CASES_VIEW, *sections_of(balancer))
+    return answers_of([Job(name=name, do=partial(_view_at, name, path)) for name in names], pool)
 
 
 def _view_at(name: str, path: Path) -> Record | None:
@@ -102,7 +95,7 @@ def write_report(
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
     """
-    folder, start = Path(out), time.perf_counter()
+    folder, start, tell = Path(out), time.perf_counter(), progress or (lambda _: None)
     saved = saved_cases(folder)
     with (
         seldom_collected(),
@@ -111,11 +104,11 @@ def write_report(
         _pictures(scene, stage, opengl) as pictures,
     ):
         evidence = collect_evidence(
-            scene, level=level, scene_text=scene_text, saved=saved, pool=pool, progress=progress
+            scene, level=level, scene_text=scene_text, saved=saved, pool=pool, progress=tell
         )
-        _tell(progress, "pictures")
+        tell("pictures")
         evidence["pictures"] = pictures()
-        _tell(progress, "page")
+        tell("page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
         evidence = _write_page(evidence, stage, pool)
     return Report(page=folder / "report.html", evidence=evidence)
@@ -131,17 +124,12 @@ def _pictures(
     return drawn(ring, stage, opengl)
 
 
-def _tell(progress: Progress | None, stage: str) -> None:
-    if progress is not None:
-        progress(stage)
-
-
 def _write_page(evidence: Record, stage: Path, pool: Workers | None) -> Record:
     """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
-    text = evidence_text(evidence)
-    kept: Record = json.loads(text)
-    (stage / "evidence.json").write_text(text, encoding="utf-8")
-    views = _views(stage / "evidence.json", kept, pool)
+    path = stage / "evidence.json"
+    path.write_text(evidence_text(evidence), encoding="utf-8")
+    kept = _read_at(path)
+    views = dict(_views(path, kept["balancer"], pool))
     figures = stage / "figures"
     figures.mkdir(exist_ok=True)
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]

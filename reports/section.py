@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
+from ringbalance.scene.platform.jobs import Job
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 
@@ -64,16 +66,25 @@ class Section:
     """Which of the two documents it stands in."""
     of_paper: bool = False
     """Whether it stands in the annex of every scene but the paper's own."""
-    collect: Callable[[Work], Record | None] = _nothing
-    """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
-    apart: bool = False
-    """Whether a worker may collect it, after the cases: it takes long, and all it needs is compiled then."""
+    collect: Callable[..., Record | None] = _nothing
+    """From the work and the answers of `parts`: plain numbers and texts for the evidence, under the section's
+    name; None: nothing there."""
+    parts: tuple[Job, ...] = ()
+    """Jobs that take the work, and then what they need."""
     show: Callable[[Record, Record], Record | None] = _everything
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False
     """Whether it is shown without evidence of its own, which is then empty."""
     template: str = ""
     """File in `templates`; by default that of its name."""
+
+    def jobs(self, work: Work) -> list[Job]:
+        """Jobs that collect its evidence, the last under its own name; none where it collects nothing."""
+        if self.collect is _nothing:
+            return []
+        needs = tuple(part.name for part in self.parts)
+        last = Job(name=self.name, title=self.title, needs=needs, do=self.collect)
+        return [replace(job, do=partial(job.do, work)) for job in (*self.parts, last)]
 
     @property
     def file(self) -> str:

@@ -5,9 +5,7 @@ A new one is a module with its `SECTION`, a template of its name, and a line in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future
-from functools import partial
+from collections.abc import Mapping
 from itertools import count
 from types import MappingProxyType
 from typing import Any, Final
@@ -28,8 +26,7 @@ from ringbalance.reports.pages import (
     tube_flow,
 )
 from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DOCUMENT
-from ringbalance.reports.section import Place, Record, Section, Work
-from ringbalance.scene.platform.processes import Workers
+from ringbalance.reports.section import Place, Record, Section
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
@@ -65,7 +62,6 @@ _BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(
 """Of those balancers that have pages of their own."""
 CASES_VIEW: Final = "verification"
 """Among the views of a report, that of all cases."""
-Begun = dict[str, Future[Record | None]]
 PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
 """Before the number of every section, figure, table and equation of a document."""
 
@@ -73,38 +69,6 @@ PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": 
 def sections_of(balancer: str) -> dict[str, Section]:
     """The sections of a report on a kind of balancer, in the page's order, by name."""
     return {section.name: section for section in _BY_BALANCER.get(balancer, plain.SECTIONS)}
-
-
-def begun(work: Work, pool: Workers | None) -> Begun:
-    """Have a worker, where there is one, collect the evidence of sections apart."""
-    apart = [section.name for section in sections_of(work.scene.balancer).values() if section.apart]
-    # The first takes longest; a worker that is at it does not give back the next ones: short ones follow.
-    apart[1:] = apart[:0:-1]
-    return {name: pool.submit(collected, name, work) for name in apart} if pool else {}
-
-
-def collected(name: str, work: Work) -> Record | None:
-    """What one section collects of a scene."""
-    return sections_of(work.scene.balancer)[name].collect(work)
-
-
-def collected_beside(work: Work, apart: Begun, progress: Callable[[str], None]) -> Record:
-    """The evidence of the sections that no worker has begun."""
-    sections = {name: one for name, one in sections_of(work.scene.balancer).items() if name not in apart}
-    records: Record = {}
-    for number, (name, section) in enumerate(sections.items(), start=1):
-        progress(f"section {number} of {len(sections)}: {section.title}")
-        records[name] = collected(name, work)
-    return records
-
-
-def completed(records: Record, apart: Begun, work: Work, pool: Workers | None) -> Record:
-    """The evidence of all sections that have some, in their order: `records`, and that of those `begun`."""
-    if pool is not None:
-        here = {name: partial(collected, name, work) for name in apart}
-        records |= {name: pool.taken(one, here[name]) for name, one in reversed(apart.items())}
-    ordered = {name: records.get(name) for name in sections_of(work.scene.balancer)}
-    return {name: record for name, record in ordered.items() if record is not None}
 
 
 def view_of(name: str, evidence: Record) -> Record | None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, Literal
 
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.platform.processes import Workers, beside
+from ringbalance.scene.platform.jobs import Job, answers_of
+from ringbalance.scene.platform.processes import beside
 from ringbalance.verification.assumptions import assumptions_of, overridden, widened
 from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
@@ -28,9 +27,6 @@ DRIVEN = "eccentric_mass"
 _ABOUT_A_SECTOR = (
     "it is about the sector between plates that the keys of [disc] give; this scene's chamber is imported"
 )
-Group = tuple[str, ...]
-"""Cases that run in one process, one after the other."""
-Started = dict[Group, Future[tuple[CaseResult, ...]]]
 
 
 @lru_cache(maxsize=1)
@@ -200,69 +196,43 @@ def run_cases(
     Raises: KeyError: an unknown case.
     Raises: SceneError: a balancer without liquid.
     """
-    results = []
-    with cases_under_way(
-        case_ids, scene=scene, level=level, mutations=mutations, workers=workers
-    ) as under_way:
-        for result in under_way:
-            results.append(result)
-            if progress is not None:
-                progress(result)
-    return tuple(results)
-
-
-@contextmanager
-def cases_under_way(
-    case_ids: Sequence[str] = (),
-    *,
-    scene: AnyScene,
-    level: Level = "light",
-    mutations: bool = False,
-    workers: int | Workers | None = 1,
-) -> Iterator[Iterator[CaseResult]]:
-    """Start several cases as `run_cases` does, and do something else while they run.
-
-    This process takes part once results are asked for. Leaving early leaves no process behind.
-    Args: `workers`: as `beside` takes them.
-    """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
-    run = partial(run_case, scene=scene, level=level, mutations=mutations)
-    with beside(workers) as crew:
-        if crew is None:
-            yield map(run, wanted)
-            return
-        started = {group: crew.submit(_run_group, run, group) for group in _started_in(wanted)}
-        yield _in_order(run, crew, started, wanted)
+    results: dict[str, CaseResult] = {}
+    reported = 0
+    with beside(workers) as pool:
+        jobs = case_jobs(wanted, scene=scene, level=level, mutations=mutations, apart=pool is None)
+        for _, ended in answers_of(jobs, pool):
+            results |= {result.definition.id: result for result in ended}
+            while reported < len(wanted) and wanted[reported] in results:
+                if progress is not None:
+                    progress(results[wanted[reported]])
+                reported += 1
+    return tuple(results[case] for case in wanted)
 
 
-def _started_in(wanted: Sequence[str]) -> list[Group]:
-    """Groups in the order of their start, first the one that takes longest when nothing is compiled yet.
+def case_jobs(
+    case_ids: Sequence[str], *, scene: Scene, level: Level, mutations: bool, apart: bool = False
+) -> list[Job]:
+    """Jobs that run some cases, each job's answer a tuple of results; options as of `run_case`.
 
-    The eccentric masses' cases run one compiled strategy: in one process it is compiled once.
+    First the one that takes longest when nothing is compiled yet: the eccentric masses' cases run one
+    compiled strategy, which is compiled once where one process runs them all.
+    Args: `apart`: whether every case is a job of its own.
     """
-    driven = tuple(case for case in wanted if load_case(case).paper == DRIVEN)
-    rest = [(case,) for case in wanted if case not in driven]
-    return [driven, *rest] if driven else list(rest)
+    driven = () if apart else tuple(case for case in case_ids if load_case(case).paper == DRIVEN)
+    groups = [driven] if driven else []
+    groups += [(case,) for case in case_ids if case not in driven]
+    run = partial(run_case, scene=scene, level=level, mutations=mutations)
+    return [
+        Job(
+            name=f"case {group[0]}",
+            do=partial(_run_group, run, group),
+            title=", ".join(load_case(case).title for case in group),
+        )
+        for group in dict.fromkeys(groups)
+    ]
 
 
-def _run_group(run: Callable[[str], CaseResult], group: Group) -> tuple[CaseResult, ...]:
+def _run_group(run: Callable[[str], CaseResult], group: Sequence[str]) -> tuple[CaseResult, ...]:
     return tuple(run(case) for case in group)
-
-
-def _in_order(
-    run: Callable[[str], CaseResult], pool: Workers, started: Started, wanted: Sequence[str]
-) -> Iterator[CaseResult]:
-    """Results as they come; while one is waited for, this process takes groups that none has begun."""
-    home = {case: (group, place) for group in started for place, case in enumerate(group)}
-    own: dict[Group, tuple[CaseResult, ...]] = {}
-    for case in wanted:
-        group, place = home[case]
-        while group not in own and not started[group].done():
-            free = next((g for g in reversed(started) if g not in own and started[g].cancel()), None)
-            if free is None:
-                break
-            own[free] = _run_group(run, free)
-        if group not in own:
-            own[group] = pool.result(started[group], partial(_run_group, run, group))
-        yield own[group][place]

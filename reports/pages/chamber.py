@@ -236,5 +236,4 @@ def _swing(found: Record) -> Drawing:
 DISC: Final = Section(name="disc", title="The disc and its liquid")
 PRESSURE: Final = Section(name="pressure", title="Pressure of the liquid", show=_pressure)
 MOMENT: Final = Section(name="moment", title="Balancing moment and λ", show=_moment)
-# Not apart: a worker is at the first page for as long as this process needs for this and the cases.
 WAVES: Final = Section(name="sloshing", title="Waves on the ring", collect=_collect, show=_view)

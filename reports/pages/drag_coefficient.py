@@ -195,4 +195,4 @@ def _name_liquids(axes: Axes, found: Record, across: float) -> None:
         note(text, at, (shift, 0), color=INK, ha=aligned, va="center", bbox=ground, zorder=4)(axes)
 
 
-SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, apart=True, show=_view)
+SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, show=_view)

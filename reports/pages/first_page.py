@@ -30,6 +30,7 @@ from ringbalance.results.requirements import MET, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import BLOCK
+from ringbalance.scene.platform.jobs import Job
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
 
@@ -81,26 +82,41 @@ _SHADES: Final = {MET: 0.28, OPEN: 0.1}
 """Opacity of the ground by what is known of the fraction there."""
 
 
-def _collect(work: Work) -> Record:
+def _tuning(work: Work) -> Record:
+    """Settings by runs; `scene`: the scene with those recommended."""
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
     tuning = tuned(balancer, along=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
-        "limit_m": balancer.limit,
-        "valve_given": scene.gas.conductance is not None,
-        **tuning_record(balancer, tuning),
-        "noise_open": not scene.sensor.amplitude_noise
-        and scene.origin_of("sensor.amplitude_noise") == "default",
-        "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
+        "judged": tuning_record(balancer, tuning),
+        "scene": tuning.recommended_scene,
         "settings": settings_lines(chosen, SETTINGS),
         "gas_pressure_Pa": scene.gas.pressure,
         "recommended_pressure_Pa": chosen.gas.pressure,
         "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
+    }
+
+
+def _choices(_work: Work, tuning: Record) -> list[Record]:
+    return choice_records(LiquidRingBalancer(tuning["scene"]))
+
+
+def _collect(work: Work, tuning: Record, choices: list[Record], other_reading: Record | None) -> Record:
+    scene, limit = work.ring, LiquidRingBalancer(work.ring).limit
+    shown = ("settings", "gas_pressure_Pa", "recommended_pressure_Pa", "run")
+    return {
+        "limit_m": limit,
+        "valve_given": scene.gas.conductance is not None,
+        **tuning["judged"],
+        "noise_open": not scene.sensor.amplitude_noise
+        and scene.origin_of("sensor.amplitude_noise") == "default",
+        "choices": choices,
+        **{key: tuning[key] for key in shown},
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
-        "requirement": _requirement_record(scene, limit=balancer.limit),
+        "requirement": _requirement_record(scene, limit=limit),
         "bore_m": scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in scene.uncertainty),
-        "other_reading": _other_reading(scene),
+        "other_reading": other_reading,
     }
 
 
@@ -123,9 +139,9 @@ def _requirement_record(scene: Scene, *, limit: float) -> Record:
     }
 
 
-def _other_reading(scene: Scene) -> Record | None:
+def _other_reading(work: Work) -> Record | None:
     """The paper's disc with the other bore that Fig. 7 allows; None for any other disc."""
-    if scene.values_sha256 != paper_scene().values_sha256:
+    if work.scene.values_sha256 != paper_scene().values_sha256:
         return None
     try:
         other = liquid_ring_scene(load_scene(bundled_scene(_OTHER_READING)))
@@ -234,7 +250,11 @@ SECTION: Final = Section(
     title="Decision",
     place="report",
     collect=_collect,
-    apart=True,
+    parts=(
+        Job(name="tuning", title="Settings by runs", do=_tuning),
+        Job(name="choices", title="Valves that can be bought", needs=("tuning",), do=_choices),
+        Job(name="other_reading", title="The paper’s disc with its other bore", do=_other_reading),
+    ),
     show=_view,
     always=True,
 )

@@ -288,5 +288,5 @@ def _where_judged(_own: Record, evidence: Record) -> Record | None:
 
 
 CONSEQUENCES: Final = Section(
-    name="consequences", title="What a wrong k costs", collect=_consequences, apart=True, show=_where_judged
+    name="consequences", title="What a wrong k costs", collect=_consequences, show=_where_judged
 )

@@ -154,6 +154,4 @@ def _drawing(
     return draw(f"flow-{name}", scaled, x=x, y=y, xlim=xlim, ylim=ylim, columns=0, height=height)
 
 
-SECTION: Final = Section(
-    name="inside", title="Flow inside the tube", collect=_collect, apart=True, show=_view
-)
+SECTION: Final = Section(name="inside", title="Flow inside the tube", collect=_collect, show=_view)

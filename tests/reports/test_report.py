@@ -316,6 +316,6 @@ def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
 def test_a_worker_makes_the_same_views(first: Report, views: Mapping[str, Record | None]) -> None:
     path = first.page.parent / "evidence.json"
     with Workers(1) as pool:
-        by_worker = report_module._views(path, first.evidence, pool)
+        by_worker = dict(report_module._views(path, first.evidence["balancer"], pool))
     assert set(by_worker) > {"trade", "inside", CASES_VIEW}
     assert by_worker == views

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from concurrent.futures import Future
 from dataclasses import replace
 from importlib.resources import files
 from typing import Any
@@ -18,9 +17,8 @@ from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric, plain, tube
 from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.section import Section, Work
-from ringbalance.reports.sections import SECTIONS, collected, completed, drawings_in, numbered, views_of
+from ringbalance.reports.sections import SECTIONS, drawings_in, numbered, views_of
 from ringbalance.scene.models import Scene
-from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.runner import paper_scene
 
 Record = dict[str, Any]
@@ -173,14 +171,12 @@ def test_a_field_is_packed_to_four_digits() -> None:
     assert inside._packed([[1.23456, 2e-7], [0.0, -3.0]]) == "1.235 2e-07 0 -3"
 
 
-def test_evidence_is_in_the_page_s_order_whoever_collected_it() -> None:
-    scene = paper_scene()
-    work = Work(scene=scene, level="light")
-    records = {"trade": {"a": 1}, "summary": {"b": 2}}
-    alone = completed(dict(records), {}, work, None)
-    assert list(alone) == ["summary", "trade"]
-    with Workers(1) as pool:
-        # No worker has begun it.
-        shared = completed(dict(records), {"sloshing": Future()}, work, pool)
-    assert list(shared) == ["summary", "sloshing", "trade"]
-    assert shared["sloshing"] == collected("sloshing", work)
+def test_the_evidence_of_a_section_is_the_answer_of_its_last_job() -> None:
+    work = Work(scene=paper_scene(), level="light")
+    jobs = {section.name: section.jobs(work) for section in SECTIONS}
+    assert [job.name for job in jobs["summary"]] == ["tuning", "choices", "other_reading", "summary"]
+    assert jobs["summary"][-1].needs == ("tuning", "choices", "other_reading")
+    assert [job.name for job in jobs["sloshing"]] == ["sloshing"]
+    assert jobs["disc"] == []
+    names = [job.name for some in jobs.values() for job in some]
+    assert len(names) == len(set(names))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from concurrent.futures import Future
 from typing import Any
 
 import pytest
@@ -12,12 +11,10 @@ from block_discs import imported
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.models import Scene
-from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError
-from ringbalance.verification.runner import run_case, run_cases, run_definition
+from ringbalance.verification.runner import case_jobs, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 
 QUICK = ("gci_celik2008", "claim_02_ring_radius", "claim_12_correction_mass")
@@ -168,31 +165,11 @@ def test_results_come_in_the_order_asked_for_with_progress(paper_scene: Scene) -
     assert all(math.isfinite(result.time_s) for result in results)
 
 
-def test_who_waits_takes_what_nobody_has_begun_and_keeps_the_order() -> None:
-    busy: Future[tuple[Any, ...]] = Future()
-    busy.set_running_or_notify_cancel()
-    started: dict[tuple[str, ...], Future[tuple[Any, ...]]] = {
-        ("slow", "slower"): busy,
-        ("one",): Future(),
-        ("two",): Future(),
-    }
-    taken: list[str] = []
-
-    def run(case: str) -> Any:
-        taken.append(case)
-        if len(taken) == 2:
-            busy.set_result(("slow elsewhere", "slower elsewhere"))
-        return f"{case} here"
-
-    with Workers(1) as pool:
-        found = list(runner._in_order(run, pool, started, ("one", "slow", "two", "slower")))
-    assert found == ["one here", "slow elsewhere", "two here", "slower elsewhere"]
-    assert taken == ["two", "one"]
-
-
-def test_the_eccentric_masses_are_compiled_in_one_process() -> None:
-    groups = runner._started_in(("claim_01_volume", "driven_bound", "driven_fig4_imbalance"))
-    assert groups == [("driven_bound", "driven_fig4_imbalance"), ("claim_01_volume",)]
+def test_the_eccentric_masses_are_compiled_in_one_process(paper_scene: Scene) -> None:
+    cases = ("claim_01_volume", "driven_bound", "driven_fig4_imbalance")
+    options: dict[str, Any] = {"scene": paper_scene, "level": "light", "mutations": False}
+    assert [job.name for job in case_jobs(cases, **options)] == ["case driven_bound", "case claim_01_volume"]
+    assert [job.name for job in case_jobs(cases, **options, apart=True)] == [f"case {name}" for name in cases]
 
 
 @pytest.mark.heavy

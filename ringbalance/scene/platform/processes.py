@@ -88,10 +88,6 @@ class Workers(ProcessPoolExecutor):
         """
         return _result(self, future, again)
 
-    def taken(self, future: Future[_R], here: Callable[[], _R]) -> _R:
-        """What a worker returns; what none has begun, this process does."""
-        return here() if future.cancel() else self.result(future, here)
-
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:

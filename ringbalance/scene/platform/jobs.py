@@ -1,0 +1,60 @@
+"""Work as a list of jobs: each begins once the answers that it needs are there, in a process that is free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from ringbalance.scene.platform.processes import Workers
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Job:
+    """A piece of work with a name."""
+
+    name: str
+    do: Callable[..., Any]
+    """A function of an importable module; takes the answers of `needs` in their order."""
+    needs: tuple[str, ...] = ()
+    """Names of the jobs whose answers it takes."""
+    title: str = ""
+    """Text for those who wait; empty: the name."""
+
+
+def answers_of(
+    jobs: Sequence[Job], pool: Workers | None, progress: Callable[[str], None] = lambda _: None
+) -> Iterator[tuple[str, Any]]:
+    """Names and answers of jobs as they come, by a pool and this process: the first that can begin is begun.
+
+    What a lost worker had begun is done again in this process. Leaving early cancels what has not begun.
+    Args: `pool`: None: this process does everything. `progress`: takes the title of what this process begins.
+    """
+    waiting, answers = list(jobs), dict[str, Any]()
+    under_way: dict[Job, tuple[Callable[[], Any], Future[Any]]] = {}
+    try:
+        while waiting or under_way:
+            for job in [each for each in waiting if answers.keys() >= {*each.needs}]:
+                waiting.remove(job)
+                call = partial(job.do, *(answers[name] for name in job.needs))
+                under_way[job] = call, pool.submit(call) if pool else Future()
+            if not under_way:
+                raise ValueError(f"no job gives what {waiting[0].name} needs: {', '.join(waiting[0].needs)}")
+            ended = [job for job, (_, future) in under_way.items() if future.done()]
+            if not ended:
+                # What no worker has begun, this process does.
+                free = next((job for job in filter(under_way.get, jobs) if under_way[job][1].cancel()), None)
+                if free is None:
+                    wait([future for _, future in under_way.values()], return_when=FIRST_COMPLETED)
+                else:
+                    progress(f"{len(answers) + 1} of {len(jobs)}: {free.title or free.name}")
+                    ended = [free]
+            for job in ended:
+                do, future = under_way.pop(job)
+                answers[job.name] = do() if pool is None or future.cancelled() else pool.result(future, do)
+                yield job.name, answers[job.name]
+    finally:
+        for _, future in under_way.values():
+            future.cancel()

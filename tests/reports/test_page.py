@@ -8,9 +8,8 @@ from functools import lru_cache
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -317,29 +316,6 @@ def test_text_stands_out_from_its_ground() -> None:
             if name not in {"--fig-grid", "--fig-surface"} and not name.startswith("--fig-map-"):
                 assert contrast(colour, scheme["--bg"]) >= 4.5, name
         assert contrast(figure["--fig-paper"], scheme["--panel"]) >= 4.5
-
-
-_SEEN: Final = {
-    "as it is": np.eye(3),
-    "deuteranopia": np.array(
-        [[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]]
-    ),
-    "protanopia": np.array([[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]]),
-}
-"""Machado, Oliveira and Fernandes (2009), severity 1; linear RGB."""
-_CONES: Final = np.array([[0.4122, 0.5363, 0.0514], [0.2119, 0.6807, 0.1074], [0.0883, 0.2817, 0.6300]])
-_OKLAB: Final = np.array([[0.2105, 0.7936, -0.0041], [1.9780, -2.4286, 0.4506], [0.0259, 0.7828, -0.8087]])
-
-
-@pytest.mark.parametrize("palette", [LIGHT, DARK], ids=["light", "dark"])
-@pytest.mark.parametrize("eyes", _SEEN)
-def test_lines_are_told_apart_by_every_eye(palette: dict[str, str], eyes: str) -> None:
-    names = ("ink", "muted", "paper", "found", "third", "fourth", "fifth")
-    parts = np.array([[int(palette[f"--fig-{n}"][i : i + 2], 16) / 255 for i in (1, 3, 5)] for n in names])
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    seen = np.cbrt(np.clip(linear @ _SEEN[eyes].T, 0, 1) @ _CONES.T) @ _OKLAB.T
-    apart = np.linalg.norm(seen[:, None] - seen, axis=-1) + np.eye(len(names))
-    assert apart.min() > 0.07
 
 
 def test_pictures_have_the_ground_of_the_page() -> None:

@@ -52,9 +52,6 @@ from ringbalance.results.numbers import (
 from ringbalance.results.rows import series
 from ringbalance.scene.describe import usual_name
 
-_Facts = tuple[tuple[str, str], ...]
-"""Labels and texts."""
-
 _UNSTATED: Final = (
     "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
     "± is known no better than the inputs."
@@ -83,19 +80,17 @@ _PICTURE_EFFORT: Final = 6
 
 
 def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
-    told = ({**row, "value": _as_known(row)} for row in rows)
-    return [(name, list(group)) for name, group in groupby(told, key=lambda row: row["group"])]
-
-
-def _as_known(row: Record) -> str:
-    """A value of the scene; one that the program supplied has no more digits than its uncertainty leaves."""
-    text: str = row["value"]
-    value, width = _LEADING.match(text), _LEADING.match(row["uncertainty"])
-    if row["origin"] != "default" or value is None or width is None:
-        return text
-    share = 0.01 * float(value[0]) if row["uncertainty"].endswith("%") else 1.0
-    known, _, _ = measured(float(value[0]), share * float(width[0])).partition(PLUS_MINUS)
-    return known + text[value.end() :]
+    """Rows of the scene by group; values that the program supplied with no more digits than are certain."""
+    shown = []
+    for row in rows:
+        text: str = row["value"]
+        value, width = _LEADING.match(text), _LEADING.match(row["uncertainty"])
+        if row["origin"] == "default" and value is not None and width is not None:
+            share = 0.01 * float(value[0]) if row["uncertainty"].endswith("%") else 1.0
+            digits, _, _ = measured(float(value[0]), share * float(width[0])).partition(PLUS_MINUS)
+            text = digits + text[value.end() :]
+        shown.append({**row, "value": text})
+    return [(name, list(group)) for name, group in groupby(shown, key=lambda row: row["group"])]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,75 +126,56 @@ def page_content(
         for case in evidence[CASES_VIEW]
     }
     claims = summary.claims(evidence)
+    scene, date = evidence["scene"], evidence["times"]["date"]
+    program = evidence["versions"]["ringbalance"]
     context = {
-        **_frame(evidence),
-        "sections": sections,
-        "claims": [cases[case["id"]] for case in claims],
-        "checks": [cases[case["id"]] for case in summary.checks(evidence)],
-        "tallies": summary.tallies(evidence),
-        "causes": summary.common_causes(claims),
-        "equations": _equations(),
-        "pictures": _pictures(evidence["pictures"], pictures or {}),
-    }
-    return _PageContent(context=context, drawings=tuple(drawings_in([sections, of_cases])))
-
-
-def _frame(evidence: Record) -> Record:
-    """What every template looks at."""
-    return {
         "e": placed(evidence),
         "known": partial(believed, stated=states_uncertainty(evidence)),
         "named": partial(named_with_origin, evidence),
         "unstated": _UNSTATED,
         "budgets": budgets_of(placed(evidence)),
-        "scene": evidence["scene"],
+        "scene": scene,
         "papers": summary.is_papers(evidence),
-        "stamp": _stamp(evidence),
-        "running_head": _running_head(evidence),
-        "scene_groups": _scene_groups(evidence["scene"]["table"]),
-        "product": f"ringbalance {evidence['versions']['ringbalance']}",
+        "stamp": (
+            ("Scene", scene["file"]),
+            ("Hash", scene["sha256"][:12]),
+            ("Effort", evidence["level"]),
+            ("Date", date),
+            ("ringbalance", program),
+        ),
+        "running_head": f"{scene['name']}, scene {scene['sha256'][:12]}, {date}",
+        "scene_groups": _scene_groups(scene["table"]),
+        "product": f"ringbalance {program}",
+        "sections": sections,
+        "claims": [cases[case["id"]] for case in claims],
+        "checks": [cases[case["id"]] for case in summary.checks(evidence)],
+        "tallies": summary.tallies(evidence),
+        "causes": summary.common_causes(claims),
+        "equations": {
+            name: {"svg": equation_svg(item.latex, item.words, f"eq-{name}"), "source": item.source}
+            for name, item in equations().items()
+        },
+        "pictures": _pictures(evidence["pictures"], pictures or {}),
     }
-
-
-def _stamp(evidence: Record) -> _Facts:
-    return (
-        ("Scene", evidence["scene"]["file"]),
-        ("Hash", evidence["scene"]["sha256"][:12]),
-        ("Effort", evidence["level"]),
-        ("Date", evidence["times"]["date"]),
-        ("ringbalance", evidence["versions"]["ringbalance"]),
-    )
-
-
-def _running_head(evidence: Record) -> str:
-    scene = evidence["scene"]
-    return f"{scene['name']}, scene {scene['sha256'][:12]}, {evidence['times']['date']}"
-
-
-def _equations() -> Record:
-    return {
-        name: {"svg": equation_svg(item.latex, item.words, f"eq-{name}"), "source": item.source}
-        for name, item in equations().items()
-    }
-
-
-def _data_address(content: bytes) -> str:
-    """A picture as part of the page, packed: a quarter of the bytes, and no difference to the eye."""
-    packed = io.BytesIO()
-    with Image.open(io.BytesIO(content)) as picture:
-        picture.thumbnail((_PICTURE_WIDTH, _PICTURE_WIDTH))
-        picture.save(packed, format="WEBP", quality=_PICTURE_QUALITY, method=_PICTURE_EFFORT)
-    return "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
+    return _PageContent(context=context, drawings=tuple(drawings_in([sections, of_cases])))
 
 
 def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
-    """Pictures by name, with their bytes; one that lacks a variant is left out."""
-    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None}
+    """Pictures by name, packed as data addresses; one that lacks a variant is left out."""
+    pictures: Record = {"text": record["text"], "disc": None, "pressure": None}
     for item in record["files"]:
-        if item["light"] in contents and item["dark"] in contents:
-            variants = {key: _data_address(contents[item[key]]) for key in ("light", "dark")}
-            shown_pictures[item["name"]] = {**item, **variants}
-    return shown_pictures
+        if item["light"] not in contents or item["dark"] not in contents:
+            continue
+        variants = {}
+        for key in ("light", "dark"):
+            # A quarter of the bytes, and no difference to the eye.
+            packed = io.BytesIO()
+            with Image.open(io.BytesIO(contents[item[key]])) as picture:
+                picture.thumbnail((_PICTURE_WIDTH, _PICTURE_WIDTH))
+                picture.save(packed, format="WEBP", quality=_PICTURE_QUALITY, method=_PICTURE_EFFORT)
+            variants[key] = "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
+        pictures[item["name"]] = {**item, **variants}
+    return pictures
 
 
 _STYLED: Final = re.compile(r'(<(?:path|g|text|tspan|use|rect|line|polyline|image)\b[^>]*?) style="([^"]*)"')
@@ -218,8 +194,28 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
 
 
 def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
-    """Fills the template, once for each document."""
-    return {file: _page(content, file) for file in documents}
+    """Fill the template once for each document."""
+    colours = ["".join(f"{key}:{value};" for key, value in scheme.items()) for scheme in (LIGHT, DARK)]
+    # Every sign outside the plainest is escaped, so that a scene's name cannot leave its string.
+    head: str = content.context["running_head"]
+    escaped = "".join(c if c.isalnum() or c in " .,-()" else f"\\{ord(c):x} " for c in head)
+    style = _template("style.css").replace("{{ running_head }}", escaped)
+    style = style.replace("{{ figure_light }}", colours[0]).replace("{{ figure_dark }}", colours[1])
+    pages = {}
+    for file in documents:
+        document = DOCUMENTS[file]
+        template = _environment().get_template("report.html")
+        page = template.render(
+            content.context,
+            document=document,
+            numbered=_Numbers(PREFIXES[document["place"]]),
+            annex_file=_ANNEX,
+            sections=[s for s in content.context["sections"] if s["place"] == document["place"]],
+            style=Markup(style),
+            glyphs=Markup(GLYPHS),
+        )
+        pages[file] = _share_styles(share_glyphs(page)) + "\n"
+    return pages
 
 
 def terminal_lines(evidence: Record) -> list[str]:
@@ -257,24 +253,6 @@ def _environment() -> jinja2.Environment:
     return environment
 
 
-def _page(content: _PageContent, file: str) -> str:
-    document = DOCUMENTS[file]
-    page = (
-        _environment()
-        .get_template("report.html")
-        .render(
-            content.context,
-            document=document,
-            numbered=_Numbers(PREFIXES[document["place"]]),
-            annex_file=_ANNEX,
-            sections=[s for s in content.context["sections"] if s["place"] == document["place"]],
-            style=Markup(_style(content.context["running_head"])),
-            glyphs=Markup(GLYPHS),
-        )
-    )
-    return _share_styles(share_glyphs(page)) + "\n"
-
-
 class _Numbers:
     """Numbers of a document's figures, tables and equations, in the order in which they are set."""
 
@@ -307,14 +285,3 @@ def _share_styles(page: str) -> str:
 
 def _template(name: str) -> str:
     return files("ringbalance.reports").joinpath("templates", name).read_text(encoding="utf-8")
-
-
-def _style(running_head: str) -> str:
-    blocks = ["".join(f"{key}:{value};" for key, value in colours.items()) for colours in (LIGHT, DARK)]
-    text = _template("style.css").replace("{{ running_head }}", _css_string(running_head))
-    return text.replace("{{ figure_light }}", blocks[0]).replace("{{ figure_dark }}", blocks[1])
-
-
-def _css_string(text: str) -> str:
-    """Every sign outside the plainest is escaped, so that a scene's name cannot leave its string."""
-    return "".join(c if c.isalnum() or c in " .,-()" else f"\\{ord(c):x} " for c in text)

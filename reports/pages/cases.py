@@ -120,35 +120,20 @@ def _error(quantity: Quantity) -> str:
     return printed(error, None if fine else width, digits=2, unit=quantity.get("unit") or "1")
 
 
-def _sequence_label(sequence: Record) -> str:
-    """What a convergence sequence is of."""
-    geometry = f", {sequence['geometry']} geometry" if sequence.get("geometry") else ""
-    return f"{sequence['quantity']}{geometry}"
-
-
-def _equations(case: Record) -> list[Record]:
-    return [
-        {"svg": equation_svg(latex, f"Equation in LaTeX: {latex}", f"{anchor(case)}-{index}"), "source": ""}
-        for index, latex in enumerate(case.get("equations") or [])
-    ]
-
-
 def _data_table(table: Record) -> Table:
     """One data table of a case, each column in one unit."""
-    columns = [
-        _column(name, values, table["units"].get(name, "1")) for name, values in table["columns"].items()
-    ]
-    rows = list(zip(*(texts for _, texts in columns), strict=True))
-    return Table(caption=table["name"], heads=tuple(head for head, _ in columns), rows=rows)
-
-
-def _column(name: str, values: list[Any], unit: str) -> tuple[str, list[str]]:
-    display = display_unit(unit, *(value for value in values if not isinstance(value, str)))
-    texts = [
-        v if isinstance(v, str) else short(None if v is None else v * display.factor, digits=5)
-        for v in values
-    ]
-    return f"{name} in {display.symbol}" if display.symbol else name, texts
+    heads, columns = [], []
+    for name, values in table["columns"].items():
+        unit = table["units"].get(name, "1")
+        display = display_unit(unit, *(value for value in values if not isinstance(value, str)))
+        heads.append(f"{name} in {display.symbol}" if display.symbol else name)
+        columns.append(
+            [
+                v if isinstance(v, str) else short(None if v is None else v * display.factor, digits=5)
+                for v in values
+            ]
+        )
+    return Table(caption=table["name"], heads=tuple(heads), rows=list(zip(*columns, strict=True)))
 
 
 def deciding(quantities: Sequence[Quantity], verdict: str) -> Quantity | None:
@@ -208,13 +193,6 @@ def _last_digit(value: float) -> float:
     return float(10.0 ** (math.floor(math.log10(abs(value))) - _DIGITS + 1))
 
 
-def _rests_on(case: Record) -> list[str]:
-    """The first inputs behind a claim that nobody gave, and how many more there are."""
-    every = [f"{input_name(one['path'])} ({one['origin']})" for one in case.get("rests_on") or []]
-    rest = len(every) - _NAMED_INPUTS
-    return every if rest <= 1 else [*every[:_NAMED_INPUTS], f"{rest} more"]
-
-
 def _order_plot(case: Record, sequences: list[Record]) -> Drawing | None:
     """Error against mesh size, a line per sequence, dotted the formal order as a slope to compare.
 
@@ -239,12 +217,6 @@ def _order_plot(case: Record, sequences: list[Record]) -> Drawing | None:
         columns=1,
         height=2.7 + 0.175 * len(sequences),
     )
-
-
-def _series_plots(case: Record) -> list[Drawing]:
-    """The figures that a case hands over as plain series."""
-    stem = f"case-{case['id'].replace('_', '-')}"
-    return [_series_plot(f"{stem}-{index}", series) for index, series in enumerate(case.get("series") or [])]
 
 
 def _series_plot(name: str, series: Record) -> Drawing:
@@ -281,9 +253,15 @@ def _few(limits: tuple[float, float]) -> tuple[float, float] | None:
 
 def case_view(case: Record) -> Record:
     """Everything that the page shows of one case."""
-    studies, tables = case.get("convergence") or [], case.get("tables") or []
-    sequences = [{**_NO_SEQUENCE, **each, "label": _sequence_label(each)} for each in studies]
+    tables, stem = case.get("tables") or [], case["id"].replace("_", "-")
+    sequences = []
+    for each in case.get("convergence") or []:
+        geometry = f", {each['geometry']} geometry" if each.get("geometry") else ""
+        sequences.append({**_NO_SEQUENCE, **each, "label": f"{each['quantity']}{geometry}"})
     falling = [s for s in sequences if s["error"] and all(e is not None and e > 0 for e in s["error"])]
+    inputs = [f"{input_name(each['path'])} ({each['origin']})" for each in case.get("rests_on") or []]
+    if len(inputs) > _NAMED_INPUTS + 1:
+        inputs[_NAMED_INPUTS:] = [f"{len(inputs) - _NAMED_INPUTS} more"]
     return {
         "id": case["id"],
         "anchor": anchor(case),
@@ -294,14 +272,19 @@ def case_view(case: Record) -> Record:
         "why_not_run": case.get("status") or "" if case["verdict"] == "not run" else "",
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
-        "rests_on": _rests_on(case),
+        "rests_on": inputs,
         "told": {key: case.get(key) for key in _TOLD},
         "mutations": {each["id"]: each for each in case.get("mutations") or []},
-        "equations": _equations(case),
+        "equations": [
+            {"svg": equation_svg(latex, f"Equation in LaTeX: {latex}", f"{anchor(case)}-{n}"), "source": ""}
+            for n, latex in enumerate(case.get("equations") or [])
+        ],
         "order_plot": _order_plot(case, falling),
         # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
         "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],
-        "drawings": _series_plots(case),
+        "drawings": [
+            _series_plot(f"case-{stem}-{n}", series) for n, series in enumerate(case.get("series") or [])
+        ],
         "series": [series["name"] for series in case.get("series") or []],
         "sequences": sequences,
         "tables": [_data_table(table) for table in tables if not is_long(table)],
@@ -358,20 +341,19 @@ def _study(scene: Scene) -> TradeStudy:
 def _trade(trade: Record, evidence: Record) -> Record:
     times = evidence["times"].get("trade") or {}
     terms = [(row["term"], row["group"], error_text(row["estimated_contribution"])) for row in trade["terms"]]
-    quantities = [quantity for quantity in trade["quantities"] if quantity["models"]]
+    quantities = []
+    for each in trade["quantities"]:
+        if each["models"]:
+            table = models_table(each, times)
+            quantities.append({"title": opening(each["title"]), "status": table.note, "models": table})
     return {
         "terms": Table(
             caption="What leaving a term out would change, by the dimensionless group that it grows with.",
             heads=("Term", "Group", "Estimated contribution"),
             rows=terms,
         ),
-        "quantities": [_quantity(each, times) for each in quantities],
+        "quantities": quantities,
     }
-
-
-def _quantity(quantity: Record, times: Record) -> Record:
-    table = models_table(quantity, times)
-    return {"title": opening(quantity["title"]), "status": table.note, "models": table}
 
 
 TRADE: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_trade)

@@ -50,7 +50,16 @@ def _collect(work: Work) -> Record:
     scene, calibration = work.ring, work.calibration
     drag = DragMap.of(calibration=calibration)
     point = drag.point
-    liquids = _with_budget(liquids_in_tube(calibration), calibration)
+    liquids = liquids_in_tube(calibration)
+    own, known, speed = liquids[0], calibration.quantities, float(calibration.answers.velocity)
+    # Where an unprimed tube spills at the operating point, the primed one of this section is another point.
+    same = math.isclose(own["velocity_m_s"], speed, rel_tol=_SAME_POINT)
+    if own["starts_at_scene_pressure"] and same and scene.tube.drag_coefficient is None:
+        # The uncertainties that every other table gives the scene's own liquid.
+        names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
+        liquids[0] = own | {
+            key: parts.total for key, name in names.items() if name in known and (parts := known[name].parts)
+        }
     return {
         "bore_m": scene.tube.bore,
         "decreed_k": scene.tube.drag_coefficient,
@@ -77,22 +86,6 @@ def _rounded(values: npt.ArrayLike) -> Any:
     if array.ndim > 1:
         return [_rounded(row) for row in array]
     return [float(f"{value:.{_DIGITS - 1}e}") for value in array]
-
-
-def _with_budget(liquids: list[Record], calibration: Calibration) -> list[Record]:
-    """The scene's own liquid, the first, with the uncertainties that every other table gives its point.
-
-    Where an unprimed tube spills at the operating point, the primed one of this section is another point.
-    """
-    first, *others = liquids
-    known, speed = calibration.quantities, float(calibration.answers.velocity)
-    same = math.isclose(first["velocity_m_s"], speed, rel_tol=_SAME_POINT)
-    if first["starts_at_scene_pressure"] and same and calibration.scene.tube.drag_coefficient is None:
-        names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
-        first = first | {
-            key: parts.total for key, name in names.items() if name in known and (parts := known[name].parts)
-        }
-    return [first, *others]
 
 
 def _verdict_on_fifty(record: Record) -> str:

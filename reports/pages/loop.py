@@ -66,22 +66,24 @@ def _reach(work: Work) -> Record:
 
 
 def _loop(own: Record, evidence: Record) -> Record:
-    runs, limit = _drawn_runs(evidence), evidence["limit_m"]
-    run = runs.get("calibrated")
-    disc = (evidence.get("operation") or {}).get("disc")
+    ran, limit = evidence["closed_loop"], evidence["limit_m"]
+    # The paper's law is compared on the paper's own disc alone.
+    runs = {law: ran[law] for law in _LAWS if law in ran and (law != "paper" or is_papers(evidence))}
+    run, disc = runs.get("calibrated"), (evidence.get("operation") or {}).get("disc")
+    judged_settings = evidence.get("summary") or {}
+    settled = [
+        (look, judged_settings[name]["settled"])
+        for name, look in SETTINGS.items()
+        if judged_settings.get(name)
+    ]
+    best = judged_settings.get("recommended") or judged_settings.get("own")
     return {
         "amplitude": _amplitude(runs, limit) if runs else None,
         "rings": _rings(run, disc) if run and disc else None,
         "laws": list(runs),
         "polar": residual_polar(run, own) if run and own else None,
-        "settling": _settling(evidence.get("summary") or {}),
+        "settling": settling(settled, best["asked"]) if best else None,
     }
-
-
-def _drawn_runs(evidence: Record) -> dict[str, Record]:
-    """By law, the calibrated one first; the paper's law is compared on the paper's own disc alone."""
-    runs = evidence["closed_loop"]
-    return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
 
 
 def _injections_until(run: Record) -> float:
@@ -111,21 +113,17 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
         for panel in others:
             panel.tick_params(labelleft=False)
         first.set_ylabel("amplitude, zero to peak, in µm")
-        _mark_injections(first, next(iter(runs.values()))["injections"])
+        groups, across = _together(next(iter(runs.values()))["injections"]), first.get_xaxis_transform()
+        for start, last, letters in groups:
+            # For the time that a chamber keeps its valve open.
+            first.plot((start, last), (1.0, 1.0), color=INK, linewidth=3, transform=across, clip_on=False)
+            first.axvline(start, color=MUTED, linewidth=0.5, alpha=0.6)
+            if len(groups) <= _LETTERED:
+                first.text(start, 1.02, "".join(letters), ha="center", va="bottom", transform=across)
         for look in (*(_LAWS[law] for law in runs), {"color": MUTED, "linestyle": ":", "label": "limit"}):
             axes.plot([], [], **look)
 
     return draw("amplitude", paint, columns=3, wide=True, height=3.6)
-
-
-def _mark_injections(panel: Axes, injections: Sequence[Record]) -> None:
-    """A stroke at the top for the time that each keeps its valve open, and the chambers' letters."""
-    along, groups = panel.get_xaxis_transform(), _together(injections)
-    for start, end, letters in groups:
-        panel.plot((start, end), (1.0, 1.0), color=INK, linewidth=3, transform=along, clip_on=False)
-        panel.axvline(start, color=MUTED, linewidth=0.5, alpha=0.6)
-        if len(groups) <= _LETTERED:
-            panel.text(start, 1.02, "".join(letters), ha="center", va="bottom", transform=along)
 
 
 def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str]]]:
@@ -183,11 +181,6 @@ def _ring(panel: Axes, fills: dict[str, float], disc: Record) -> None:
         panel.text(at.real, at.imag, letter, ha="center", va="center", color=MUTED, fontsize="small")
     panel.set(xlim=(-1.05 * outer, 1.05 * outer), ylim=(-1.05 * outer, 1.05 * outer), aspect="equal")
     panel.set_axis_off()
-
-
-def _settling(found: Record) -> Drawing | None:
-    curves = [(look, found[name]["settled"]) for name, look in SETTINGS.items() if found.get(name)]
-    return settling(curves, (found["recommended"] or found["own"])["asked"]) if curves else None
 
 
 def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> Drawing | None:

@@ -30,15 +30,15 @@ def _show(_own: Record, evidence: Record) -> Record | None:
     found = evidence["scene"].get("measured")
     if not found:
         return None
-    return {"findings": [_sentence(each["text"], found) for each in found["findings"]]}
-
-
-def _sentence(text: str, found: Record) -> str:
-    """A finding, with the quantities' usual names in place of keys that are no words."""
-    for each in found["quantities"]:
-        if "_" in each["quantity"]:
-            text = text.replace(each["quantity"], usual_name(each["quantity"]))
-    return f"{opening(text)}.".replace(" -", " \N{MINUS SIGN}")
+    sentences = []
+    for finding in found["findings"]:
+        text = finding["text"]
+        for each in found["quantities"]:
+            # Usual names in place of keys that are no words.
+            if "_" in each["quantity"]:
+                text = text.replace(each["quantity"], usual_name(each["quantity"]))
+        sentences.append(f"{opening(text)}.".replace(" -", " \N{MINUS SIGN}"))
+    return {"findings": sentences}
 
 
 SECTION: Final = Section(name="measured", title="Measurements and fit", show=_show, always=True)
@@ -68,13 +68,19 @@ def fit_figures(found: Sequence[AgainstFit]) -> list[Drawing]:
 def _against(found: AgainstFit, place: int) -> Drawing:
     factor = unit_factor(found.unit) if found.unit else 1.0
     unit = _SIGNS.get(found.unit, found.unit) or "1"
-    low, high = _range(found, factor)
+    pairs = ((found.measured, found.measured_uncertainty), (found.fitted, found.fitted_uncertainty))
+    least = min(float(np.min(value - width)) for value, width in pairs) / factor
+    most = max(float(np.max(value + width)) for value, width in pairs) / factor
+    low, high = least - _MARGIN * (most - least), most + _MARGIN * (most - least)
+    slope, width, told = found.slope, found.slope_uncertainty, "undefined"
+    if slope is not None and width is not None:
+        told = f"{rounded(slope, width)} ± {rounded(width, width)}"
 
     def ends(axes: Axes) -> None:
         axes.set(xlim=(low, high), ylim=(low, high))
         axes.set_yticks([tick for tick in axes.get_xticks() if low <= tick <= high])
         axes.annotate(
-            f"slope {_slope(found)}",
+            f"slope {told}",
             (0.97, 0.05),
             xycoords="axes fraction",
             ha="right",
@@ -106,17 +112,3 @@ def _points(found: AgainstFit, part: int, factor: float) -> Paint:
         elinewidth=0.8,
         label=_PARTS[part] if vibration else "readings",
     )
-
-
-def _range(found: AgainstFit, factor: float) -> tuple[float, float]:
-    pairs = ((found.measured, found.measured_uncertainty), (found.fitted, found.fitted_uncertainty))
-    low = min(float(np.min(value - width)) for value, width in pairs) / factor
-    high = max(float(np.max(value + width)) for value, width in pairs) / factor
-    return low - _MARGIN * (high - low), high + _MARGIN * (high - low)
-
-
-def _slope(found: AgainstFit) -> str:
-    width = found.slope_uncertainty
-    if found.slope is None or width is None:
-        return "undefined"
-    return f"{rounded(found.slope, width)} ± {rounded(width, width)}"

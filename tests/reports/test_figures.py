@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ringbalance.reports.figure import LIGHT, MUTED, Drawing, decade, plain_number
 from ringbalance.reports.figure import curve as band_of
 from ringbalance.reports.page import page_content
-from ringbalance.reports.pages.cases import _series_plots
+from ringbalance.reports.pages.cases import _series_plot
 from ringbalance.verification.evidence import CurveStyle
 
 Record = dict[str, Any]
@@ -135,8 +135,7 @@ def test_a_gap_in_a_series_is_no_number() -> None:
         "y": [{"name": "found", "unit": "m/s", "values": [1.0, None, 2.0, 3.0], "style": "found"}],
         "log": False,
     }
-    (drawing,) = _series_plots({"id": "some_case", "series": [series]})
-    assert drawing.name == "case-some-case-0"
+    drawing = _series_plot("some-case", series)
     assert "nan" not in drawing.svg.lower()
 
 
@@ -147,7 +146,7 @@ def test_every_style_of_a_curve_can_be_drawn(kind: str) -> None:
         "x": {"name": "time", "unit": "s", "values": [0.0, 1.0]},
         "y": [{"name": "found", "unit": "m/s", "values": [1.0, 2.0], "style": kind}],
     }
-    (drawing,) = _series_plots({"id": "some_case", "series": [series]})
+    drawing = _series_plot("some-case", series)
     assert "found" in drawing.svg
 
 

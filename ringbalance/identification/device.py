@@ -83,11 +83,6 @@ class Models:
             for device in together:
                 device.together[:] = together
 
-    def with_gauge_correction(self, scene: Scene) -> Scene:
-        """A fitted scene that says by how much the gauge of the data is off."""
-        off = scene.gas.pressure - self.gas_pressure
-        return replace(scene, gas=replace(scene.gas, gauge_correction=off))
-
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
     """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
@@ -149,12 +144,6 @@ class Device:
         return plant
 
     @cached_property
-    def _delay(self) -> float:
-        """Delay of the start of the flow, s: its error (95 %) is L/2u at equal fills."""
-        length = self.scene.tube.model_error(START_ERROR) / NORMAL_95 * self.scene.tube.length / 2
-        return length / velocity if (velocity := self.models.velocity) else 0.0
-
-    @cached_property
     def _kept(self) -> dict[int, tuple[Observations, FloatArray]]:
         return {}
 
@@ -183,11 +172,15 @@ class Device:
             `pressure`: of the supply, as the gauge shows it, Pa. `gas_time`: from the command to open to the
             command to close, s.
         """
-        off, times = self.scene.gas.pressure - self.models.gas_pressure, np.atleast_1d(gas_time)
+        scene, velocity, times = self.scene, self.models.velocity, np.atleast_1d(gas_time)
+        off = scene.gas.pressure - self.models.gas_pressure
+        # The flow starts late: the error (95 %) is L/2u at equal fills.
+        late = scene.tube.model_error(START_ERROR) / NORMAL_95 * scene.tube.length / 2
+        delay = late / velocity if velocity else 0.0
         count, plant = times.size, self._plant
         fills = np.zeros((2, count))
         fills[0] = fill
-        motions = np.repeat(at_rest(plant, fill=self.scene.disc.initial_fill), 2)
+        motions = np.repeat(at_rest(plant, fill=scene.disc.initial_fill), 2)
         inject_each(
             plant[0],
             motions,
@@ -195,7 +188,7 @@ class Device:
             np.broadcast_to(np.asarray(chamber, dtype=np.int64), count).copy(),
             np.broadcast_to(np.asarray(pressure, dtype=np.float64) + off, count).copy(),
             # Of a shorter time the model would have nothing left to start.
-            np.maximum(times - self._delay, _LEAST_LEFT * times),
+            np.maximum(times - delay, _LEAST_LEFT * times),
             _SETTLED,
             fills,
             np.zeros(WORKSPACE),

@@ -143,9 +143,7 @@ def fit_rows(
         title=f"{scene.name} ({scene.source}), fitted to {count} measurements",
         quantities=tuple(quantities),
         findings=(
-            *_review(review),
-            *_of_parameters(result),
-            *_of_errors(result),
+            *_findings(result, review),
             *result.pulled,
             Finding(code="next_measurement", values={"text": next_measurement.text}),
         ),
@@ -155,15 +153,11 @@ def fit_rows(
     )
 
 
-def _review(review: Review) -> Iterator[Finding]:
-    yield Finding(
-        code="fit_describes" if review.describes else "fit_contradicted", values={"text": review.text}
-    )
+def _findings(result: FitResult, review: Review) -> Iterator[Finding]:
+    """Verdict on the fit; parameters and their products; noise, errors that go together, and rows far off."""
+    code = "fit_describes" if review.describes else "fit_contradicted"
+    yield Finding(code=code, values={"text": review.text})
     yield from (Finding(code="sense_undecided", values={"text": text}) for text in review.undecided)
-
-
-def _of_parameters(result: FitResult) -> Iterator[Finding]:
-    """Verdicts on parameters, doubts of them, and products that are identified."""
     for each in result.parameters:
         name: dict[str, Value] = {"name": each.name}
         if each.verdict is not Identified.IDENTIFIED:
@@ -177,13 +171,9 @@ def _of_parameters(result: FitResult) -> Iterator[Finding]:
         values: dict[str, Value] = {"combination": product.text, "value": product.value}
         values["uncertainty"] = product.relative_uncertainty
         yield Finding(code="combination_identified", values=values)
-
-
-def _of_errors(result: FitResult) -> Iterator[Finding]:
-    """Noise, correlated errors, rows that lie far off, and those that a robust loss counts less."""
     for noise in result.noise:
         kind, column_name = noise.group.split(" ")
-        values: dict[str, Value] = {"kind": kind, "name": column_name}
+        values = {"kind": kind, "name": column_name}
         if noise.standard_deviation is None:
             yield Finding(code="noise_stated", values=values)
             continue

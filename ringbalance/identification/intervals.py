@@ -248,4 +248,9 @@ def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
         scene = inputs_of(scene).changed(name, step * sd)
     as_fitted: AnyScene = replace(residuals.problem, scene=scene).scene_at(best.t)
     models = residuals.problem.models
-    return as_fitted if models is None else models.with_gauge_correction(liquid_ring_scene(as_fitted))
+    if models is None:
+        return as_fitted
+    # The fitted scene says by how much the gauge of the data is off.
+    ring = liquid_ring_scene(as_fitted)
+    off = ring.gas.pressure - models.gas_pressure
+    return replace(ring, gas=replace(ring.gas, gauge_correction=off))

@@ -129,13 +129,6 @@ class Problem:
             self._known[key] = np.concatenate(predicted)
         return self._known[key]
 
-    def at_each(self, points: Sequence[FloatArray]) -> list[FloatArray]:
-        """L^-1 f at several t, whose laws are made together."""
-        lacking = [t for t in points if t.tobytes() not in self._known]
-        if self.models is not None:
-            self.models.expect([self.scene_at(t) for t in lacking])
-        return [self.at(t) for t in points]
-
     def slopes(self, t: FloatArray) -> FloatArray:
         """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters).
 
@@ -159,7 +152,11 @@ class Problem:
         """Slopes of L^-1 f from t to ends of each parameter in turn; zero over a step of zero."""
         which = np.arange(ends.size) % t.size
         points = [np.where(np.arange(t.size) == i, end, t) for i, end in zip(which, ends, strict=True)]
-        center, *values = self.at_each([t, *points])
+        if self.models is not None:
+            # Their laws are made together.
+            unknown = [each for each in (t, *points) if each.tobytes() not in self._known]
+            self.models.expect([self.scene_at(each) for each in unknown])
+        center, *values = map(self.at, (t, *points))
         step = ends - t[which]
         return (np.stack(values, axis=1) - center[:, None]) / np.where(step == 0, 1.0, step)
 

@@ -104,11 +104,6 @@ class Comparison:
             problem=problem, rows=rows, deviance=deviance_of(best), pulled=pulled, changed={}, refits={}
         )
 
-    @cached_property
-    def given_from_scene(self) -> float:
-        """Gain of the files as they stand, fitted as the other readings are: what curvature takes."""
-        return self.gain((), ()) or 0.0
-
     def gain(self, joint: Joint, chosen: Sequence[int]) -> float | None:
         """Gain of the log likelihood by reading some files otherwise; None where nothing can be predicted."""
         rows = list(self.rows)

@@ -154,7 +154,7 @@ def other_readings(
     # A better one that is not named hides none behind it.
     named = named if any(named[:1]) else [False] * len(named)
     # The given reading fitted as the others are, which curvature costs as much.
-    least = min(compare.given_from_scene, 0.0) - _TELLS
+    least = min(compare.gain((), ()) or 0.0, 0.0) - _TELLS
     readings = []
     for ((joint, _), gain), where, is_named in zip(ordered, files, named, strict=True):
         senses_alone = not any(named) and gain > least and {*joint} <= {*SENSES}

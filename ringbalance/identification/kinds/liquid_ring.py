@@ -148,15 +148,11 @@ def _moved(device: Device, observations: Observations) -> FloatArray:
     return np.asarray(before - after)
 
 
-def _flow_rates(scene: Scene, observations: Observations, models: Models) -> FloatArray:
+def _flow_rate(device: Device, observations: Observations) -> FloatArray:
     """Flow through the tube alone, at rest: (k + 1) rho u^2/2 = p, Q = S u, k without rotation, m^3/s.
 
     By the secant in ln u. Source: definition of k, between two reservoirs at rest.
     """
-    return Device.of(scene, models).once(observations, _flow_rate)
-
-
-def _flow_rate(device: Device, observations: Observations) -> FloatArray:
     still = replace(device.scene, rotor=replace(device.scene.rotor, speed=0.0))
     head = observations.columns["pressure_difference"] / still.liquid.density
     log_u = np.log(np.sqrt(2 * head / (corrected_state(still, np.sqrt(head)).k + 1)))
@@ -294,7 +290,7 @@ LIQUID_RING: Final[Mapping[str, Kind]] = {
             positive("pressure_difference [kPa]", "between the ends of the tube"),
             positive("flow_rate [ml/s]", "volume flow", measured=True),
         ),
-        predict=_flow_rates,
+        predict=lambda scene, data, models: Device.of(scene, models).once(data, _flow_rate),
         informs=always("bore", "extra_loss"),
         offers=lambda scene: {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
     ),

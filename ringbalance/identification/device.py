@@ -173,7 +173,7 @@ class Device:
             command to close, s.
         """
         scene, velocity, times = self.scene, self.models.velocity, np.atleast_1d(gas_time)
-        off = scene.gas.pressure - self.models.gas_pressure
+        supply = np.asarray(pressure, dtype=np.float64) + scene.gas.pressure - self.models.gas_pressure
         # The flow starts late: the error (95 %) is L/2u at equal fills.
         late = scene.tube.model_error(START_ERROR) / NORMAL_95 * scene.tube.length / 2
         delay = late / velocity if velocity else 0.0
@@ -186,7 +186,7 @@ class Device:
             motions,
             np.arange(count) if follows is None else np.array(follows, dtype=np.int64),
             np.broadcast_to(np.asarray(chamber, dtype=np.int64), count).copy(),
-            np.broadcast_to(np.asarray(pressure, dtype=np.float64) + off, count).copy(),
+            np.broadcast_to(supply, count).copy(),
             # Of a shorter time the model would have nothing left to start.
             np.maximum(times - delay, _LEAST_LEFT * times),
             _SETTLED,

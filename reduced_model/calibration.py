@@ -108,8 +108,7 @@ def chamber_and_law(
     """
     check_ring(scene)
     chamber = calibrate_chamber(scene, checked=checked, varied=varied)
-    heads = TubeHeads.of(scene) if varied else TubeHeads.bare(scene)
-    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=heads, varied=varied)
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=TubeHeads.of(scene), varied=varied)
 
 
 known_chamber_and_law = lru_cache(maxsize=16)(chamber_and_law)

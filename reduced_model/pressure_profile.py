@@ -17,6 +17,7 @@ from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.sides import lost_to_crest
 from ringbalance.reduced_model.tube.flow import column_pressure, column_radius
 from ringbalance.reduced_model.tube.heads import roots_of
 from ringbalance.reduced_model.tube.path import (
@@ -114,7 +115,12 @@ class HumpProfile:
         ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas)
         reverse = bool(driving_pressure(law.path, ends) < 0)
         tube, along = (reversed_tube(scene.tube), ends.reversed()) if reverse else (scene.tube, ends)
-        margin = law.cavity_margin(fills=(fill_ratio, other), gas_pressure=gas, reverse=reverse)
+        width = None
+        if law.half_widths is not None:
+            # The gas of the driven chamber holds a reverse flow back: seen from upstream none drives it.
+            fill = np.asarray(other if reverse else fill_ratio)
+            wall = along.upstream_hydrostatic if reverse else ends.upstream_pressure()
+            width = float(law.half_widths.at(fill, wall, np.asarray(True))[1])
         if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
             line = _blocked(scene, law, ends, primed, points)
         else:
@@ -122,7 +128,7 @@ class HumpProfile:
             line = _flowing(scene, law.path, tube, abs(float(flow.velocity)), along, cavity, points)
             if reverse:
                 line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
-        return _profile(scene, law, flow, along, reverse, margin, line)
+        return _profile(scene, law, flow, along, reverse, width, line)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -140,13 +146,17 @@ def _profile(
     flow: Flow,
     ends: TubeEnds,
     reverse: bool,
-    margin: tuple[float, float] | tuple[None, None],
+    width: float | None,
     line: _Line,
 ) -> HumpProfile:
     tube, humped = scene.tube, scene.tube.hump_radius is not None
     start, end = crest_span(tube)
     crest = start if reverse else end
     place = int(np.argmin(np.abs(line.share - crest)))
+    margin = None
+    if humped:
+        lost = lost_to_crest(law, ends, reverse=reverse)
+        margin = float(resting_pressure(law.path, ends) - cavity_pressure(law.path, ends) - lost)
     return HumpProfile(
         path=line.share * tube.length,
         radius=path_radius(tube=tube, share=line.share),
@@ -157,8 +167,8 @@ def _profile(
         hump_path=crest * tube.length if humped else None,
         hump_pressure=float(line.pressure[place]) if humped else None,
         cavity_pressure=float(cavity_pressure(law.path, ends)) if humped else None,
-        cavitation_margin=margin[0],
-        cavitation_margin_uncertainty=margin[1],
+        cavitation_margin=margin,
+        cavitation_margin_uncertainty=width if humped else None,
     )
 
 

@@ -71,7 +71,7 @@ def _liquid_cells(record: Record) -> Sequence[str]:
 def _bores_table(calibration: Calibration) -> str:
     """The bore at which k is the paper's, and the bores at which it may be, over the viscosity."""
     drag = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
-    k, width = drag.point.k, drag.point.k_point_uncertainty
+    k, width = drag.point.k, drag.point.k_uncertainty
     columns = [drag.bores_for(k + side * width) for side in (0.0, -1.0, 1.0)]
     rows = []
     for i, viscosity in enumerate(_VISCOSITIES):

@@ -380,7 +380,7 @@ def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
     head = Table(knots=_NO_HEADS, columns=np.repeat([ratio, 0.0, 0.0, 0.0], 2))
     rows = LawRows.of(1)
     rows.add_levels(level)
-    rows.add_way(point.SIPHON, head, law.density, error=0.0, more=())
+    rows.add_way(point.SIPHON, head, law.density, more=())
     _fill_rows(plant, 1, *rows.arrays({point.LARGEST_FILL: law.max_fill_ratio}))
 
 

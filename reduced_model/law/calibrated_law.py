@@ -5,7 +5,6 @@ Beside it the moment of a pair of chambers, from the same chamber.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,43 +22,23 @@ from ringbalance.reduced_model.law.flow_law import (
     law_text,
     save_record,
 )
+from ringbalance.reduced_model.law.half_widths import HalfWidths
 from ringbalance.reduced_model.pieces import point
-from ringbalance.reduced_model.pieces.query import answer, turn
+from ringbalance.reduced_model.pieces.query import answer
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import (
-    BACK_SHARE,
-    SHARE,
-    SHARE_WIDTH,
-    TubeHeads,
-    roots_of,
-    velocities_of,
-)
+from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of, velocities_of
 from ringbalance.reduced_model.tube.regime import CLEARING, TubeEnds, TubePath, priming_pressure
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ringbalance.scene.models import HumpGas
 from ringbalance.scene.registry import registered
 
 WIDTH: Final = 3
-"""Column of a half-width over the fill ratio."""
+"""Column of a moment's half-width over the fill ratio."""
 _Asked = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
-_Answers = tuple[FloatArray, FloatArray, IntArray, BoolArray]
-_NO_MARGINS: Final = np.empty((2, 0))
+_Answers = tuple[FloatArray, IntArray, BoolArray, FloatArray]
 _FEW: Final = 500
 """Points up to which compiled code would take longer to load than they take without."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DriveUncertainty:
-    """Expanded uncertainties (95 %) of what drives the flow."""
-
-    relative_density: float = 0.0
-    relative_speed: float = 0.0
-    relative_gas_pressure: float = 0.0
-    hump_pressure: float = 0.0
-    """Pa."""
-    vapour_pressure: float = 0.0
-    """Pa."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,21 +95,18 @@ class CalibratedLaw:
     tube_area: float
     """S, m^2."""
     levels: Table
-    """Over the fill ratio: `hydrostatic_pressure` with slope and curvature, and its half-width, Pa."""
+    """Over the fill ratio: `hydrostatic_pressure` with slope and curvature, Pa."""
     path: TubePath
     """Radii of the tube, as pressures."""
     heads: TubeHeads
     """Loss of the tube."""
-    inputs: DriveUncertainty
-    """Half-widths of what drives the flow."""
     moment: CalibratedMoment
     """The moment that goes with this law."""
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
 
-    variants: tuple[CalibratedLaw, ...] = ()
-    """Laws without uncertainties of a device that is lower, then higher, by the expanded uncertainty (95 %)
-    along each direction of the inputs that were fitted together; `inputs` and the rest have the others."""
+    half_widths: HalfWidths | None = None
+    """Expanded uncertainties (95 %); None: half-widths are zero, and no regime is undecided."""
 
     def __repr__(self) -> str:
         return law_text(self)
@@ -151,8 +127,7 @@ class CalibratedLaw:
 
     def scalars(self) -> dict[int, float]:
         """What is no table, at the places of `point`."""
-        path, inputs, heads = self.path, self.inputs, self.heads
-        by_density, by_speed = inputs.relative_density**2, (2 * inputs.relative_speed) ** 2
+        path, heads = self.path, self.heads
         slowest, fastest = velocities_of(heads.siphon)[[0, -1]]
         carry, carry_from = _carried_by(path)
         return {
@@ -166,14 +141,6 @@ class CalibratedLaw:
             point.TRAPPED: path.trapped,
             point.VAPOUR: path.vapour_pressure,
             point.RELEASED: path.released,
-            point.CAVITY_KNOWN: path.cavity_fitted,
-            point.CLEARING_KNOWN: path.clearing_fitted,
-            point.OF_DENSITY: by_density,
-            point.OF_BLOWN: by_density + inputs.relative_gas_pressure**2,
-            point.OF_SPEED: by_speed,
-            point.OF_GAS: inputs.relative_gas_pressure**2,
-            point.OF_CREST: inputs.hump_pressure**2 + inputs.vapour_pressure**2,
-            point.OF_LIQUID: by_density + by_speed,
             point.LOWEST: slowest,
             point.HIGHEST: fastest,
             point.WAY_BACK: float(len(heads.tables) - 1),
@@ -214,7 +181,10 @@ class CalibratedLaw:
             np.array(asked.gas_pressure).ravel(),
             np.array(asked.primed).ravel(),
         )
-        velocity, width, regime, after = self._widened(flat) if self.variants else self._answers(flat)
+        velocity, regime, after, margin = self._answers(flat)
+        width = np.zeros_like(velocity)
+        if self.half_widths is not None:
+            width, regime = self._widened(flat, velocity, regime, margin)
         return Flow(
             velocity=velocity.reshape(shape),
             regime=regime.reshape(shape),
@@ -223,7 +193,7 @@ class CalibratedLaw:
         )
 
     def _is_plain(self, x: Any, y: Any, p: Any, primed: Any) -> bool:
-        """Whether these are four numbers that need no other check, of a law without variants."""
+        """Whether these are four numbers that need no other check, of a law without half-widths."""
         most = self.max_fill_ratio + FILL_SLACK
         return (
             isinstance(x, _NUMBER)
@@ -233,7 +203,7 @@ class CalibratedLaw:
             and -FILL_SLACK <= x <= most
             and -FILL_SLACK <= y <= most
             and -self.ambient_pressure <= p <= point.GREATEST_PRESSURE
-            and not self.variants
+            and self.half_widths is None
         )
 
     def _opposite(self, fill_ratio: Any) -> Any:
@@ -243,43 +213,43 @@ class CalibratedLaw:
         """A query of `point` with its answer."""
         query = [float(x), float(y), float(p), float(primed), *_REST_OF_QUERY]
         numbers, cells, pieces = self._lists
-        answer(numbers, cells, pieces, pieces, query, True)
+        answer(numbers, cells, pieces, pieces, query)
         return query
 
-    def _answers(self, asked: _Asked, margins: FloatArray = _NO_MARGINS) -> _Answers:
-        """Velocity, half-width, regime and primed afterwards of n queries; `margins`: as `answer_each`."""
+    def _answers(self, asked: _Asked) -> _Answers:
+        """Velocity, regime, primed afterwards and margin over the crest of n queries."""
         n = asked[0].size
-        answers = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
+        answers = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_), np.empty(n)
         if n > _FEW:
             answer_each = registered("function", "answer_each")
-            answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers, margins)
+            answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers)
             return answers
         each = [self._answer(*query) for query in zip(*(values.tolist() for values in asked), strict=True)]
-        for column, place in zip((*answers, *margins), _ANSWER, strict=True):
-            column[...] = [query[place] for query in each][: column.size]
+        for column, place in zip(answers, _ANSWER, strict=True):
+            column[...] = [query[place] for query in each]
         return answers
 
-    def _widened(self, asked: _Asked) -> _Answers:
-        """The same with what the variants add to the half-widths of velocity and margin."""
-        margins = np.empty((1 + len(self.variants), 2, asked[0].size))
-        velocity, width, regime, after = self._answers(asked, margins[0])
-        sides = [each._answers(asked, more)[0] for each, more in zip(self.variants, margins[1:], strict=True)]
-        direction = np.sign(velocity)
-        speeds = np.maximum(direction * np.array(sides), 0.0)
-        spread = np.sqrt(np.sum(((speeds[1::2] - speeds[::2]) / 2) ** 2, axis=0))
-        margin, square = margins[0]
-        square = square + np.sum(((margins[2::2, 0] - margins[1::2, 0]) / 2) ** 2, axis=0)
-        opened = (velocity > 0) & (margin * margin < square)
-        width = np.hypot(width, np.abs(direction) * spread)
-        return velocity, width, np.where(opened, int(Regime.UNDECIDED), regime), after
+    def _widened(
+        self, asked: _Asked, velocity: FloatArray, regime: IntArray, margin: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Half-widths of velocities, m/s, and regimes, undecided where the margin lies within its half-width.
+
+        With other liquid opposite than the rest of the pair's, a full tube counts as one under the gas
+        pressure that drives it alike with that.
+        """
+        assert self.half_widths is not None
+        fill, opposite, pressure, primed = asked
+        wall, rest, there = map(self.hydrostatic_pressure, (fill, self.max_fill_ratio - fill, opposite))
+        back = np.maximum(rest, self.path.port_pressure) - np.maximum(there, self.path.port_pressure)
+        wall = self.gas_factor * pressure + wall + np.where(regime == Regime.SEPARATED, 0.0, back)
+        width, of_margin = self.half_widths.at(fill, wall, primed)
+        width = np.where(velocity == 0, 0.0, np.hypot(width, self.heads.interpolation_error * velocity))
+        opened = self.path.crest & (velocity > 0) & (np.abs(margin) < of_margin)
+        return width, np.where(opened, int(Regime.UNDECIDED), regime)
 
     def hydrostatic_pressure(self, fill_ratio: npt.ArrayLike) -> FloatArray:
         """Of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa."""
         return self.levels.quintic(fill_ratio)
-
-    def hydrostatic_pressure_uncertainty(self, fill_ratio: npt.ArrayLike) -> FloatArray:
-        """Its expanded uncertainty (95 %), Pa."""
-        return self.levels.straight(fill_ratio, WIDTH)
 
     def ends(
         self,
@@ -351,37 +321,6 @@ class CalibratedLaw:
             | {name: np.array([value]) for name, value in values.items() if value is not None}
         )
 
-    def cavity_margin(
-        self, *, fills: tuple[float, float], gas_pressure: float, reverse: bool
-    ) -> tuple[float, float] | tuple[None, None]:
-        """`point.set_margin` over a primed tube's cavity in one direction, Pa; both None without a crest."""
-        if not self.path.crest:
-            return None, None
-        (c, k, p), w = self._lists, [*fills, gas_pressure, 1.0, *_REST_OF_QUERY]
-        point.set_levels(c, k, p, w, *fills)
-        w[point.UP_GAS] = self.gas_factor * gas_pressure
-        if reverse:
-            turn(w)
-        point.set_drive(c, w)
-        point.set_crest(c, w, w[point.DOWN_LEVEL] >= c[point.PORT])
-        w[point.UP_SQUARE] = point.up_square(c, w)
-        w[point.HOLDS], lost, off = w[point.RESTING] - w[point.CAVITY], 0.0, 0.0
-        if w[point.DRIVING] > 0:
-            point.find(k, p, w, point.SIPHON, w[point.DRIVING])
-            root = w[point.EIGHTH] / self.density**0.125
-            column = BACK_SHARE if reverse and self.heads.return_hump else SHARE
-            lost = float(self.heads.siphon.cubic(root, column))
-            off = float(self.heads.siphon.straight(root, SHARE_WIDTH))
-            w[point.LOST] = lost * w[point.DRIVING]
-        spread = max(w[point.MOST] - w[point.CAVITY], w[point.CAVITY] - w[point.LEAST])
-        point.set_margin(c, w, lost, off, point.known_of(w, lost, spread))
-        sides = [
-            each.cavity_margin(fills=fills, gas_pressure=gas_pressure, reverse=reverse)[0] or 0.0
-            for each in self.variants
-        ]
-        by_fitted = ((high - low) / 2 for low, high in zip(sides[::2], sides[1::2], strict=True))
-        return w[point.MARGIN], math.hypot(math.sqrt(w[point.MARGIN_SQUARE]), *by_fitted)
-
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
 
@@ -391,13 +330,10 @@ def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]
     siphon, *ways = (Table.stacked(each) for each in zip(*(law.heads.tables for law in laws), strict=True))
     density = np.array([law.density for law in laws])
     froude = np.array([law.path.froude_velocity for law in laws])
-    error = np.array([law.heads.interpolation_error for law in laws])
     rows = LawRows.of(1 + len(ways), stack=(len(laws),))
     rows.add_levels(Table.stacked([law.levels for law in laws]))
-    beside = siphon.knots.shape[-1] - 1
     for at, way in enumerate((siphon, *ways)):
-        more = (0 if at else beside, *_carrying_pressures(way, density, froude).T)
-        rows.add_way(at, way, density, error=error, more=more)
+        rows.add_way(at, way, density, more=_carrying_pressures(way, density, froude).T)
         if ways and at == point.SIPHON:
             rows.add_shares(siphon, density)
     scalars = [law.scalars() for law in laws]
@@ -454,21 +390,14 @@ def _carried_by(path: TubePath) -> tuple[float, float]:
 _NUMBER: Final = (float, int)
 _TRUTH: Final = (bool, np.bool_)
 _REST_OF_QUERY: Final = [0.0] * (point.PLACES_OF_QUERY - 4)
-_ANSWER: Final = (
-    point.VELOCITY,
-    point.UNCERTAINTY,
-    point.REGIME,
-    point.PRIMED_AFTER,
-    point.MARGIN,
-    point.MARGIN_SQUARE,
-)
+_ANSWER: Final = (point.VELOCITY, point.REGIME, point.PRIMED_AFTER, point.MARGIN)
 
 
 def _one_flow(query: list[float]) -> Flow:
-    velocity, width, regime, _, primed = query[point.VELOCITY : point.PRIMED_AFTER + 1]
+    velocity, regime, _, primed = query[point.VELOCITY : point.PRIMED_AFTER + 1]
     return Flow(
         velocity=np.asarray(velocity),
         regime=np.asarray(int(regime)),
-        uncertainty=np.asarray(width),
+        uncertainty=np.zeros(()),
         primed=np.asarray(primed != 0.0),
     )

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, cast
 
 import numpy as np
 
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, DriveUncertainty
+from ringbalance.reduced_model.law import version_4
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.flow_law import FORMAT, VERSION, CompleteLaw
+from ringbalance.reduced_model.law.half_widths import HalfWidths
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
 from ringbalance.reduced_model.pieces.table import Table
 from ringbalance.reduced_model.tube.heads import TubeHeads
@@ -26,7 +28,7 @@ _RECORDS: Final[Mapping[str, type]] = MappingProxyType(
         for record in (
             CalibratedLaw,
             CalibratedMoment,
-            DriveUncertainty,
+            HalfWidths,
             PaperLaw,
             PaperMoment,
             Table,
@@ -51,7 +53,6 @@ _NOT_NEGATIVE: Final = frozenset(
     {"ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"}
 )
 _LONGEST: Final = 40
-_VARIANTS: Final = "tuple[CalibratedLaw, ...]"
 
 
 class _Reader:
@@ -98,15 +99,23 @@ class _Reader:
         value, optional = data[field.name], str(field.type).endswith("| None")
         if value is None and optional:
             return None
-        if str(field.type) == _VARIANTS:
-            return self.variants(value, where)
         return self.value(value, str(field.type).removesuffix(" | None"), field.name, where)
 
-    def variants(self, value: object, where: str) -> tuple[CalibratedLaw, ...]:
-        if not isinstance(value, list) or len(value) % 2:
-            self.fault(where, _shown(value), "it is not a list of pairs of laws", "a list of pairs of laws")
-            return ()
-        return tuple(self.record(each, (CalibratedLaw,), f"{where}[{i + 1}]") for i, each in enumerate(value))
+    def law(self, content: Mapping[str, Any]) -> Any:
+        """Read the law of a file, or note why it cannot be read."""
+        data = content.get("law")
+        if content["version"] == VERSION or not isinstance(data, dict) or data.get("type") != "CalibratedLaw":
+            return self.record(data, _LAWS, "law")
+        try:
+            document, held = version_4.split(data)
+            both = [version_4.split(each)[0] for each in held["variants"]]
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+            self.fault("law.type", data["type"], "this is no whole law of version 4", "calibrate again")
+            return None
+        law, *variants = (self.record(each, (CalibratedLaw,), "law") for each in (document, *both))
+        if self.faults:
+            return None
+        return replace(law, half_widths=version_4.half_widths(law, held, variants))
 
     def value(self, value: object, kind: str, name: str, where: str) -> Any:
         checks: Mapping[str, tuple[Callable[[object], bool], str]] = {
@@ -153,9 +162,10 @@ def _shown(value: object) -> str:
 
 
 def load_law(path: Path | str) -> CompleteLaw:
-    """Read a law that a law's `save` wrote.
+    """Read a law that a law's `save` wrote, also one of version 4.
 
-    Returns: The law, equal to the saved one bit for bit; it carries its moment, volumes and density.
+    Returns: The law, equal to the saved one bit for bit; it carries its moment, volumes and density.  Of
+        version 4 all but half-widths, and whether a regime is undecided, are equal.
     Raises: SceneError: a file that cannot be read or is no law; every fault names key, value and what is
         allowed.
 
@@ -172,7 +182,7 @@ def load_law(path: Path | str) -> CompleteLaw:
     reader = _Reader(str(file))
     law = None
     for content in _content(reader, file):
-        law = reader.record(content.get("law"), _LAWS, "law")
+        law = reader.law(content)
     if reader.faults:
         raise SceneError(reader.faults)
     return cast(CompleteLaw, law)
@@ -191,12 +201,12 @@ def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             found = content.get("format") if isinstance(content, dict) else None
             reader.fault("format", _shown(found), "the file is not a saved law", f'"{FORMAT}", {wanted}')
-        elif content.get("version") != VERSION:
+        elif content.get("version") not in (VERSION, 4):
             reader.fault(
                 "version",
                 _shown(content.get("version")),
                 "written by another release, whose law lacks what this one needs: calibrate again",
-                str(VERSION),
+                f"{VERSION}, or 4",
             )
         else:
             yield content

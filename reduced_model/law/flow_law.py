@@ -178,7 +178,7 @@ def law_text(law: Any) -> str:
 
 
 FORMAT: Final = "ringbalance law"
-VERSION: Final = 4
+VERSION: Final = 5
 
 
 def save_record(*, path: Path, record: object) -> Path:
@@ -189,7 +189,7 @@ def save_record(*, path: Path, record: object) -> Path:
     Raises: OSError: the file cannot be written; nothing is left behind.
     """
     content = {"format": FORMAT, "version": VERSION, "law": _plain(record)}
-    return write_whole(path, json.dumps(content, allow_nan=False, indent=1) + "\n")
+    return write_whole(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def _plain(value: object) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable, MutableMapping, Sequence
 from dataclasses import replace
 from typing import Final, TypeAlias
@@ -12,7 +11,7 @@ import numpy as np
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
-from ringbalance.reduced_model.chamber.contributions import gravity_shares, unmodelled_fractions
+from ringbalance.reduced_model.chamber.contributions import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import (
     RingValues,
     chamber_closed_forms,
@@ -23,29 +22,19 @@ from ringbalance.reduced_model.law.calibrated_law import (
     WIDTH,
     CalibratedLaw,
     CalibratedMoment,
-    DriveUncertainty,
     constants_of,
 )
-from ringbalance.reduced_model.law.flow_law import (
-    CALIBRATED,
-)
+from ringbalance.reduced_model.law.flow_law import CALIBRATED
+from ringbalance.reduced_model.law.sides import half_width_table
 from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, alike
-from ringbalance.scene.errors import FITTED, directions
+from ringbalance.scene.errors import of_flow, with_places
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95, independent_half_widths
+from ringbalance.scene.uncertain import NORMAL_95
 
-# Density and speed act on both chambers and on the tube at once, so the law handles them separately.
-_SHARED: Final = ("density", "speed")
-_VARIED_FILLS: Final = np.array([0.2, 0.5, 0.8])
-"""Of the greatest fill ratio: where the velocity's dependence on fitted inputs is looked at."""
-_VARIED_PRESSURES: Final = np.array([0.7, 1.0, 1.4])
-"""Of the scene's gas pressure."""
-_LITTLE: Final = 1e-2
-"""Of the largest effect of a direction, below which it is left out: its square counts."""
 _NEXT_TO_NOTHING: Final = 1e-4
 """Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
 
@@ -55,57 +44,37 @@ def calibrated_law(
 ) -> CalibratedLaw:
     """Put the flow law together.
 
-    Args: `varied`: whether inputs that were fitted together are varied for the law's uncertainty.
+    Args: `varied`: whether it has half-widths.
 
     Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
     """
-    own = [
-        e.hydrostatic_pressure
-        for name, e in chamber.input_effects.items()
-        if name not in _SHARED and name != FITTED
-    ]
-    inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
-    no_inputs = np.zeros_like(chamber.fill_ratio)
-    level, along = chamber.hydrostatic_pressure, chamber.moment
+    along = chamber.moment
     law = _put_together(
         scene,
         heads=heads,
-        levels=level.table.with_column(WIDTH, level.half_widths(inputs=inputs)),
-        inputs=_drive_uncertainty(scene),
+        levels=chamber.hydrostatic_pressure.table,
         moment=CalibratedMoment(
-            along=along.table.with_column(WIDTH, along.half_widths(inputs=no_inputs)),
+            along=along.table.with_column(WIDTH, along.half_widths(inputs=np.zeros_like(chamber.fill_ratio))),
             across=_across_table(scene, along.table.knots),
         ),
     )
-    return replace(law, variants=_variants(scene)) if varied and scene.fitted.quantities else law
+    if not varied:
+        return law
+    return replace(law, half_widths=half_width_table(side_laws(scene), gas_pressure=scene.gas.pressure))
 
 
-def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
-    """Nominal laws along the directions of the fitted inputs that the velocity depends on, low and high.
-
-    The directions are turned to the singular vectors of the velocity's changes over fills and pressures.
-    """
-    gravity = gravity_shares(scene).mean > scene.tolerance
-
-    def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
-        sides = [side for error in directions(scene, turned=turned) for side in error.sides(scene)]
-        made = zip(nominal_laws(sides, gravity=gravity), sides, strict=True)
-        return tuple(_variant(scene, law, side) for law, side in made)
-
-    pressure = _VARIED_PRESSURES * scene.gas.pressure
-    fill = _VARIED_FILLS[:, None] * scene.disc.max_fill_ratio
-    velocities = np.array(
-        [law.evaluate(fill_ratio=fill, gas_pressure=pressure, primed=True).velocity.ravel() for law in laws()]
-    )
-    changes = (velocities[1::2] - velocities[::2]).T
-    _, size, turned = np.linalg.svd(changes, full_matrices=False)
-    return laws(turned[size > _LITTLE * size[0]].T) if size[0] > 0 else ()
-
-
-def _variant(scene: Scene, law: CalibratedLaw, side: Scene) -> CalibratedLaw:
-    """Law of a scene beside another one; gas pressures are asked for as that has them."""
-    asked = scene.gas.pressure
-    return replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) if asked else law
+def side_laws(scene: Scene) -> tuple[CalibratedLaw, ...]:
+    """The nominal law of a scene, and those at both sides of every uncertainty that acts on the flow."""
+    errors = of_flow(scene)
+    base = with_places(scene, errors)
+    sides = [base, *(side for error in errors for side in error.sides(base)), base, base]
+    waves = [0.0] * (len(sides) - 2) + [-NORMAL_95, NORMAL_95]
+    asked, laws = scene.gas.pressure, nominal_laws(sides, gravity=False, waves=waves)
+    if not asked:
+        return laws
+    # Gas pressures are asked for as the scene has them.
+    pairs = zip(laws, sides, strict=True)
+    return tuple(replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) for law, side in pairs)
 
 
 def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
@@ -161,8 +130,7 @@ def _nominal(
         _put_together(
             scene,
             heads=head,
-            levels=level.with_column(WIDTH, 0.0),
-            inputs=DriveUncertainty(),
+            levels=level,
             moment=CalibratedMoment(along=moment.with_column(WIDTH, 0.0), across=_across_table(scene, fills)),
         )
         for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True)
@@ -196,7 +164,6 @@ def _put_together(
     *,
     heads: TubeHeads,
     levels: Table,
-    inputs: DriveUncertainty,
     moment: CalibratedMoment,
 ) -> CalibratedLaw:
     return CalibratedLaw(
@@ -208,22 +175,8 @@ def _put_together(
         levels=levels,
         path=tube_path(scene),
         heads=heads,
-        inputs=inputs,
         gas_factor=pressure_factor(scene),
         moment=moment,
-    )
-
-
-def _drive_uncertainty(scene: Scene) -> DriveUncertainty:
-    width = independent_half_widths(scene)
-    hump = scene.tube.hump_radius or 0.0
-    moved = scene.liquid.density * scene.rotor.speed**2 * hump * width.get("hump_radius", 0.0)
-    return DriveUncertainty(
-        relative_density=width.get("density", 0.0) / scene.liquid.density,
-        relative_speed=width.get("speed", 0.0) / abs(scene.rotor.speed),
-        relative_gas_pressure=width.get("pressure", 0.0) / scene.gas.pressure if scene.gas.pressure else 0.0,
-        hump_pressure=moved,
-        vapour_pressure=math.hypot(width.get("vapour_pressure", 0.0), width.get("ambient_pressure", 0.0)),
     )
 
 

@@ -6,7 +6,6 @@ from ringbalance.reduced_model.pieces.point import (
     CREST,
     DOWN_GAS,
     DOWN_LEVEL,
-    DOWN_WIDTH,
     DRIVING,
     EXTRAPOLATED,
     FILL,
@@ -17,7 +16,6 @@ from ringbalance.reduced_model.pieces.point import (
     LARGEST_FILL,
     LEAST_PRESSURE,
     MARGIN,
-    MARGIN_SQUARE,
     OK,
     OPPOSITE_FILL,
     PORT,
@@ -30,10 +28,8 @@ from ringbalance.reduced_model.pieces.point import (
     STANDS,
     STATUS,
     THERE,
-    UNCERTAINTY,
     UP_GAS,
     UP_LEVEL,
-    UP_WIDTH,
     VELOCITY,
     WAY_BACK,
     Cells,
@@ -58,22 +54,19 @@ def turn(w: Query) -> None:
     kept = w[UP_LEVEL]
     w[UP_LEVEL] = w[DOWN_LEVEL]
     w[DOWN_LEVEL] = kept
-    kept = w[UP_WIDTH]
-    w[UP_WIDTH] = w[DOWN_WIDTH]
-    w[DOWN_WIDTH] = kept
     kept = w[UP_GAS]
     w[UP_GAS] = w[DOWN_GAS]
     w[DOWN_GAS] = kept
 
 
 @both_ways
-def set_flow(c: Law, k: Cells, p: Pieces, w: Query, way: int, widths: bool) -> None:
+def set_flow(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
     """The answer where something drives liquid out of the upstream chamber, whose port must be covered."""
     if w[UP_LEVEL] >= c[PORT]:
         if c[CREST] == 0.0:
-            set_full(c, k, p, w, widths)
+            set_full(c, k, p, w)
         else:
-            over_crest(c, k, p, w, way, widths)
+            over_crest(c, k, p, w, way)
 
 
 @both_ways
@@ -92,25 +85,24 @@ def stays_full(c: Law, w: Query) -> bool:
 
 
 @both_ways
-def set_answer(c: Law, k: Cells, p: Pieces, w: Query, widths: bool) -> bool:
-    """Velocity, regime and primed afterwards.
+def set_answer(c: Law, k: Cells, p: Pieces, w: Query) -> bool:
+    """Velocity, regime and primed afterwards; at most one direction flows: what drives one holds the other.
 
-    With `widths` half-width and whether it is undecided, too.  At most one direction flows: what drives one
-    holds the other.  Returns: whether it is the reverse one, of which the velocity is positive too.
+    Returns: whether it is the reverse one, of which the velocity is positive too.
     """
     w[VELOCITY] = 0.0
     w[REGIME] = BLOCKED
     w[PRIMED_AFTER] = 0.0
     set_drive(c, w)
     if w[DRIVING] > 0.0:
-        set_flow(c, k, p, w, THERE, widths)
+        set_flow(c, k, p, w, THERE)
         return False
     if stays_full(c, w):
         w[PRIMED_AFTER] = 1.0
     turn(w)
     set_drive(c, w)
     if w[DRIVING] > 0.0:
-        set_flow(c, k, p, w, int(c[WAY_BACK]), widths)
+        set_flow(c, k, p, w, int(c[WAY_BACK]))
         if w[REGIME] != BLOCKED:
             w[REGIME] = REVERSE
             return True
@@ -149,14 +141,9 @@ def worth_of(c: Law, w: Query) -> float:
 
 
 @both_ways
-def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, widths: bool) -> None:
-    """Velocity out of the driven chamber, m/s, regime, status, primed afterwards.
-
-    With `widths` the velocity's half-width (95 %), m/s, too; without, the status is never undecided.
-    """
-    w[UNCERTAINTY] = 0.0
+def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
+    """Velocity out of the driven chamber, m/s, regime, status, primed afterwards."""
     w[MARGIN] = 0.0
-    w[MARGIN_SQUARE] = 0.0
     up = w[FILL]
     down = w[OPPOSITE_FILL]
     worth = OK
@@ -174,7 +161,7 @@ def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, widths: bool) -> No
     w[DOWN_GAS] = 0.0
     set_levels(c, k, q, w, up, down)
     w[STATUS] = STANDS
-    if set_answer(c, k, p, w, widths):
+    if set_answer(c, k, p, w):
         w[VELOCITY] = -w[VELOCITY]
     if worth == EXTRAPOLATED:
         w[STATUS] = EXTRAPOLATED

@@ -13,7 +13,7 @@ from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.pieces.table import Table, pieces_of
 from ringbalance.scene.arrays import FloatArray
 
-WIDTH_OF_ROW: Final = point.WIDTH_SLOPE + 1
+WIDTH_OF_ROW: Final = point.ALL + 1
 _EDGE: Final = 1e-9
 
 
@@ -69,15 +69,14 @@ class LawRows:
         way: int,
         knots: FloatArray,
         ratios: FloatArray,
-        squares: FloatArray,
-        more: Sequence[npt.ArrayLike],
+        more: Sequence[npt.ArrayLike] | FloatArray,
         *,
         cells: int = CELLS,
     ) -> None:
         """Pieces of a way: velocity over the root of a pressure, along the eighth root of that.
 
-        Args: `ratios`: shape (..., 6, pieces). `squares`: of half-widths of the loss, shape (..., 2, pieces).
-            `more`: behind the cells in the way's own row, numbers of the law or of the laws.
+        Args: `ratios`: shape (..., 6, pieces). `more`: behind the cells in the way's own row, numbers of the
+            law or of the laws.
         """
         ends = []
         for (first, second), ratio in zip(
@@ -88,48 +87,35 @@ class LawRows:
         row = [*np.reshape(ends, (*knots.shape[:-1], 2)).T, knots[..., -1]]
         for place, value in enumerate([*row, *self.add_cells(knots, cells=cells), *more]):
             self.ways[..., way, place] = value
-        self.add(knots[..., None, 1:], ratios, squares)
+        if way == point.SIPHON:
+            self.numbers[0][..., point.SHARES] = knots.shape[-1] - 1
+        self.add(knots[..., None, 1:], ratios)
 
     def add_levels(self, levels: Table) -> None:
-        """Hydrostatic pressure over the fill, with its half-width in column 3.
-
-        The first that is added. Its knots are equally spaced, and cells end there.
-        """
+        """Hydrostatic pressure over the fill, the first table; cells end at its equally spaced knots."""
         cells = levels.knots.shape[-1] - 1
         self.numbers[0][..., point.LEVEL_SCALE] = self.add_cells(levels.knots, cells=cells)[0]
-        self.add(levels.knots[..., None, 1:], levels.quintics, levels.lines(levels.column(3)))
+        self.add(levels.knots[..., None, 1:], levels.quintics)
 
     def add_way(
-        self,
-        way: int,
-        table: Table,
-        density: npt.ArrayLike,
-        *,
-        error: npt.ArrayLike,
-        more: Sequence[npt.ArrayLike],
+        self, way: int, table: Table, density: npt.ArrayLike, *, more: Sequence[npt.ArrayLike] | FloatArray
     ) -> None:
-        """A table over the eighth root of a head, of a liquid's density, kg/m^3; its loss in column 3.
-
-        Args: `error`: relative, of a velocity; part of the half-width.
-        """
+        """A table over the eighth root of a head, of a liquid's density, kg/m^3."""
         root, half = _powers_of(density, 0.125), _powers_of(density, 0.5)
         ratios = table.quintics / half[..., None, None] / _powers_of(root, np.arange(6))[..., None]
-        exponent = 0.5 + table.knots * table.column(1) / table.column(0) / 8
-        squares = table.lines(table.column(3) ** 2 + (np.asarray(error)[..., None] / exponent) ** 2)
-        squares[..., 1, :] /= root[..., None]
-        self.add_ratios(way, root[..., None] * table.knots, ratios, squares, more)
+        self.add_ratios(way, root[..., None] * table.knots, ratios, more)
 
     def add_shares(self, table: Table, density: npt.ArrayLike) -> None:
-        """Beside the pieces of the whole tube: from column 4 on, see `TubeHeads`."""
+        """Beside the pieces of the whole tube: from column 3 on, see `TubeHeads`."""
         powers = _powers_of(density, 0.125 * np.arange(3))[..., None]
         length = np.diff(table.knots)
         shares = []
-        for column in (5, min(7, table.count - 2)):
+        for column in (3, min(5, table.count - 2)):
             # A parabola through the middle of a cubic piece and both its ends.
             value, slope, square, cube = np.moveaxis(table.cubics(column), -2, 0)
             parabola = [value, slope - cube * length**2 / 2, square - cube * length * 1.5]
             shares.append(np.stack(parabola, axis=-2) / powers)
-        self.add(*shares, table.lines(table.column(4)) / powers[..., :2, :])
+        self.add(*shares)
 
     def arrays(self, scalars: Mapping[int, npt.ArrayLike]) -> tuple[FloatArray, FloatArray]:
         """Numbers, with those of the law or laws at their places, and pieces, (..., rows, `WIDTH_OF_ROW`)."""

@@ -79,10 +79,6 @@ class Table:
         powers = np.stack(_polynomial(h, *ends), axis=-2)
         return np.asarray(powers / h[..., None, :] ** np.arange(powers.shape[-2])[:, None])
 
-    def lines(self, values: FloatArray) -> FloatArray:
-        """Values at the knots, straight between them, in powers of x - end, shape (..., 2, n - 1)."""
-        return np.stack([values[..., 1:], np.diff(values) / np.diff(self.knots)], axis=-2)
-
     def place(self, x: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
         """The piece of any x, or the nearest one, and the distance from its end."""
         inside = clipped(x, self.knots[0], self.knots[-1])

@@ -26,7 +26,7 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, plain
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
+from ringbalance.scene.uncertain import NORMAL_95
 
 Radius = TypeVar("Radius", float, FloatArray)
 _LEAST, _MOST = np.log(1e-9), np.log(1e6)
@@ -55,7 +55,6 @@ def tube_path(scene: Scene) -> TubePath:
     froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
     # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
     released = plain(np.clip(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0, 1.0))
-    fitted = fitted_causes(scene)
     return TubePath(
         density=scene.liquid.density,
         port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
@@ -64,8 +63,6 @@ def tube_path(scene: Scene) -> TubePath:
         vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
         released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
         froude_velocity=froude * abs(scene.rotor.speed) * plain(np.sqrt(crest * scene.tube.bore)),
-        cavity_fitted=CAVITY_ERROR in fitted,
-        clearing_fitted=CLEARING_ERROR in fitted,
     )
 
 

@@ -2,51 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import (
-    corrected_state,
-    uncertainty_parts,
-    with_errors,
-)
-from ringbalance.physics.tube.state import TubeState, tube_state
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, pieces_of, spline, table_at
-from ringbalance.reduced_model.tube.path import (
-    crest_end_uncertainty,
-    crest_head,
-    crest_span,
-    reversed_tube,
-)
+from ringbalance.reduced_model.tube.path import crest_head, reversed_tube
 from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.fitted import CREST_ERROR
-from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.models import Scene
 from ringbalance.scene.toml import toml_text
-from ringbalance.scene.uncertain import fitted_causes, independent_half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to its square."""
 _SAMPLES: Final = 2049
 """At which knots may stand; more sharpen nothing but the bend where the flow turns turbulent."""
 _NOMINAL_KNOTS: Final = 257
-LOSS, SHARE_WIDTH, SHARE, BACK_SHARE = 3, 4, 5, 7
-"""Columns of a table: half-width of the loss, behind the ratio with its derivatives; of the whole tube also
-half-width of the share, the share and its slope, and the same of the way back."""
+SHARE, BACK_SHARE = 3, 5
+"""Columns of the whole tube's table behind the ratio with its derivatives: the share and its slope, and the
+same of the way back."""
 _OF_TOLERANCE: Final = 1e-7
 """Largest relative error of a velocity between knots, of the scene's tolerance."""
 _FINEST: Final = 1e-5
 """Tolerance below which knots do not become more."""
 _OF_SHARES: Final = 1000.0
 """Times that of a share, which decides on nothing but the regime."""
-_OF_WIDTHS: Final = 1e-4
-"""Of a half-width, and a tenth of that of the largest one."""
 _OF_HEAD: Final = 2.0
 """Relative error of a head over that of the velocity that it drives, at the most."""
 _NEWTON_STEPS: Final = 30
@@ -62,13 +48,11 @@ class TubeHeads:
     """Heads of the full tube in tables of `point`, along the eighth root of a head, (m/s)^(1/4)."""
 
     siphon: Table
-    """Of (k + 1) u^2/2, between the chambers: u/sqrt(head), half-width of k over k + 1, and with a crest that
-    of the share (alpha + k_up)/(k + 1) of the head that is lost up to it, and the share; where the way back
-    differs, its share too."""
+    """Of (k + 1) u^2/2, between the chambers: u/sqrt(head), and with a crest the share (alpha + k_up)/(k + 1)
+    of the head that is lost up to it; where the way back differs, its share too."""
     hump: Table | None
     """Of (alpha + k_up) u^2/2, from the driven chamber to the lowest pressure on the path, at the end of the
-    crest's arc or just behind it: u/sqrt(head), half-width of k_up over alpha + k_up with the place of the
-    crest's end; None without a crest."""
+    crest's arc or just behind it: u/sqrt(head); None without a crest."""
     return_hump: Table | None
     """The same from the opposite chamber, for reverse flow; None: it is the same, or there is no crest."""
     interpolation_error: float = 0.0
@@ -76,7 +60,7 @@ class TubeHeads:
 
     @classmethod
     def nominal(cls, designs: Designs) -> tuple[TubeHeads, ...]:
-        """The heads of every design without uncertainties and on few knots.
+        """The heads of every design on few knots.
 
         These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values. Drawn
         errors of models, and those that a fit tries, may make a head fall: it is then level.
@@ -84,20 +68,15 @@ class TubeHeads:
         """
         log_u = _places(_NOMINAL_KNOTS)
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u, falls=np.inf)]
-        exact, tables = _Widths(*([np.zeros((log_u.size, 1))] * 4)), []
+        tables = []
         # One column where nothing that a head depends on differs between designs.
         shape = log_u.size, designs.size
-        for way, columns in _columns(lost, exact, 0.0):
+        for way, columns in _columns(lost, 0.0):
             stored = [np.broadcast_to(values, shape) for each in columns for values in each.stored]
             rows = np.stack(stored).transpose(2, 0, 1).reshape(designs.size, -1)
             roots = np.broadcast_to(way.root, shape).T
             tables.append([Table(knots=x, columns=row) for x, row in zip(roots, rows, strict=True)])
         return tuple(map(cls._of_tables, zip(*tables, strict=True)))
-
-    @classmethod
-    def bare(cls, scene: Scene) -> TubeHeads:
-        """The same heads as `of`, without their uncertainties: a fraction of its work. Raises: as `of`."""
-        return cls._with_widths(scene, _Widths(*([np.zeros(2 * _SAMPLES - 1)] * 4)))
 
     @classmethod
     def of(cls, scene: Scene) -> TubeHeads:
@@ -106,33 +85,16 @@ class TubeHeads:
         Raises: ValueError: arcs of bends longer than the tube. SceneError: a head that falls.
         Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
         """
-        position = independent_half_widths(scene).get("hump_position", 0.0)
-        fitted = CREST_ERROR in fitted_causes(scene)
-        place = crest_end_uncertainty(scene.tube, position, fitted=fitted)
-        log_u, every = _places(2 * _SAMPLES - 1), _places(_SAMPLES)
-        widths = _widths(scene, np.exp(every), place=place)
-        return cls._with_widths(scene, _Widths(*(np.interp(log_u, every, width) for width in widths)))
-
-    @classmethod
-    def _with_widths(cls, scene: Scene, widths: _Widths) -> TubeHeads:
-        """Of a scene's tube, with half-widths at the samples."""
         log_u = _places(2 * _SAMPLES - 1)
         lost = [_Lost.of(log_u, value[:, 0]) for value in _sampled(scene, log_u)]
-        allowed = _OF_TOLERANCE * max(scene.tolerance, _FINEST)
-        heads = cls._tabled(lost, widths, shortest=2, allowed=allowed)
+        columns = _columns(lost, _OF_TOLERANCE * max(scene.tolerance, _FINEST))
+        heads = cls._of_tables(
+            [table_at(way.root, knots_of(way.root, each, shortest=2), each) for way, each in columns]
+        )
         missed = [
             table.quintic(e.root) / e.over_root - 1.0 for e, table in zip(lost, heads.tables, strict=False)
         ]
         return replace(heads, interpolation_error=_OF_HEAD * float(np.max(np.abs(missed))))
-
-    @classmethod
-    def _tabled(cls, lost: list[_Lost], widths: _Widths, *, shortest: int, allowed: float) -> TubeHeads:
-        """From losses and half-widths at samples; `shortest`: as `knots_of`."""
-        made = [
-            table_at(way.root, knots_of(way.root, columns, shortest=shortest), columns)
-            for way, columns in _columns(lost, widths, allowed)
-        ]
-        return cls._of_tables(made)
 
     @classmethod
     def _of_tables(cls, tables: Sequence[Table]) -> TubeHeads:
@@ -149,15 +111,11 @@ class TubeHeads:
         """From the chamber that gives liquid; None without a crest."""
         return self.return_hump or self.hump if reverse else self.hump
 
-    def velocity(self, head: npt.ArrayLike) -> FloatArray:
-        """Of a full tube under heads of at least zero, m/s."""
-        root, table = np.sqrt(np.sqrt(np.sqrt(np.asarray(head, dtype=np.float64)))), self.siphon
+    def velocity(self, head: npt.ArrayLike, table: Table | None = None) -> FloatArray:
+        """Of a full tube under heads of at least zero, m/s. Args: `table`: default the whole tube's."""
+        root, table = np.sqrt(np.sqrt(np.sqrt(np.asarray(head, dtype=np.float64)))), table or self.siphon
         slower = np.minimum(root / table.knots[0], 1.0) ** 4
         return np.asarray(root**4 * table.quintic(root) * slower)
-
-    def uncertainty(self, velocity: npt.ArrayLike) -> FloatArray:
-        """Expanded uncertainty (95 %) of k over k + 1 at velocities above zero, m/s."""
-        return self.siphon.straight(roots_of(self.siphon, velocity), LOSS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,20 +164,13 @@ class _Lost:
         return Column(value=share, allowed=_OF_SHARES * allowed * share, derivatives=(slope,))
 
 
-def _columns(lost: list[_Lost], widths: _Widths, allowed: float) -> list[tuple[_Lost, list[Column]]]:
+def _columns(lost: list[_Lost], allowed: float) -> list[tuple[_Lost, list[Column]]]:
     """What the table of each way holds; there and back where they differ."""
     whole, *ways = lost
     alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
     ways = ways[:1] if alike else ways
-    columns = [whole.ratio(allowed), _half_width(widths.whole)]
-    if ways:
-        columns += [_half_width(widths.share), *(whole.share(way, allowed) for way in ways)]
-    there = zip(ways, widths.ways, strict=False)
-    return [(whole, columns), *((way, [way.ratio(allowed), _half_width(width)]) for way, width in there)]
-
-
-def _half_width(value: FloatArray) -> Column:
-    return Column(value=value, allowed=_OF_WIDTHS * (value + 0.1 * float(np.max(value))))
+    columns = [whole.ratio(allowed), *(whole.share(way, allowed) for way in ways)]
+    return [(whole, columns), *((way, [way.ratio(allowed)]) for way in ways)]
 
 
 def _places(count: int) -> FloatArray:
@@ -315,72 +266,6 @@ def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray, falls
     if not np.all(highest - log_head <= falls):
         raise _inconsistent(scene)
     return highest + _RISE * log_velocity
-
-
-class _Widths(NamedTuple):
-    """Expanded uncertainties (95 %)."""
-
-    whole: FloatArray
-    """Of k over k + 1."""
-    share: FloatArray
-    """Of (alpha + k_up)/(k + 1), the larger one of both directions."""
-    there: FloatArray
-    """Of k_up over alpha + k_up."""
-    back: FloatArray
-    """The same of the way back."""
-
-    @property
-    def ways(self) -> tuple[FloatArray, FloatArray]:
-        """There and back."""
-        return self.there, self.back
-
-
-def _widths(scene: Scene, velocity: FloatArray, *, place: float) -> _Widths:
-    """But for inputs fitted together.
-
-    Args: `place`: uncertainty of the crest's end.
-    """
-    state = tube_state(scene, velocity)
-    parts = uncertainty_parts(scene, velocity=velocity, state=state, fitted=False)
-    width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(velocity)))
-    right = with_errors(tube=scene.tube, state=state)
-    there, share = _way_widths(scene.tube, state, right, parts, width, place)
-    seen, right_seen = (replace(each, bends=each.bends[::-1]) for each in (state, right))
-    back, share_back = _way_widths(reversed_tube(scene.tube), seen, right_seen, parts, width, place)
-    return _Widths(whole=width / (right.k + 1), share=np.maximum(share, share_back), there=there, back=back)
-
-
-def _way_widths(
-    tube: Tube,
-    state: TubeState,
-    right: TubeState,
-    parts: Mapping[str, FloatArray],
-    width: FloatArray,
-    place: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Of k_up over alpha + k_up and of (alpha + k_up)/(k + 1).
-
-    Args: `right`: the state with supposed errors. `width`: of k by all parts.
-    """
-    upstream, k = right.upstream_loss(crest_span(tube)[1]), right.k
-    share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
-    moved = np.hypot(width * share, state.along * place)
-    return moved / (right.kinetic_factor + upstream), _fraction_uncertainty(tube, state, parts, place)
-
-
-def _fraction_uncertainty(
-    tube: Tube, state: TubeState, parts: Mapping[str, FloatArray], place: float
-) -> FloatArray:
-    """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
-    total, end = state.k + 1, crest_span(tube)[1]
-    fraction = (state.kinetic_factor + state.upstream_loss(end)) / total
-    squares = (state.along * place / total) ** 2
-    for name, part in parts.items():
-        # Which end or bend is wrong is not known: then the worse of before and behind the crest.
-        lumped = name in {"ends", "bends"}
-        lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(end - fraction)
-        squares = squares + (lever * part / total) ** 2
-    return np.asarray(np.sqrt(squares))
 
 
 def log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:

@@ -123,20 +123,6 @@ def _shortest(tube: Tube) -> float:
     return shortest_path(port_radius=tube.port_radius, hump_radius=tube.hump_radius, separation=math.pi)
 
 
-def crest_end_uncertainty(tube: Tube, position: float, *, fitted: bool = False) -> float:
-    """Expanded uncertainty (95 %) of the fraction of the path at which the arc ends.
-
-    Args: `position`: that of `hump_position`. `fitted`: whether the rest is fitted together with inputs.
-    Source: by how much the tube is longer than its shortest path, all of it before the arc's end or behind.
-    """
-    arc, end = _arc_fraction(tube), crest_span(tube)[1]
-    if np.all(arc == 0) or fitted:
-        return (1 - arc) * position
-    slack = np.maximum(1 - _shortest(tube) / tube.length, 0.0)
-    width: float = plain(np.hypot((1 - arc) * position, slack * np.maximum(end, 1 - end)))
-    return width
-
-
 def crest_head(
     *, scene: Scene, tube: Tube, state: TubeState, velocity: FloatArray, lowest: bool = True
 ) -> FloatArray:

@@ -88,10 +88,6 @@ class TubePath:
     `RELEASED` with dissolved gas."""
     froude_velocity: float
     """sqrt(g_c d) = sqrt(omega^2 r_m d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
-    cavity_fitted: bool = False
-    """Whether what the cavity's pressure may be is among the inputs that were fitted together."""
-    clearing_fitted: bool = False
-    """Whether the Froude number that clears the crest is."""
 
     @property
     def crest(self) -> bool:
@@ -251,6 +247,8 @@ class ColumnFlow(Generic[Pressure]):
     """Of a column that is separated at the crest, m/s; without a crest that of the siphon."""
     spill_velocity: Pressure
     """Of a column separated by what lay over the crest beforehand: gas in an unprimed tube, m/s."""
+    holding: Pressure
+    """Pressure that drives the column up to the crest, Pa; without a crest that of the siphon."""
     separated: Truth
     """Whether the column is separated."""
     primed: Truth
@@ -286,6 +284,7 @@ def column_flow(
             siphon_velocity=full,
             separation_velocity=full,
             spill_velocity=full,
+            holding=driving,
             separated=full < full,
             primed=flows | holds_at_rest(path, ends, primed),
         )
@@ -295,7 +294,8 @@ def column_flow(
     carried, broken = cleared(path, spill), spill
     if primed is not True:
         more = carried * np.maximum(over_cavity - margin, 0.0)
-        broken = chosen(primed, spill, separation(margin + more, flows))
+        margin = chosen(primed, margin, margin + more)
+        broken = chosen(primed, spill, separation(margin, flows))
     separated = broken < full
     # Gas stays over the crest of a tube that was unprimed until what flows through it carries the gas out.
     swept = (carried > 0.5) & (cleared(path, full) > 0.5)
@@ -305,6 +305,7 @@ def column_flow(
         siphon_velocity=full,
         separation_velocity=broken,
         spill_velocity=spill,
+        holding=margin,
         separated=separated,
         primed=(flows & keeps) | holds_at_rest(path, ends, primed),
     )

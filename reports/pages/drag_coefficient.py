@@ -69,7 +69,7 @@ def _collect(work: Work) -> Record:
             "density_kg_m3": scene.liquid.density,
             "gas_pressure_Pa": scene.gas.pressure,
             "k": _rounded(point.k),
-            "k_uncertainty": _rounded(point.k_point_uncertainty),
+            "k_uncertainty": _rounded(point.k_uncertainty),
             "apparent_k": _rounded(point.apparent_k),
             "separation": _rounded(point.separation_excess),
             "runs": bool(np.all(point.runs)),

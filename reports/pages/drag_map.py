@@ -12,14 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ringbalance.physics.tube.loss import TUBE_INPUTS, corrected_state, flow_states, model_parts, range_notes
-from ringbalance.physics.tube.state import TubeState
+from ringbalance.physics.tube.loss import corrected_state, flow_states, range_notes
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.values import chamber_pressure
@@ -27,25 +27,30 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.heads import roots_of
-from ringbalance.reduced_model.tube.path import crest_head, crest_span
 from ringbalance.reduced_model.tube.regime import (
+    ColumnFlow,
     TubeEnds,
     can_flow,
-    cavity_bounds,
     crest_margins,
     driving_pressure,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.designs import Designs
-from ringbalance.scene.errors import uncertainties
+from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.errors import Uncertainty, larger, of_flow, of_input
 from ringbalance.scene.liquids import liquids_at_room_temperature
 from ringbalance.scene.models import HumpGas, Liquid, Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, without_fitted
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    independent_half_widths,
+    without_fitted,
+)
 
-_STEP: Final = 1e-5
-"""Of ln u, for slopes."""
 _CHARGED: Final = ("bore", "kinematic_viscosity")
-"""Of `TUBE_INPUTS` those that designs are chosen by; a viscosity has its own uncertainty."""
+"""Inputs that a map is drawn over."""
+_OF_LIQUID: Final = {"density": "density_uncertainty", "kinematic_viscosity": "viscosity_uncertainty"}
+"""Properties with the relative uncertainty that a liquid has of each."""
+_NODES: Final = 13
+"""Of either axis of a map, at which half-widths are found; between them their ratio to k is interpolated."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,14 +69,11 @@ class _DragPoint:
     velocity: FloatArray
     """u, m/s."""
     velocity_uncertainty: FloatArray
-    """Expanded uncertainty (95 %), m/s."""
+    """Expanded uncertainty (95 %), m/s; zero where none was asked for."""
     k: FloatArray
     """Loss coefficient of the tube at u."""
     k_uncertainty: FloatArray
-    """Expanded uncertainty (95 %) of k at just this u."""
-    k_point_uncertainty: FloatArray
-    """Expanded uncertainty (95 %) of k at the operating point, whose u moves with k and with what drives the
-    flow."""
+    """Expanded uncertainty (95 %) of k, whose u moves with k and with what drives the flow, likewise."""
     apparent_k: FloatArray
     """2 p/(rho u^2) - 1: the k that Eq. 18 reads off this velocity; above k where the column is separated."""
     reynolds: FloatArray
@@ -81,29 +83,17 @@ class _DragPoint:
     """False where a correlation is stretched, as in `TubeLoss`."""
 
     @classmethod
-    def of(
-        cls,
-        designs: Designs,
-        *,
-        scene: Scene,
-        law: CalibratedLaw,
-        relative_density: FloatArray | float,
-        relative_viscosity: FloatArray | float = 0.0,
-    ) -> _DragPoint:
+    def of(cls, designs: Designs, errors: Sequence[Uncertainty] = ()) -> _DragPoint:
         """Find the operating point of each design.
 
-        Args: `scene`: whose inputs are uncertain. `law`: its calibrated one, which says how surely the rest
-            is known. `relative_density`, `relative_viscosity`: expanded uncertainties (95 %) of the liquids.
+        Args: `errors`: for the half-widths.
         Returns: _DragPoint, arrays of shape (n,).
         Raises: ValueError: arcs of bends longer than the tube.
         Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the tube's crest; as `column_flow`.
         """
-        tube, varied = TubeFlow.of(designs), designs.scene
-        level = chamber_pressure(scene=varied, fill_ratio=varied.disc.max_fill_ratio / 2) * np.ones(
-            designs.size
-        )
-        ends, path = tube.ends(level, level), tube.path
-        column = tube.flow(ends, primed=True)
+        varied = designs.scene
+        tube, ends, column = _flow(designs)
+        path = tube.path
         runs = np.asarray(can_flow(path, ends, True))
         starts = np.asarray(can_flow(path, ends, False))
         u = np.where(runs, column.velocity, 1.0)
@@ -113,9 +103,12 @@ class _DragPoint:
             excess = np.log(next(both)) - np.log(next(both))
         separated = runs & (excess > 0)
         state = corrected_state(varied, u)
-        width = _width(designs, scene, state, u, relative_viscosity)
-        driven = _drive_width(law, tube, ends, separated, relative_density)
-        of_velocity, of_k = _half_widths(varied, state, u, separated, width, driven)
+        widths = np.zeros((2, designs.size))
+        if errors:
+            # One design alone would count as plain numbers.
+            rows = np.resize(np.arange(designs.size), max(designs.size, 2))
+            moved = changes_of(designs.take(rows).scene, _velocity_and_k, errors, each=rows.size)[1]
+            widths = np.sqrt(np.sum(np.nan_to_num(larger(moved)) ** 2, axis=0))[:, : designs.size]
         notes = range_notes(tube=varied.tube, state=state, velocity=u)
         outside = np.any(np.array([np.zeros(u.shape, dtype=np.bool_), *notes.values()]), axis=0)
 
@@ -128,10 +121,9 @@ class _DragPoint:
             runs=runs,
             separation_excess=kept(excess),
             velocity=kept(u),
-            velocity_uncertainty=kept(of_velocity),
+            velocity_uncertainty=kept(widths[0]),
             k=kept(state.k),
-            k_uncertainty=kept(width),
-            k_point_uncertainty=kept(of_k),
+            k_uncertainty=kept(widths[1]),
             apparent_k=kept(2 * varied.gas.pressure / (varied.liquid.density * u**2) - 1),
             reynolds=kept(state.reynolds),
             flow_state=flow_states(state),
@@ -140,8 +132,8 @@ class _DragPoint:
 
     def at(self, i: int) -> dict[str, Any]:
         """One of the points, plain values in SI."""
-        keys = {"velocity": "velocity_m_s", "k_point_uncertainty": "k_uncertainty"}
-        keys |= {name: name for name in ("velocity_uncertainty", "k", "apparent_k", "reynolds")}
+        keys = {"velocity": "velocity_m_s", "velocity_uncertainty": "velocity_uncertainty"}
+        keys |= {name: name for name in ("k", "k_uncertainty", "apparent_k", "reynolds")}
         return {
             "regime": Regime(int(self.regime[i])).label,
             "runs": bool(self.runs[i]),
@@ -155,86 +147,23 @@ class _DragPoint:
         return _DragPoint(**{name: values.reshape(shape) for name, values in vars(self).items()})
 
 
-def _width(
-    designs: Designs, scene: Scene, state: TubeState, velocity: FloatArray, viscosity: FloatArray | float
-) -> FloatArray:
-    """Half-width of k at a fixed velocity, by models and inputs."""
-    varied = designs.scene
-    squares = sum(part**2 for part in model_parts(tube=varied.tube, state=state).values())
-    among = [name for name in TUBE_INPUTS if name not in _CHARGED]
-    moved = []
-    independent = without_fitted(scene)
-    for each in uncertainties(independent, among=among, models=False):
-        name, table = each.name, UNCERTAIN_QUANTITIES[each.name]
-        values = [nominal_value(scene=side, quantity=name) for side in each.sides(independent)]
-        moved.append(
-            [replace(varied, **{table: replace(getattr(varied, table), **{name: v})}) for v in values]
-        )
-    nu = varied.liquid.kinematic_viscosity
-    factors = (np.maximum(1 - np.asarray(viscosity), 0.1), 1 + np.asarray(viscosity))
-    moved.append(
-        [replace(varied, liquid=replace(varied.liquid, kinematic_viscosity=nu * f)) for f in factors]  # type: ignore[arg-type]
-    )
-    for sides_of_one in moved:
-        changes = [corrected_state(side, velocity).k - state.k for side in sides_of_one]
-        squares = squares + np.max(np.abs(changes), axis=0) ** 2
-    return np.sqrt(np.asarray(squares, dtype=np.float64))
+def _flow(designs: Designs) -> tuple[TubeFlow, TubeEnds, ColumnFlow[FloatArray]]:
+    """Flow of primed tubes at equal fills."""
+    tube, scene = TubeFlow.of(designs), designs.scene
+    level = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2) * np.ones(designs.size)
+    ends = tube.ends(level, level)
+    return tube, ends, tube.flow(ends, primed=True)
 
 
-def _drive_width(
-    law: CalibratedLaw,
-    tube: TubeFlow,
-    ends: TubeEnds,
-    separated: BoolArray,
-    density: FloatArray | float,
-) -> FloatArray:
-    """Expanded uncertainty (95 %) of the head that drives the column, relative to it."""
-    inputs, ratio = law.inputs, np.asarray(tube.path.density) / law.density
-    gas, level = ends.upstream_gas, ends.upstream_hydrostatic
-    levels = ratio * np.sqrt(2) * float(law.hydrostatic_pressure_uncertainty(law.max_fill_ratio / 2))
-    of_gas = np.hypot(density, inputs.relative_gas_pressure) * gas
-    siphon = np.hypot(levels, of_gas) / np.maximum(np.abs(gas), 1e-100)
-    path = tube.path
-    if not path.crest:
-        return np.asarray(siphon)
-    low, high = cavity_bounds(path, ends)
-    squares = (
-        levels**2
-        + (density * (gas - path.vapour_pressure)) ** 2
-        + (inputs.relative_gas_pressure * gas) ** 2
-        + (2 * inputs.relative_speed * (level - path.column_pressure)) ** 2
-        + (ratio * inputs.hump_pressure) ** 2
-        + inputs.vapour_pressure**2
-        + (max(path.released, 1 - path.released) * (high - low)) ** 2
-    )
-    over = np.sqrt(squares) / np.maximum(crest_margins(path, ends)[0], 1e-100)
-    return np.asarray(np.where(separated, over, siphon), dtype=np.float64)
+def _velocity_and_k(designs: Designs) -> FloatArray:
+    """Velocity, m/s, and k there, NaN where nothing flows."""
+    tube, _, column = _flow(designs)
+    return np.array([column.velocity, tube.drag_coefficient(column.velocity)])
 
 
-def _half_widths(
-    varied: Scene,
-    state: TubeState,
-    velocity: FloatArray,
-    separated: BoolArray,
-    width: FloatArray,
-    driven: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Half-widths of u and of k at the operating point; k's own uncertainty moves u, and u moves k."""
-    beside_u = velocity * np.exp(_STEP)
-    beside = corrected_state(varied, beside_u)
-    siphon = 2 + np.log((beside.k + 1) / (state.k + 1)) / _STEP
-    ahead, of_head = siphon, width / (state.k + 1)
-    if varied.tube.hump_radius is not None:
-        to_crest = crest_head(scene=varied, tube=varied.tube, state=state, velocity=velocity)
-        further = crest_head(scene=varied, tube=varied.tube, state=beside, velocity=beside_u)
-        ahead = np.where(separated, np.log(further / to_crest) / _STEP, siphon)
-        upstream = state.upstream_loss(crest_span(varied.tube)[1])
-        share = np.where(state.k > 0, upstream / np.where(state.k > 0, state.k, 1.0), 1.0)
-        of_head = np.where(separated, width * share * velocity**2 / 2 / to_crest, of_head)
-    # dk/d ln u, along which every move of u takes k.
-    along = (state.k + 1) * (siphon - 2)
-    of_k = np.hypot(width - along * of_head / ahead, along * driven / ahead)
-    return velocity / ahead * np.hypot(of_head, driven), of_k
+def _errors(scene: Scene, *, over: Sequence[str] = _CHARGED) -> list[Uncertainty]:
+    """Uncertainties of a scene that act on the flow. Args: `over`: inputs that are known, axes of a map."""
+    return [each for each in of_flow(without_fitted(scene)) if each.name not in over]
 
 
 BORES: Final = (0.2e-3, 5e-3)
@@ -275,18 +204,26 @@ class DragMap:
         Raises: ValueError: arcs of bends longer than the tube.
         Range: as `tube_loss`; `point.in_range` says where a correlation is stretched.
         """
-        scene, law = calibration.scene, calibration.flow_law
+        scene = calibration.scene
         d = _axis(bore, BORES, _BORE_POINTS, scene.tube.bore)
         own = scene.liquid.kinematic_viscosity
         nu = _axis(kinematic_viscosity, _VISCOSITIES, _VISCOSITY_POINTS, own)
-        varied = {
-            "tube.bore": np.repeat(d, nu.size),
-            "liquid.kinematic_viscosity": np.tile(nu, d.size),
-        }
-        point = _DragPoint.of(
-            _designs(scene, varied), scene=scene, law=law, relative_density=law.inputs.relative_density
-        )
-        return cls(bore=d, kinematic_viscosity=nu, point=point.reshaped(d.size, nu.size))
+        nodes = [np.unique(np.linspace(0, each.size - 1, _NODES).astype(int)) for each in (d, nu)]
+
+        def points(d: FloatArray, nu: FloatArray, errors: Sequence[Uncertainty]) -> _DragPoint:
+            varied = {"tube.bore": np.repeat(d, nu.size), "liquid.kinematic_viscosity": np.tile(nu, d.size)}
+            return _DragPoint.of(_designs(scene, varied), errors).reshaped(d.size, nu.size)
+
+        coarse, point = points(d[nodes[0]], nu[nodes[1]], _errors(scene)), points(d, nu, ())
+        widths = {}
+        for name in ("velocity", "k"):
+            value, width = getattr(coarse, name), getattr(coarse, f"{name}_uncertainty")
+            share = width / np.where(value > 0, value, 1.0)
+            for axis, (every, at) in enumerate(zip((d, nu), nodes, strict=True)):
+                line = partial(np.interp, np.log(every), np.log(every[at]))
+                share = np.apply_along_axis(line, axis, share)
+            widths[f"{name}_uncertainty"] = share * getattr(point, name)
+        return cls(bore=d, kinematic_viscosity=nu, point=replace(point, **widths))
 
     def bores_for(self, k: FloatArray) -> list[float | None]:
         """For each viscosity the largest bore, m, at which a k on the map, shape (n, m), is the paper's.
@@ -354,27 +291,25 @@ def _in_tube(
     gas_pressure: FloatArray,
     bores: FloatArray | None = None,
 ) -> _DragPoint:
-    """Of liquids, shape (m,), or in a tube of each bore, shape (n, m)."""
-    scene, law = calibration.scene, calibration.flow_law
+    """Of liquids, shape (m,), or, without half-widths, in a tube of each bore, shape (n, m)."""
+    scene = calibration.scene
     times, own = (1, scene.tube.bore) if bores is None else (bores.size, bores)
     values: dict[str, Any] = {"gas.pressure": gas_pressure}
     for key in ("kinematic_viscosity", "density", "vapour_pressure"):
         values[f"liquid.{key}"] = [getattr(q, key) for q in liquids]
-    spread = np.array([(q.density_uncertainty, q.viscosity_uncertainty) for q in liquids])
-    # What the scene states is of its own liquid.
-    spread[0, 0] = law.inputs.relative_density
-    stated = [each for each in scene.uncertainty if each.quantity == "kinematic_viscosity"]
-    nu = scene.liquid.kinematic_viscosity
-    spread[0, 1] = stated[0].absolute(nu) / nu if stated else spread[0, 1]
     tiled = {path: np.tile(np.asarray(each), times) for path, each in values.items()}
-    point = _DragPoint.of(
-        _designs(scene, {"tube.bore": np.repeat(own, len(liquids)), **tiled}),
-        scene=scene,
-        law=law,
-        relative_density=np.tile(spread[:, 0], times),
-        relative_viscosity=np.tile(spread[:, 1], times),
-    )
-    return point if bores is None else point.reshaped(times, len(liquids))
+    designs = _designs(scene, {"tube.bore": np.repeat(own, len(liquids)), **tiled})
+    if bores is not None:
+        return _DragPoint.of(designs).reshaped(times, len(liquids))
+    errors = [each for each in _errors(scene, over=()) if each.name not in _OF_LIQUID]
+    stated = independent_half_widths(scene)
+    for name, spread in _OF_LIQUID.items():
+        widths = np.array([getattr(q, spread) * getattr(q, name) for q in liquids])
+        # What the scene states is of its own liquid.
+        widths[0] = stated.get(name, widths[0])
+        change: dict[str, Any] = {name: widths / NORMAL_95}
+        errors.append(replace(of_input(name, 0.0), change=change))
+    return _DragPoint.of(designs, errors)
 
 
 def read_by_eq_18(

@@ -98,9 +98,8 @@ class Block:
     variables: tuple[Variable, ...]
 
     def source(self, entries: Sequence[str] = ()) -> Source:
-        """What some functions need; default the one that a host calls. The law alone gives half-widths."""
-        without = "" if self.kind == "law" else "widths"
-        return Source.of_modules(self.modules, entries or (self.steps,), without)
+        """What some functions need; default the one that a host calls."""
+        return Source.of_modules(self.modules, entries or (self.steps,))
 
     @property
     def size(self) -> int:
@@ -129,7 +128,7 @@ def law_block(law: CompactLaw) -> Block:
         kind="law",
         title="Flow law of a liquid-ring balancer",
         scene=law.scene,
-        facts=law_facts(law),
+        facts=tabulation(law),
         constants=law.constants,
         tables=law.tables,
         start=tuple(row),
@@ -140,12 +139,8 @@ def law_block(law: CompactLaw) -> Block:
     )
 
 
-def law_facts(law: CompactLaw) -> str:
+def tabulation(law: CompactLaw) -> str:
     """What a law holds and how exact it is, in sentences."""
-    return f"{_tabulation(law)} Both are part of the uncertainty."
-
-
-def _tabulation(law: CompactLaw) -> str:
     return (
         f"Constants of {law.size} bytes; velocities {RANGE}, beyond\n"
         f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
@@ -175,7 +170,7 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
         kind="disc",
         title="Disc of a liquid-ring balancer on its rotor",
         scene=scene.file,
-        facts=_tabulation(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
+        facts=tabulation(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),
@@ -194,7 +189,7 @@ def _disc(
         raise SceneError.of_file(
             scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
         )
-    compact = compact_law(scene=scene, law=law, uncertainty=False)
+    compact = compact_law(scene=scene, law=law)
     constants = [*compact.constants, *_disc_numbers(scene, law, modelled)]
     constants[point.BLOCK] = float(len(compact.constants))
     half, fill, ambient = scene.disc.chambers // 2, scene.disc.initial_fill, scene.gas.ambient_pressure
@@ -320,7 +315,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         kind="controller",
         title="Law-based controller of a liquid-ring balancer",
         scene=scene.file,
-        facts="Settings of the scene; the vibration enters by its components.\n   " + _tabulation(compact),
+        facts="Settings of the scene; the vibration enters by its components.\n   " + tabulation(compact),
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),

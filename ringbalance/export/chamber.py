@@ -11,12 +11,11 @@ from ringbalance.reduced_model.pieces.point import (
     MOMENT_0,
     MOMENT_1,
     MOMENT_2,
+    MOMENT_WIDTH,
     RADIUS,
     SQUARE_0,
     SQUARE_1,
     SQUARE_2,
-    WIDTH,
-    WIDTH_SLOPE,
     Cells,
     Law,
     Levels,
@@ -51,14 +50,12 @@ def moment(c: Law, k: Cells, p: Pieces, fill: float) -> float:
 
 
 def moment_uncertainty(c: Law, k: Cells, p: Pieces, fill: float) -> float:
-    """Expanded uncertainty (95 %) of `moment`, kg m."""
-    x = within(c, fill)
-    row = chamber_piece(c, k, p, x)
-    return p[row][WIDTH] + (x - p[row][END]) * p[row][WIDTH_SLOPE]
+    """Expanded uncertainty (95 %) of `moment`, the largest of the fills in a piece, kg m."""
+    return p[chamber_piece(c, k, p, within(c, fill))][MOMENT_WIDTH]
 
 
 def answer_all(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     """The answer, and surface radius, m, and moment, kg m, of the driven chamber."""
-    answer(c, k, p, q, w, True)
+    answer(c, k, p, q, w)
     w[RADIUS] = surface_radius(c, k, p, w[FILL])
     w[MOMENT] = moment(c, k, p, w[FILL])

@@ -2,7 +2,7 @@
 
 Velocity over the square root of its pressure stands as polynomials of degree five along the pressure's eighth
 root, levels alike along the fill ratio, each piece as long as the tolerance allows; beside them is what
-decides on regime, status and uncertainty.
+decides on regime and status.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ringbalance.reduced_model.pieces import point
 from ringbalance.reduced_model.pieces.query import answer
 from ringbalance.reduced_model.pieces.rows import WIDTH_OF_ROW, LawRows
 from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import BACK_SHARE, LOSS, SHARE, SHARE_WIDTH, roots_of
+from ringbalance.reduced_model.tube.heads import BACK_SHARE, SHARE, roots_of
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -34,12 +34,10 @@ TOLERANCE: Final = 1e-4
 """Of a velocity against the calibrated law."""
 _OF_HEADS: Final = 0.25 * TOLERANCE
 """What of it a head takes."""
-_AT_CREST: Final = 2.0
-"""Gas that the flow carries out from over the crest makes up to the double of it."""
 _OF_LEVELS: Final = 0.2 * TOLERANCE
 """Of the head of the slowest velocity."""
 _MOST_LEVELS: Final = 16
-"""Pieces; a level that asks for more is less exact, and says so in its half-width."""
+"""Pieces; a level that asks for more is less exact, and the export says so."""
 _OF_SHARE: Final = 5e-4
 """Where a share decides whether a column separates, `point` allows for more."""
 _OF_CHAMBER: Final = 2e-6
@@ -47,11 +45,6 @@ _OF_CHAMBER: Final = 2e-6
 _EASES: Final = (1.0, 1.6, 2.5, 4.0)
 """Times the first of these errors, and its cube the second, where levels would have no room otherwise; the
 larger it is the fewer levels do, as `_MOST_LEVELS` over its square."""
-_OF_WIDTHS: Final = 0.08
-"""Of a half-width, and a tenth of that of the largest one."""
-_OF_MOMENT_WIDTH: Final = 0.1
-_ANYTHING: Final = 1e100
-"""Times the error of half-widths that nobody asks for: they are rounded to zero."""
 _OF_ROUNDING: Final = 0.2
 """Of a piece's error, to which its coefficients are rounded: numbers with few bits make small libraries."""
 _BITS: Final = 18
@@ -76,12 +69,10 @@ class Answer:
 
     velocity: float
     """m/s, positive out of the driven chamber."""
-    uncertainty: float
-    """Expanded (95 %), m/s; the error of tabulation is part of it."""
     regime: int
     """Value of `Regime`."""
     status: int
-    """0 ok, 1 extrapolated, 2 blocked, 3 undecided, 4 invalid: not a number, or no possible pressure."""
+    """0 ok, 1 extrapolated, 2 blocked, 4 invalid: not a number, or no possible pressure."""
     primed: bool
     """Whether the tube holds a continuous column afterwards."""
 
@@ -92,9 +83,9 @@ class Tables(NamedTuple):
     cells: tuple[int, ...]
     """Rows at which to begin looking, each of a byte."""
     pieces: tuple[tuple[float, ...], ...]
-    """Rows of nine numbers of single precision."""
+    """Rows of eight numbers of single precision."""
     levels: tuple[tuple[float, ...], ...]
-    """Rows of nine numbers of double precision: near a stall two levels next to cancel."""
+    """Rows of eight numbers of double precision: near a stall two levels next to cancel."""
 
     @property
     def size(self) -> int:
@@ -112,7 +103,9 @@ class CompactLaw:
     """At the places that `point` names."""
     tables: Tables
     level_error: float
-    """Largest error of a level's pressure, Pa; part of its half-width."""
+    """Largest error of a level's pressure, Pa."""
+    calibrated: CalibratedLaw
+    """The law that it tabulates, which has half-widths."""
     departure: float = 0.0
     """Largest relative difference of a velocity from the calibrated law's, in drawn conditions."""
 
@@ -141,36 +134,23 @@ class CompactLaw:
         opposite = self.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         query = [0.0] * point.PLACES_OF_QUERY
         query[:4] = fill_ratio, opposite, gas_pressure, float(primed)
-        answer(self.constants, *self.tables, query, True)
-        velocity, width, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
-        return Answer(
-            velocity=velocity,
-            uncertainty=width,
-            regime=int(regime),
-            status=int(status),
-            primed=after != 0.0,
-        )
+        answer(self.constants, *self.tables, query)
+        velocity, regime, status, after = query[point.VELOCITY : point.PRIMED_AFTER + 1]
+        return Answer(velocity=velocity, regime=int(regime), status=int(status), primed=after != 0.0)
 
 
-def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -> CompactLaw:
+def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
     """Tabulate a calibrated law again, on as few knots as `TOLERANCE` allows.
 
-    Args: `scene`: whose law it is; its chamber gives the free surface. `uncertainty`: False: for what asks
-        for velocities and moments alone; half-widths are then zero, which takes no room in a library.
-    Raises: SceneError: a scene with inputs that were fitted together, whose effect such a law does not hold.
+    Args: `scene`: whose law it is; its chamber gives the free surface.
+    Raises: SceneError: a law that takes more room than there is.
     """
-    if law.variants:
-        raise SceneError.of_file(
-            scene.file,
-            "inputs were fitted together: the compact form of its law would miss their uncertainty",
-            "a scene without [fitted]",
-        )
-    tables, slack = law.heads.tables, 1.0 if uncertainty else _ANYTHING
+    tables = law.heads.tables
     for ease in _EASES:
         rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
         for way, table in enumerate(tables):
-            _add_way(rows, law, way, table, slack, ease)
-        _add_chamber(rows, scene, law, slack, ease)
+            _add_way(rows, law, way, table, ease)
+        _add_chamber(rows, scene, law, ease)
         before, count = map(len, rows.arrays({}))
         left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
         most = left // (8 * WIDTH_OF_ROW)
@@ -179,7 +159,7 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
     else:
         problem = f"its law does not fit into the {LARGEST} bytes of its compact form"
         raise SceneError.of_file(scene.file, problem, "a tube whose loss changes less abruptly")
-    level_error = _add_levels(level_rows, law, slack, most=min(_MOST_LEVELS, most))
+    level_error = _add_levels(level_rows, law, most=min(_MOST_LEVELS, most))
     level_numbers, levels = level_rows.arrays({})
     numbers, pieces = rows.arrays(
         law.scalars()
@@ -202,6 +182,7 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, uncertainty: bool = True) -
             levels=_tuples(levels),
         ),
         level_error=level_error,
+        calibrated=law,
     )
     return replace(made, departure=_departure(made, law))
 
@@ -244,11 +225,7 @@ class _Column:
         t = (x[at] - x[last]) / (x[last] - x[first])
         exact = np.linalg.solve(np.vander(t, increasing=True), self.value[at]) / powers
         step = 2.0 ** np.floor(np.log2(_OF_ROUNDING * self.allowed[first : last + 1].min() / powers))
-        rounded = np.rint(exact / step) * step
-        if self.degree == 1 and rounded @ (x[first] - x[last]) ** np.arange(2) < 0.0:
-            # A half-width is rounded up where it would begin below zero.
-            rounded = np.array([np.ceil(exact[0] / step[0]), np.floor(exact[1] / step[1])]) * step
-        return np.pad(rounded + 0.0, (0, self.degree + 1 - at.size))
+        return np.pad(np.rint(exact / step) * step + 0.0, (0, self.degree + 1 - at.size))
 
     def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
         """Of one piece, at the samples that it spans."""
@@ -266,26 +243,20 @@ class _Column:
         return np.transpose([self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())])
 
 
-def _add_levels(rows: LawRows, law: CalibratedLaw, slack: float, *, most: int) -> float:
+def _add_levels(rows: LawRows, law: CalibratedLaw, *, most: int) -> float:
     """The hydrostatic pressure over the fill ratio. Args: `most`: pieces. Returns: its largest error, Pa."""
     x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
-    value, allowed = law.hydrostatic_pressure(x), np.full_like(x, _OF_LEVELS * slowest)
-    level = _Column(value=value, allowed=allowed)
-    width = _half_width(np.maximum(law.hydrostatic_pressure_uncertainty(x), 0.0), slack * _OF_WIDTHS)
-    while (ends := _ends(x, [level, width])).size > most + 1:
-        level, width = (replace(each, allowed=1.5 * each.allowed) for each in (level, width))
-    error = np.zeros_like(x)
-    for first, last in pairwise(ends.tolist()):
-        error[first + (first > 0) : last + 1] = np.max(np.abs(level.errors(x, first, last)))
+    level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    while (ends := _ends(x, [level])).size > most + 1:
+        level = replace(level, allowed=1.5 * level.allowed)
     rows.numbers[0][point.LEVEL_SCALE] = rows.add_cells(x[ends], cells=_LEVEL_CELLS)[0]
-    widened = replace(width, value=np.hypot(width.value, error))
-    rows.add(x[None, ends[1:]], level.pieces(x, ends), widened.pieces(x, ends))
-    return float(np.max(error))
+    rows.add(x[None, ends[1:]], level.pieces(x, ends))
+    return level.largest(x, ends)
 
 
-def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float, ease: float) -> None:
-    """Squared radius of the free surface, moment and its half-width over the fill ratio."""
+def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, ease: float) -> None:
+    """Squared radius of the free surface, and moment with its largest half-width in a piece, by the fill."""
     cells = _CELLS[0]
     x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _PER_CELL + 1))
     # The last piece holds the largest fill, whichever way that is rounded.
@@ -294,13 +265,14 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, slack: float, 
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
         allowed = np.full_like(x, ease**3 * _OF_CHAMBER * float(np.max(np.abs(value))))
         columns.append(_Column(value=value, allowed=allowed, degree=2))
-    columns.append(_half_width(np.maximum(law.moment.half_width(x), 0.0), slack * _OF_MOMENT_WIDTH))
     ends = _ends(x, columns)
+    width = np.maximum(law.moment.half_width(x), 0.0)
+    widest = [np.max(width[first : last + 1]) for first, last in pairwise(ends.tolist())]
     rows.numbers[0][[point.CHAMBER_SCALE, point.CHAMBER_CELLS]] = rows.add_cells(x[ends], cells=cells)
-    rows.add(x[None, ends[1:]], *(each.pieces(x, ends) for each in columns))
+    rows.add(x[None, ends[1:]], *(each.pieces(x, ends) for each in columns), np.array([widest]))
 
 
-def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: float, ease: float) -> None:
+def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, ease: float) -> None:
     """Velocities over the eighth root of a pressure."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
@@ -309,35 +281,21 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, slack: f
         s = np.clip(x / root, slowest, fastest)
         value = table.quintic(s) / law.density**0.5
         ratio = _Column(value=value, allowed=ease * _OF_HEADS * value)
-        squared = table.straight(s, LOSS) ** 2
-        beside = _shares(table, s, slack) if way == point.SIPHON else []
-        ends = _ends(x, [ratio, _half_width(squared, slack * _OF_WIDTHS), *beside])
-        missed = ratio.largest(x, ends, of=value)
-        if missed <= ease * _OF_HEADS:
+        beside = _shares(table, s) if way == point.SIPHON else []
+        ends = _ends(x, [ratio, *beside])
+        if ratio.largest(x, ends, of=value) <= ease * _OF_HEADS:
             break
-    # The error of tabulation is part of the half-width, whatever is known of the loss.
-    error = _AT_CREST * missed + law.heads.interpolation_error
-    exponent = 0.5 + np.gradient(np.log(value), np.log(x)) / 8
-    loss = _half_width(squared + (error / exponent) ** 2, slack * _OF_WIDTHS)
-    more = (ends.size - 1, *law.carrying_pressures(table))
-    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), loss.pieces(x, ends), more, cells=cells)
+    rows.add_ratios(way, x[ends], ratio.pieces(x, ends), law.carrying_pressures(table), cells=cells)
     if beside:
         rows.add(*(each.pieces(x, ends) for each in beside))
 
 
-def _shares(table: Table, s: FloatArray, slack: float) -> Sequence[_Column]:
-    """Part of the pressure that is lost up to the crest, there and back, and its half-width."""
+def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
+    """Part of the pressure that is lost up to the crest, there and back."""
     if table.count <= SHARE:
         return []
     ways = [table.cubic(s, at) for at in (SHARE, min(BACK_SHARE, table.count - 2))]
-    found = [_Column(value=value, allowed=_OF_SHARE * value, degree=2) for value in ways]
-    width = np.hypot(table.straight(s, SHARE_WIDTH), _OF_SHARE)
-    return [*found, _half_width(width, slack * _OF_WIDTHS)]
-
-
-def _half_width(value: FloatArray, of: float) -> _Column:
-    allowed = of * (value + 0.1 * float(np.max(value))) + 1e-300
-    return _Column(value=value, allowed=allowed, degree=1)
+    return [_Column(value=value, allowed=_OF_SHARE * value, degree=2) for value in ways]
 
 
 def _rounded(x: FloatArray) -> FloatArray:

@@ -98,7 +98,7 @@ def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
     w[UP_GAS] = c[GAS_FACTOR] * (w[at + GAS] - c[AMBIENT])
     w[DOWN_GAS] = c[GAS_FACTOR] * (w[at + GAS + 1] - c[AMBIENT])
     w[PRIMED] = w[at + IS_PRIMED]
-    if set_answer(c, k, p, w, False):
+    if set_answer(c, k, p, w):
         w[VELOCITY] = -w[VELOCITY]
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.export.blocks import law_facts
+from ringbalance.export.blocks import tabulation
 from ringbalance.export.compact import Answer, CompactLaw
 from ringbalance.export.hosts import plain_name
 from ringbalance.scene.arrays import FloatArray
@@ -35,8 +35,10 @@ def csv_files(law: CompactLaw, name: str, *, points: int, highest: float) -> dic
         for key in product(fills.tolist(), pressures.tolist(), (False, True))
     }
     lines = [*_header(law, _interpolation_errors(law, fills, pressures, rows)), ",".join(COLUMNS)]
-    for (fill, pressure, primed), found in rows.items():
-        values = (found.velocity, found.uncertainty, found.regime, found.status, int(found.primed))
+    x, p, wet = (np.array(column) for column in zip(*rows, strict=True))
+    flow = law.calibrated.evaluate(fill_ratio=x, gas_pressure=p, primed=wet)
+    for ((fill, pressure, primed), found), width in zip(rows.items(), flow.uncertainty.tolist(), strict=True):
+        values = (found.velocity, width, found.regime, found.status, int(found.primed))
         lines.append(f"{fill!r},{pressure!r},{int(primed)}," + ",".join(map(repr, values)))
     return {f"{name}.csv": "\n".join(lines) + "\n"}
 
@@ -49,10 +51,10 @@ def _header(law: CompactLaw, errors: tuple[FloatArray, float]) -> list[str]:
         f"# {line.strip()}"
         for line in (
             f"Flow law of a liquid-ring balancer, made by ringbalance from {plain_name(law.scene)}.",
-            *law_facts(law).splitlines(),
+            *tabulation(law).splitlines(),
             "units: fill ratios in 1, gauge pressures in Pa, velocities in m/s; uncertainty expanded (95 %)",
-            "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse, 4 siphon or separated",
-            "status: 0 ok, 1 extrapolated, 2 blocked, 3 undecided, 4 invalid",
+            "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse",
+            "status: 0 ok, 1 extrapolated, 2 blocked, 4 invalid",
             f"opposite fill ratio: {law.max_fill_ratio!r} less the fill ratio",
             "bilinear interpolation, looked at in the middle of cells whose corners have one regime: at most "
             f"{largest:.2g} m/s, 95 % below {most:.2g} m/s",

@@ -168,7 +168,7 @@ def falling(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float) -> fl
     w[UP_GAS] = c[GAS_FACTOR] * (c[d + SUPPLY] - c[AMBIENT])
     w[DOWN_GAS] = 0.0
     w[PRIMED] = w[r + FLOW_PRIMED]
-    back = set_answer(c, k, p, w, False)
+    back = set_answer(c, k, p, w)
     keep_primed(w, r + FLOW_PRIMED)
     if back:
         return -c[d + PER_SECOND] * w[VELOCITY]

@@ -16,7 +16,7 @@ from typing import Final
 NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
 LAW, CELLS, PIECES, LEVELS, QUERY = "Law", "Cells", "Pieces", "Levels", "Query"
 """Types of the subset; all but the last are only read, cells are bytes, pieces of single precision."""
-PER_PIECE: Final = 9  # numbers in a row of `Pieces` or `Levels`
+PER_PIECE: Final = 8  # numbers in a row of `Pieces` or `Levels`
 _BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
 _NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
 
@@ -50,13 +50,12 @@ class Source:
     functions: Mapping[str, Function]
 
     @classmethod
-    def of_modules(cls, modules: Sequence[ModuleType], entries: Sequence[str], without: str = "") -> Source:
+    def of_modules(cls, modules: Sequence[ModuleType], entries: Sequence[str]) -> Source:
         """What some functions need of modules that import each other's names, a later one's before.
 
-        Args: `without`: as in `of_text`.
         Raises: ValueError: something in it that is not of the subset, or a constant of two values.
         """
-        whole = [cls.of_text(inspect.getsource(each), without) for each in modules]
+        whole = [cls.of_text(inspect.getsource(each)) for each in modules]
         functions = {name: each for source in whole for name, each in source.functions.items()}
         needed, todo = set(entries), list(entries)
         while todo:
@@ -78,13 +77,12 @@ class Source:
         )
 
     @classmethod
-    def of_text(cls, text: str, without: str = "") -> Source:
+    def of_text(cls, text: str) -> Source:
         """Read the source of a module.
 
-        Args: `without`: a parameter, the last of each function that has it, that is false in every call.
         Raises: ValueError: something in it that is not of the subset.
         """
-        tree = _Without(without).visit(ast.parse(text))
+        tree = ast.parse(text)
         constants = {
             name.id: ast.literal_eval(value)
             for node in tree.body
@@ -93,31 +91,6 @@ class Source:
         }
         functions = [_function(node) for node in tree.body if isinstance(node, ast.FunctionDef)]
         return cls(constants=constants, functions={each.name: each for each in functions})
-
-
-class _Without(ast.NodeTransformer):
-    """Takes out a parameter that is false, with what is done only where it is true."""
-
-    def __init__(self, parameter: str) -> None:
-        self.parameter = parameter
-
-    def visit_arguments(self, node: ast.arguments) -> ast.arguments:
-        node.args = [each for each in node.args if each.arg != self.parameter]
-        return node
-
-    def visit_If(self, node: ast.If) -> ast.If | list[ast.stmt]:
-        self.generic_visit(node)
-        return node.orelse if self._is_false(node.test) else node
-
-    def visit_Call(self, node: ast.Call) -> ast.Call:
-        self.generic_visit(node)
-        node.args = [each for each in node.args if not self._is_false(each)]
-        return node
-
-    def _is_false(self, node: ast.expr) -> bool:
-        if isinstance(node, ast.Name):
-            return node.id == self.parameter
-        return bool(self.parameter) and isinstance(node, ast.Constant) and node.value is False
 
 
 def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:

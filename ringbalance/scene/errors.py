@@ -203,6 +203,12 @@ def uncertainties(
     return (*found, *model_uncertainties(scene), of_chamber(WAVES), of_chamber(MOMENT)) if models else found
 
 
+def of_flow(scene: Scene) -> tuple[Uncertainty, ...]:
+    """Those of `uncertainties` that may move the flow in the tube by a change of the scene."""
+    among = [name for name, table in UNCERTAIN_QUANTITIES.items() if table != "rotor" or name == "speed"]
+    return tuple(each for each in uncertainties(scene, among=among) if each.change)
+
+
 def of_input(name: str, width: float) -> Uncertainty:
     """A quantity of the scene with its half-width (95 %), SI."""
     table = UNCERTAIN_QUANTITIES[name]

@@ -28,11 +28,11 @@ int fmi2GetStatus(void *, int, int *);
 
 #define CHECK(holds) if (!(holds)) { printf("line %d: %s\n", __LINE__, #holds); return 1; }
 
-static const unsigned inputs[] = {0, 1, 2}, outputs[] = {3, 4}, codes[] = {7, 8}, primed[] = {9}, after[] = {10};
+static const unsigned inputs[] = {0, 1, 2}, outputs[] = {3}, codes[] = {6, 7}, primed[] = {8}, after[] = {9};
 
 static int misuse(const char *guid)
 {
-    const unsigned wrong[] = {11}, output[] = {3}, fill[] = {0};
+    const unsigned wrong[] = {10}, output[] = {3}, fill[] = {0};
     const double bad = NAN, other = 0.123;
     double value = 0.0;
     int code[2], on = 1;
@@ -69,7 +69,7 @@ static int misuse(const char *guid)
 
 int main(int count, char **arguments)
 {
-    double x[3], y[2];
+    double x[3], y[1];
     int flag, code[2];
     void *unit;
     if (count != 2 || misuse(arguments[1])) {
@@ -80,9 +80,9 @@ int main(int count, char **arguments)
     CHECK(!fmi2ExitInitializationMode(unit))
     while (scanf("%lf,%lf,%lf,%d", x, x + 1, x + 2, &flag) == 4) {
         CHECK(!fmi2SetReal(unit, inputs, 3, x) && !fmi2SetBoolean(unit, primed, 1, &flag))
-        CHECK(!fmi2DoStep(unit, 0.0, 0.1, 0) && !fmi2GetReal(unit, outputs, 2, y))
+        CHECK(!fmi2DoStep(unit, 0.0, 0.1, 0) && !fmi2GetReal(unit, outputs, 1, y))
         CHECK(!fmi2GetInteger(unit, codes, 2, code) && !fmi2GetBoolean(unit, after, 1, &flag))
-        printf("%.17g,%.17g,%d,%d,%d\n", y[0], y[1], code[0], code[1], flag);
+        printf("%.17g,%d,%d,%d\n", y[0], code[0], code[1], flag);
     }
     CHECK(!fmi2Terminate(unit))
     fmi2FreeInstance(unit);

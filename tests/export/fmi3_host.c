@@ -29,11 +29,11 @@ int fmi3DoStep(void *, double, double, bool, bool *, bool *, bool *, double *);
 
 #define CHECK(holds) if (!(holds)) { printf("line %d: %s\n", __LINE__, #holds); return 1; }
 
-static const unsigned inputs[] = {0, 1, 2}, outputs[] = {3, 4}, codes[] = {7, 8}, primed[] = {9}, after[] = {10};
+static const unsigned inputs[] = {0, 1, 2}, outputs[] = {3}, codes[] = {6, 7}, primed[] = {8}, after[] = {9};
 
 static int misuse(const char *guid)
 {
-    const unsigned wrong[] = {12}, output[] = {3}, fill[] = {0};
+    const unsigned wrong[] = {11}, output[] = {3}, fill[] = {0};
     const double bad = NAN, other = 0.123;
     double value = 0.0;
     int32_t code[2];
@@ -72,7 +72,7 @@ static int misuse(const char *guid)
 
 int main(int count, char **arguments)
 {
-    double x[3], y[2];
+    double x[3], y[1];
     int flag;
     int32_t code[2];
     bool on, event, ended, early;
@@ -87,9 +87,9 @@ int main(int count, char **arguments)
     while (scanf("%lf,%lf,%lf,%d", x, x + 1, x + 2, &flag) == 4) {
         on = flag != 0;
         CHECK(!fmi3SetFloat64(unit, inputs, 3, x, 3) && !fmi3SetBoolean(unit, primed, 1, &on, 1))
-        CHECK(!fmi3DoStep(unit, 0.0, 0.1, 0, &event, &ended, &early, &last) && !fmi3GetFloat64(unit, outputs, 2, y, 2))
+        CHECK(!fmi3DoStep(unit, 0.0, 0.1, 0, &event, &ended, &early, &last) && !fmi3GetFloat64(unit, outputs, 1, y, 1))
         CHECK(!fmi3GetInt32(unit, codes, 2, code, 2) && !fmi3GetBoolean(unit, after, 1, &on, 1))
-        printf("%.17g,%.17g,%d,%d,%d\n", y[0], y[1], code[0], code[1], on);
+        printf("%.17g,%d,%d,%d\n", y[0], code[0], code[1], on);
     }
     CHECK(!fmi3Terminate(unit))
     fmi3FreeInstance(unit);

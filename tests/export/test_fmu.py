@@ -96,8 +96,8 @@ def test_an_importer_in_c_has_the_bits_of_python(
     asked = asked[:, np.isfinite(asked).all(axis=0)]
     found = ran(tmp_path / "host", compact, asked)
     right = np.array(list(answers(compact, asked)))
-    assert found[:, :2].tobytes() == np.ascontiguousarray(right[:, :2]).tobytes()
-    assert np.array_equal(found[:, 2:], right[:, 2:])
+    assert found[:, 0].tobytes() == np.ascontiguousarray(right[:, 0]).tobytes()
+    assert np.array_equal(found[:, 1:], right[:, 1:])
 
 
 def ran(host: Path, law: CompactLaw, asked: FloatArray) -> FloatArray:

@@ -61,17 +61,6 @@ def test_a_name_with_two_meanings_is_refused(tmp_path: Path) -> None:
     assert Source.of_modules(modules, ["f"]).constants == {"N": 1}
 
 
-def test_a_parameter_that_is_false_goes_with_what_it_guards() -> None:
-    text = (
-        "def g(a: float, on: bool) -> float:\n    if on:\n        return -a\n    return a\n\n\n"
-        "def f(a: float) -> float:\n    if a > 0.5:\n        return g(a, False)\n    return a\n"
-    )
-    without = c_functions(Source.of_text(text, "on"))
-    assert "static double g(double a)\n{\n    return a;\n}" in without
-    assert "return g(a);" in without
-    assert "if (on) {" in c_functions(Source.of_text(text))
-
-
 def test_numbers_of_c_are_exact_and_the_shorter_of_two() -> None:
     assert [exact_text(x) for x in (0.25, 1e-100, -0.0, 2.0**-20)] == ["0.25", "1.0e-100", "-0.0", "0x1p-20"]
     drawn = np.random.default_rng(1).normal(size=200) * 10.0 ** np.arange(-100, 100)

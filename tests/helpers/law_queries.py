@@ -36,8 +36,8 @@ def queries(law: CalibratedLaw, count: int, *, seed: int = 1, outside: bool = Fa
 
 
 def answers(law: CompactLaw, asked: FloatArray) -> Iterator[list[float]]:
-    """Velocity, half-width, regime, status and primed of each query, by the program's own evaluator."""
+    """Velocity, regime, status and primed of each query, by the program's own evaluator."""
     for query in asked.T.tolist():
         w = query + [0.0] * (point.PLACES_OF_QUERY - 4)
-        answer(law.constants, *law.tables, w, True)
+        answer(law.constants, *law.tables, w)
         yield w[point.VELOCITY : point.PRIMED_AFTER + 1]

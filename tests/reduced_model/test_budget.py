@@ -20,6 +20,7 @@ from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import ANSWERED, FIELDS
 from ringbalance.reduced_model.core import Answers
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.path import crest_head
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
@@ -281,6 +282,5 @@ def test_a_blocked_tube_has_the_margin_of_a_primed_one_and_no_crest_pressure(tab
     told = calibrate(blocked).quantities
     assert told["velocity"].value == 0
     assert {"crest_pressure", "drag_coefficient"}.isdisjoint(told)
-    law = calibrate(blocked).flow_law
-    margin = law.cavity_margin(fills=(0.25, 0.25), gas_pressure=0.1e6, reverse=False)[0]
-    assert told["cavitation_margin"].value == pytest.approx(margin, rel=1e-6)
+    profile = HumpProfile.of(scene=blocked, law=calibrate(blocked).flow_law, fill_ratio=0.25)
+    assert told["cavitation_margin"].value == pytest.approx(profile.cavitation_margin, rel=1e-6)

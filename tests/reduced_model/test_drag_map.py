@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -12,11 +13,13 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.making import side_laws
+from ringbalance.reduced_model.law.sides import half_widths_of
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reports.pages.drag_map import DragMap, _velocity_paper, liquids_in_tube
+from ringbalance.scene.fitted import CLEARING_ERROR, MODEL
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import Scene
-from ringbalance.scene.origins import InputUncertainty
 
 POINTS = [(0.3e-3, 1e-6), (0.9e-3, 3e-7), (1.5e-3, 5e-5), (2.4e-3, 6e-6), (4.1e-3, 2.2e-4)]
 
@@ -38,6 +41,12 @@ def moved(scene: Scene, bore: float, viscosity: float) -> Scene:
     return replace(scene, tube=replace(scene.tube, bore=bore), liquid=liquid)
 
 
+def of_primed_tube(scene: Scene) -> float:
+    """Half-width of the velocity at equal fills by all but the waves of the chambers, the last two laws."""
+    point = map(np.array, (0.25, 0.25, scene.gas.pressure, True))
+    return float(half_widths_of(side_laws(scene)[:-2], *point)[0])
+
+
 @pytest.mark.parametrize(("bore", "viscosity"), POINTS)
 def test_a_point_is_what_law_and_tube_loss_say(
     calibration: Calibration, bore: float, viscosity: float
@@ -53,9 +62,11 @@ def test_a_point_is_what_law_and_tube_loss_say(
     # The law interpolates its heads, too.
     assert found.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-7)
     assert found.k[0, 0] == pytest.approx(float(loss.k.value), rel=1e-7)
-    assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-6)
-    # The law interpolates its half-widths between 257 velocities.
-    assert found.velocity_uncertainty[0, 0] == pytest.approx(float(flow.uncertainty), rel=3e-2)
+    assert found.velocity_uncertainty[0, 0] == pytest.approx(of_primed_tube(scene), rel=1e-3)
+    causes = calibrate(scene).quantities["drag_coefficient"].causes
+    if f"{MODEL}{CLEARING_ERROR}" not in causes:
+        # Else gas lies over the crest of the tube that is not primed, of which the calibration tells.
+        assert found.k_uncertainty[0, 0] == pytest.approx(math.hypot(*causes.values()), rel=1e-3)
     assert found.in_range[0, 0] == loss.in_range
     assert found.flow_state[0, 0] == loss.flow_state
 
@@ -70,21 +81,6 @@ def test_a_point_holds_the_gas_column_as_the_law_does(calibration: Calibration) 
         fill_ratio=0.25, opposite_fill_ratio=0.25, gas_pressure=scene.gas.pressure, primed=True
     )
     assert point.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
-
-
-def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration) -> None:
-    stated = tuple(
-        InputUncertainty(quantity=name, half_width=0.05, relative=True)
-        for name in ("length", "speed", "roughness", "bore")
-    )
-    scene = replace(calibration.scene, uncertainty=stated)
-    found = DragMap.of(
-        calibration=with_scene(calibration, scene), bore=[1.2e-3], kinematic_viscosity=[2e-6]
-    ).point
-    # The bore is a coordinate of the map.
-    at = replace(moved(scene, 1.2e-3, 2e-6), uncertainty=stated[:3])
-    loss = tube_loss(at, found.velocity[0, 0])
-    assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-9)
 
 
 def test_the_contour_is_really_at_fifty(calibration: Calibration) -> None:
@@ -121,26 +117,6 @@ def test_separated_columns_look_like_more_drag(calibration: Calibration) -> None
     np.testing.assert_allclose(point.apparent_k[~separated], point.k[~separated], rtol=1e-7)
 
 
-@pytest.mark.parametrize(("bore", "viscosity"), [(1.5e-3, 5e-5), (0.4e-3, 4e-6)])
-def test_a_wrong_loss_moves_the_operating_point_as_the_half_width_says(
-    calibration: Calibration, bore: float, viscosity: float
-) -> None:
-    # A loss that is too small by 0.01 throughout shifts k by less or more than that, since u moves, too.
-    def at(extra: float) -> tuple[float, float, float]:
-        tube = replace(calibration.scene.tube, extra_loss=extra)
-        calm = replace(calibration.scene, tube=tube)
-        law = replace(calibration.flow_law, inputs=replace(calibration.flow_law.inputs, relative_density=0.0))
-        point = DragMap.of(
-            calibration=replace(calibration, scene=calm, flow_law=law),
-            bore=[bore],
-            kinematic_viscosity=[viscosity],
-        ).point
-        return tuple(float(v[0, 0]) for v in (point.k, point.k_uncertainty, point.k_point_uncertainty))  # type: ignore[return-value]
-
-    low, high, middle = at(0.99), at(1.01), at(1.0)
-    assert (high[0] - low[0]) / 0.02 == pytest.approx(middle[2] / middle[1], rel=1e-3)
-
-
 def test_without_a_hump_every_point_is_a_siphon(calibration: Calibration) -> None:
     scene = calibration.scene
     straight = calibrate(replace(scene, tube=replace(scene.tube, hump_radius=None)))
@@ -167,11 +143,10 @@ def test_the_scenes_liquid_comes_first_and_agrees_with_the_calibration(
     calibration: Calibration, liquids: dict[str, dict[str, Any]]
 ) -> None:
     answers, first = calibration.answers, next(iter(liquids.values()))
-    flow = calibration.flow_law.evaluate(fill_ratio=0.25, gas_pressure=calibration.scene.gas.pressure)
     assert first["name"] == calibration.scene.liquid.name
     assert first["velocity_m_s"] == pytest.approx(answers.velocity, rel=1e-8)
     assert first["k"] == pytest.approx(answers.drag_coefficient, rel=1e-8)
-    assert first["velocity_uncertainty"] == pytest.approx(flow.uncertainty, rel=1e-4)
+    assert first["velocity_uncertainty"] == pytest.approx(of_primed_tube(calibration.scene), rel=1e-3)
 
 
 def test_a_dense_liquid_starts_at_just_its_starting_pressure(

@@ -95,4 +95,4 @@ def test_the_error_of_tables_is_part_of_the_uncertainty(law: CalibratedLaw) -> N
 def test_its_file_is_small(law: CalibratedLaw, tmp_path: Path) -> None:
     path = law.save(tmp_path / "law.json")
     assert path.stat().st_size < 150_000
-    assert json.loads(path.read_text())["version"] == 4
+    assert json.loads(path.read_text())["version"] == 5

@@ -63,6 +63,6 @@ def test_bends_that_are_nearly_the_whole_tube_are_refused_by_their_key(paper_sce
         rotor=replace(paper_scene.rotor, speed=1446.0),
     )
     varied = replace(scene, rotor=replace(scene.rotor, speed=1440.0))
-    for heads in (lambda: TubeHeads.bare(scene), lambda: TubeHeads.nominal(Designs.stacked([scene, varied]))):
+    for heads in (lambda: TubeHeads.of(scene), lambda: TubeHeads.nominal(Designs.stacked([scene, varied]))):
         with pytest.raises(SceneError, match=r"\[tube\] bends: .* does not grow with the velocity"):
             heads()

@@ -88,7 +88,7 @@ def test_a_velocity_loses_the_head_that_drives_it(u: list[float]) -> None:
     ]
     table = Table(knots=s, columns=np.concatenate(columns))
     rows = LawRows.of(1)
-    rows.add_way(SIPHON, table, 1000.0, error=0.0, more=())
+    rows.add_way(SIPHON, table, 1000.0, more=())
     whole = rows.arrays({})
     numbers, pieces = (each.tolist() for each in whole)
     cells, near_roots = [0.0] * ROOT_PLACES, np.zeros((len(pieces), WIDTH_OF_ROOT)).tolist()

@@ -1,0 +1,91 @@
+"""Half-widths of a law's file of version 4, which stood beside its numbers: as a table of version 5."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.half_widths import HalfWidths
+from ringbalance.reduced_model.law.sides import half_width_table
+from ringbalance.reduced_model.pieces.table import Table
+from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, TubePath
+from ringbalance.scene.arrays import FloatArray
+
+_HEADS: Final = ("siphon", "hump", "return_hump")
+_LEAST: Final = 0.1
+"""Of a head, that an error leaves of it at least."""
+
+
+def split(document: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The document of a calibrated law as version 5 has it, and what it held of half-widths.
+
+    Raises: KeyError, TypeError, ValueError: a document that is no such law.
+    """
+    law = {key: value for key, value in document.items() if key not in ("inputs", "variants")}
+    inputs = {name: float(width) for name, width in document["inputs"].items() if name != "type"}
+    held: dict[str, Any] = {**inputs, "variants": document.get("variants", [])}
+    law["path"] = dict(law["path"])
+    for name in ("cavity_fitted", "clearing_fitted"):
+        held[name] = bool(law["path"].pop(name, False))
+    law["levels"], held["levels"] = _without(law["levels"], slice(3, 4))
+    law["heads"] = dict(law["heads"])
+    for name in _HEADS:
+        if (table := law["heads"].get(name)) is not None:
+            # Behind the loss's half-width stood that of the share, in the whole tube's table.
+            law["heads"][name], held[name] = _without(table, slice(3, 5))
+    return law, held
+
+
+def _without(table: Mapping[str, Any], numbers: slice) -> tuple[dict[str, Any], FloatArray]:
+    """A table without some columns, and the first of these."""
+    columns = np.reshape(np.array(table["columns"], dtype=np.float64), (-1, len(table["knots"])))
+    return {**table, "columns": np.delete(columns, numbers, axis=0).ravel().tolist()}, columns[numbers][0]
+
+
+def half_widths(law: CalibratedLaw, held: Mapping[str, Any], variants: Sequence[CalibratedLaw]) -> HalfWidths:
+    """The table, by laws at both sides of all that the file held."""
+    sides = [replace(law, path=path) for path in _paths(law.path, held)]
+    levels, scaled = law.levels, {"density": held["relative_density"], "speed": 2 * held["relative_speed"]}
+    moved = (levels.with_column(0, levels.column(0) + sign * held["levels"]) for sign in (-1, 1))
+    sides += [replace(law, levels=each) for each in moved]
+    for name, size in scaled.items():
+        for factor in (1 - size, 1 + size):
+            path = replace(
+                law.path,
+                density=law.density * (factor if name == "density" else 1.0),
+                port_pressure=law.path.port_pressure * factor,
+                hump_pressure=law.path.column_pressure * factor if law.path.crest else None,
+            )
+            sides.append(replace(law, path=path, levels=replace(levels, columns=levels.columns * factor)))
+    factors = (1 + sign * held["relative_gas_pressure"] for sign in (-1, 1))
+    sides += [replace(law, gas_factor=law.gas_factor * factor) for factor in factors]
+    ways = {name: way for name in _HEADS if (way := getattr(law.heads, name)) is not None}
+    for sign in (-1, 1):
+        lost: dict[str, Any] = {name: _lost(way, 1 + sign * held[name]) for name, way in ways.items()}
+        sides.append(replace(law, heads=replace(law.heads, **lost)))
+    return half_width_table([law, *sides, *variants], gas_pressure=0.0)
+
+
+def _paths(path: TubePath, held: Mapping[str, Any]) -> Iterator[TubePath]:
+    """Both sides of what acts at the crest alone."""
+    if not path.crest:
+        return
+    for name in ("hump_pressure", "vapour_pressure"):
+        yield from (replace(path, **{name: getattr(path, name) + sign * held[name]}) for sign in (-1, 1))
+    if path.released and not held["cavity_fitted"]:
+        yield from (replace(path, released=end) for end in (0.0, 1.0))
+    if path.froude_velocity and not held["clearing_fitted"]:
+        factors = (1 - CLEARING_UNCERTAINTY, 1 + CLEARING_UNCERTAINTY)
+        yield from (replace(path, froude_velocity=path.froude_velocity * factor) for factor in factors)
+
+
+def _lost(way: Table, factor: FloatArray) -> Table:
+    """A table of heads times a factor at each knot."""
+    root = np.maximum(factor, _LEAST) ** 0.125
+    powers = [4, 5, 6, *(number % 2 for number in range(way.count - 3))]
+    columns = [way.column(number) / root**power for number, power in enumerate(powers)]
+    return Table(knots=way.knots * root, columns=np.concatenate(columns))

@@ -52,7 +52,7 @@ def calibration_rows(calibration: Calibration) -> Rows:
             _chamber_table(calibration),
             _tube_table(calibration),
             _law_table(calibration),
-            models_table(calibration.models_used),
+            models_table(calibration.models_used, tolerance=scene.tolerance),
         ),
     )
 

@@ -165,7 +165,7 @@ def simulation_rows(simulation: Simulation) -> Rows:
         tables=(
             _injection_table(simulation.injections),
             _conventions_table(simulation),
-            models_table(simulation.models_used),
+            models_table(simulation.models_used, tolerance=simulation.tolerance),
         ),
     )
 

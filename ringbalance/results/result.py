@@ -88,11 +88,16 @@ class _TermUsed(Protocol):
         """Relative to the result; None: unknown."""
 
 
-def models_table(models_used: Iterable[_TermUsed]) -> Table:
-    """The physical terms of an answer with their models."""
+_LEAST_SHOWN: Final = 0.1
+"""Contribution of a term over the tolerance below which it leaves the printed table."""
+
+
+def models_table(models_used: Iterable[_TermUsed], *, tolerance: float) -> Table:
+    """Physical terms of an answer with their models, without those far below the tolerance."""
     rows = [
         (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)
         for each in models_used
+        if each.estimated_contribution is None or each.estimated_contribution >= _LEAST_SHOWN * tolerance
     ]
     return Table(caption="Models used", heads=("term", "model", "contribution", "why"), rows=rows)
 

@@ -10,8 +10,10 @@ import pytest
 from quantities import by_key
 
 from ringbalance.reduced_model.law.files import load_law
+from ringbalance.reduced_model.terms import models_used
+from ringbalance.results.result import models_table
 from ringbalance.running import run_command
-from ringbalance.scene import SceneError, bundled_scene
+from ringbalance.scene import Scene, SceneError, bundled_scene
 
 
 def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -62,3 +64,16 @@ def test_no_interval_is_finer_than_inputs_that_nobody_stated(
 def test_a_missing_scene_is_a_fault_not_a_traceback(tmp_path: Path) -> None:
     with pytest.raises(SceneError):
         run_command("calibrate", scene=tmp_path / "none.toml")
+
+
+def test_terms_far_below_the_tolerance_leave_the_printed_table(paper_scene: Scene) -> None:
+    used = models_used(paper_scene)
+    whole, printed = (
+        [term for term, *_ in models_table(used, tolerance=tolerance).rows] for tolerance in (0.0, 0.01)
+    )
+    assert whole == [each.term for each in used]
+    assert [term for term in whole if term not in printed] == [
+        each.term for each in used if (each.estimated_contribution or 1.0) < 0.001
+    ]
+    assert "surface tension" not in printed
+    assert "gas filling" in printed

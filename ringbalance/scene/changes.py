@@ -129,7 +129,15 @@ def checked_scene(scene: SceneFile) -> AnyScene:
     if not isinstance(scene, SceneFile):
         what = type(scene).__name__
         raise TypeError(f"a scene is needed, such as ringbalance.load_scene(path), and not {what}")
-    faults = [_unchecked(scene, path, value) for path, value in _changed_values(scene)]
+    faults = []
+    for path, value in _changed_values(scene):
+        table, _, key = path.rpartition(".")
+        plain = value is None or isinstance(value, str | float | int)
+        problem = "the record was changed, so nothing has checked it and its hash is that of another scene"
+        allowed = f'scene.with_values({{"{path}": ...}}), which checks as a file is checked'
+        shown = toml_text(value if plain else str(value))
+        fault = Fault(file=scene.file, table=table, key=key, value=shown, problem=problem, allowed=allowed)
+        faults.append(fault)
     if faults:
         raise SceneError(faults)
     return scene
@@ -160,18 +168,6 @@ def _known(scene: SceneFile) -> CheckedValues:
     return scene.checked
 
 
-def _unchecked(scene: SceneFile, path: str, value: object) -> Fault:
-    table, _, key = path.rpartition(".")
-    return Fault(
-        file=scene.file,
-        table=table,
-        key=key,
-        value=toml_text(value if isinstance(value, str | float | int) or value is None else str(value)),
-        problem="the record was changed, so nothing has checked it and its hash is that of another scene",
-        allowed=f'scene.with_values({{"{path}": ...}}), which checks as a file is checked',
-    )
-
-
 def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
     """Path and value of each key whose value is not the one that was checked."""
     for name, before in _known(scene).parts.items():
@@ -181,15 +177,13 @@ def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
         if is_dataclass(now) and type(now) is type(before):
             for field in fields(now):
                 path, value = f"{name}.{field.name}", getattr(now, field.name)
-                if not _same(value, getattr(before, field.name)):
+                # Two meshes are equal when they name the same file, whatever their nodes are.
+                comparable = not isinstance(value, ChamberGeometry)
+                checked = getattr(before, field.name)
+                if value is not checked and not (comparable and value == checked):
                     yield KEY_OF_FIELD.get(path, path), value
         elif now != before:
             yield KEY_OF_FIELD.get(name, name), now
-
-
-def _same(now: object, before: object) -> bool:
-    # Two meshes are equal when they name the same file, whatever their nodes are.
-    return now is before or (not isinstance(now, ChamberGeometry) and now == before)
 
 
 def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema, origin: Origin) -> None:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from types import MappingProxyType
@@ -113,7 +113,22 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
     if not liquid.holds(temperature):
         shown = f"{temperature - _ZERO_CELSIUS:.6g} degC"
         raise FieldError(f"there are no data for {liquid.name} at {shown}", f"{liquid.name} at {liquid.held}")
-    density, viscosity, vapour_pressure = _properties(liquid, temperature)
+    low, high = liquid.temperatures[0], liquid.temperatures[-1]
+    inside = min(max(temperature, low), high)
+    if liquid.name == _WATER:
+        density, viscosity, vapour_pressure = _water_properties(temperature=inside)
+    else:
+        rows = _library()[liquid.name][1]
+        upper = int(np.searchsorted(rows[:, 0], inside))
+        last, density, viscosity, vapour_pressure = rows[upper].tolist()
+        if last != inside:
+            first, lower_density, lower_viscosity, lower_vapour = rows[upper - 1].tolist()
+            share = (inside - first) / (last - first)
+            # Linear in 1/T rather than in T: the same share, weighted with the upper temperature over T.
+            inverse_share = share * last / inside
+            density = lower_density + share * (density - lower_density)
+            viscosity = lower_viscosity * math.exp(inverse_share * math.log(viscosity / lower_viscosity))
+            vapour_pressure = lower_vapour + share * (vapour_pressure - lower_vapour)
     return Liquid(
         name=liquid.name,
         temperature=temperature,
@@ -135,31 +150,6 @@ def liquids_at_room_temperature() -> tuple[Liquid, ...]:
     )
 
 
-def _properties(liquid: KnownLiquid, temperature: float) -> tuple[float, float, float]:
-    low, high = liquid.temperatures[0], liquid.temperatures[-1]
-    inside = min(max(temperature, low), high)
-    if liquid.name == _WATER:
-        return _water_properties(temperature=inside)
-    return _interpolated(_library()[liquid.name][1], inside)
-
-
-def _interpolated(rows: FloatArray, temperature: float) -> tuple[float, float, float]:
-    """Args: `rows`: temperature, density, kinematic viscosity and vapour pressure, shape (n, 4), rising."""
-    upper = int(np.searchsorted(rows[:, 0], temperature))
-    last, density, viscosity, vapour = rows[upper].tolist()
-    if last == temperature:
-        return density, viscosity, vapour
-    first, *lower = rows[upper - 1].tolist()
-    share = (temperature - first) / (last - first)
-    # Linear in 1/T rather than in T: the same share, weighted with the upper temperature over T.
-    inverse_share = share * last / temperature
-    return (
-        lower[0] + share * (density - lower[0]),
-        lower[1] * math.exp(inverse_share * math.log(viscosity / lower[1])),
-        lower[2] + share * (vapour - lower[2]),
-    )
-
-
 def _names(liquid: KnownLiquid) -> tuple[str, ...]:
     return (liquid.name, *liquid.aliases)
 
@@ -170,29 +160,26 @@ def _plain(name: str) -> str:
 
 @cache
 def _library() -> Mapping[str, tuple[KnownLiquid, FloatArray]]:
+    """Liquids by name, with rows of temperature, density, kinematic viscosity and vapour pressure, SI."""
     table = packaged_rows("ringbalance.scene", "data", "fluid_properties.csv")
-    entries = (
-        _entry(key, [line for line in table if line["fluid"] == key])
-        for key in dict.fromkeys(line["fluid"] for line in table)
-    )
-    return MappingProxyType({liquid.name: (liquid, rows) for liquid, rows in entries})
-
-
-def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, FloatArray]:
-    ordered = sorted(lines, key=lambda line: float(line["T_C"]))
-    rows = np.array([[float(line[column]) for column in _COLUMNS] for line in ordered])
-    rows[:, 0] += _ZERO_CELSIUS
-    name, aliases = _ALIASES[key]
-    source = f"{ordered[0]['source']}; {ordered[0]['status']}"
-    liquid = KnownLiquid(
-        name=name,
-        aliases=aliases if key == name else (*aliases, key),
-        temperatures=(COLDEST, HOTTEST) if name == _WATER else tuple(rows[:, 0].tolist()),
-        density_uncertainty=max(float(line["u95_rho_percent"]) for line in ordered) / 100,
-        viscosity_uncertainty=max(float(line["u95_nu_percent"]) for line in ordered) / 100,
-        source=source,
-    )
-    return liquid, rows
+    library = {}
+    for key in dict.fromkeys(line["fluid"] for line in table):
+        ordered = sorted(
+            (line for line in table if line["fluid"] == key), key=lambda line: float(line["T_C"])
+        )
+        rows = np.array([[float(line[column]) for column in _COLUMNS] for line in ordered])
+        rows[:, 0] += _ZERO_CELSIUS
+        name, aliases = _ALIASES[key]
+        liquid = KnownLiquid(
+            name=name,
+            aliases=aliases if key == name else (*aliases, key),
+            temperatures=(COLDEST, HOTTEST) if name == _WATER else tuple(rows[:, 0].tolist()),
+            density_uncertainty=max(float(line["u95_rho_percent"]) for line in ordered) / 100,
+            viscosity_uncertainty=max(float(line["u95_nu_percent"]) for line in ordered) / 100,
+            source=f"{ordered[0]['source']}; {ordered[0]['status']}",
+        )
+        library[name] = liquid, rows
+    return MappingProxyType(library)
 
 
 @lru_cache(maxsize=256)
@@ -222,7 +209,13 @@ def with_liquid(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]
         return reading, ()
     liquid = _find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None
     faults = _faults(reading, liquid)
-    looked_up = None if faults or liquid is None else _looked_up(reading, liquid)
+    looked_up = None
+    if liquid is not None and not faults:
+        temperature = reading.values.get("liquid.temperature")
+        if temperature is None and len(liquid.temperatures) == 1 and reading.lacks("liquid.temperature"):
+            temperature = liquid.temperatures[0]
+        if temperature is not None and liquid.holds(temperature):
+            looked_up = liquid_at(name=liquid.name, temperature=temperature)
     return reading.adding(_liquid_values(reading, looked_up)), faults
 
 
@@ -262,15 +255,6 @@ def _temperature_faults(reading: SceneReading, liquid: KnownLiquid) -> tuple[Fau
     return (reading.fault(path, problem=problem, allowed=f"{held}; or {_OUTRIGHT}"),)
 
 
-def _looked_up(reading: SceneReading, liquid: KnownLiquid) -> Liquid | None:
-    temperature = reading.values.get("liquid.temperature")
-    if temperature is None and len(liquid.temperatures) == 1 and reading.lacks("liquid.temperature"):
-        temperature = liquid.temperatures[0]
-    if temperature is None or not liquid.holds(temperature):
-        return None
-    return liquid_at(name=liquid.name, temperature=temperature)
-
-
 def _liquid_values(reading: SceneReading, looked_up: Liquid | None) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if looked_up is not None:
@@ -285,39 +269,19 @@ def _liquid_values(reading: SceneReading, looked_up: Liquid | None) -> dict[str,
         values[_VAPOUR] = 0.0
     if reading.lacks("liquid.name"):
         values["liquid.name"] = "custom"
-    return (
-        values
-        | _uncertainties(reading, values, looked_up)
-        | {"liquid.source": _source_of(reading, looked_up)}
-    )
-
-
-def _uncertainties(
-    reading: SceneReading, values: dict[str, Any], looked_up: Liquid | None
-) -> dict[str, float]:
-    known = (0.0, 0.0)
-    if looked_up is not None:
-        known = (looked_up.density_uncertainty, looked_up.viscosity_uncertainty)
-    keys = ("density", "kinematic_viscosity")
-    names = ("liquid.density_uncertainty", "liquid.viscosity_uncertainty")
     merged = {**reading.values, **values}
-    return {
-        name: _relative(merged, key, otherwise=0.0 if reading.known(f"liquid.{key}") else uncertainty)
-        for name, key, uncertainty in zip(names, keys, known, strict=True)
-    }
-
-
-def _relative(values: dict[str, Any], key: str, *, otherwise: float) -> float:
-    if f"uncertainty.{key}" not in values or f"liquid.{key}" not in values:
-        return otherwise
-    width, relative = values[f"uncertainty.{key}"]
-    return float(width if relative else width / values[f"liquid.{key}"])
-
-
-def _source_of(reading: SceneReading, looked_up: Liquid | None) -> str:
+    for key, name in (("density", "density"), ("kinematic_viscosity", "viscosity")):
+        outright = looked_up is None or reading.known(f"liquid.{key}")
+        uncertainty = 0.0 if outright else getattr(looked_up, f"{name}_uncertainty")
+        if f"uncertainty.{key}" in merged and f"liquid.{key}" in merged:
+            width, relative = merged[f"uncertainty.{key}"]
+            uncertainty = float(width if relative else width / merged[f"liquid.{key}"])
+        values[f"liquid.{name}_uncertainty"] = uncertainty
     named = {"density": _DENSITY, "kinematic viscosity": _VISCOSITY, "vapour pressure": _VAPOUR}
-    outright = [name for name, path in named.items() if reading.known(path)]
-    given = f"{', '.join(outright)} given outright" if outright else ""
-    if looked_up is None:
-        return given if _VAPOUR in reading.values else f"{given}; vapour pressure not given, taken as 0 Pa"
-    return looked_up.source if not given else f"{given}; otherwise {looked_up.source}"
+    stated = ", ".join(name for name, path in named.items() if reading.known(path))
+    source = f"{stated} given outright" if stated else ""
+    if looked_up is not None:
+        source = f"{source}; otherwise {looked_up.source}" if source else looked_up.source
+    elif _VAPOUR not in reading.values:
+        source = f"{source}; vapour pressure not given, taken as 0 Pa"
+    return values | {"liquid.source": source}

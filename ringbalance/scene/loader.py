@@ -147,26 +147,23 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
         values["rotor.initial_amplitude"] = vibration.amplitude
         values["rotor.initial_phase"] = vibration.phase
     known = before.parts if before else {}
-    records = {
-        name: _record(name, table.record, values, known.get(name))
-        for name, table in reading.schema.tables.items()
-        if table.record is not None
-    }
+    records = {}
+    for name, table in reading.schema.tables.items():
+        if (kind := table.record) is None:
+            continue
+        given = {field: values.get(path, absent) for field, path, absent in _fields(kind, name)}
+        record = known.get(name)
+        # A mesh, and what else has parts, is compared by identity alone.
+        if type(record) is not kind or not all(
+            value is (other := getattr(record, key))
+            or (type(value) is type(other) is float and value == other)
+            for key, value in given.items()
+        ):
+            record = kind(**given)
+        records[name] = record
     same = before is not None and before.tables.get("uncertainty") is reading.tables["uncertainty"]
     uncertainty = known["uncertainty"] if same else tuple(_uncertainty(reading))
     return {**records, "tolerance": values["accuracy.tolerance"], "uncertainty": uncertainty}
-
-
-def _record(name: str, kind: type, values: Mapping[str, Any], before: object) -> Any:
-    given = {field: values.get(path, absent) for field, path, absent in _fields(kind, name)}
-    if type(before) is kind and all(_equal(value, getattr(before, key)) for key, value in given.items()):
-        return before
-    return kind(**given)
-
-
-def _equal(value: object, before: object) -> bool:
-    """Whether a value is that of another scene; a mesh and what else has parts only where it is the same."""
-    return value is before or (type(value) is type(before) is float and value == before)
 
 
 @cache

@@ -90,31 +90,26 @@ class SceneReading:
     def fault(self, path: str, *, problem: str, allowed: str) -> Fault:
         """An error about a value, with what the file has there or the default that is used."""
         table, _, key = path.rpartition(".")
-        value = toml_text(self._table(table)[key]) if self.given(path) else self._default_text(path)
+        if self.given(path):
+            value = toml_text(self._table(table)[key])
+        elif not self.known(path):
+            value = MISSING
+        else:
+            default, declared = self.values[path], self.schema.key_at(tuple(path.split(".")))
+            if isinstance(default, float) and declared.takes.dimension is not None:
+                default = format_quantity(default, declared.takes.dimension, declared.usual_unit)
+            source = "from the mesh" if path in self.derived else "by default"
+            value = f"{toml_text(default)} ({source})"
         return Fault(file=self.file, table=table, key=key, value=value, problem=problem, allowed=allowed)
 
     def missing(self, path: str, problem: str = "every scene needs it") -> Fault:
         """An error about a value that is not there."""
         return self.fault(path, problem=problem, allowed=self.allowed(path))
 
-    def _needed(self, path: str) -> Fault:
-        """An error about a missing value, with what it would follow from."""
-        others = (need.split(".")[1] for need in self.schema.key_at(tuple(path.split("."))).presence.needs)
-        return self.missing(path, " or ".join(["every scene needs it", *others]))
-
     def _table(self, table: str) -> Mapping[str, Any]:
         content = self.document.get(table, {}) if table else self.document
         # A check against Mapping takes ten times as long, and rules ask for thousands of scenes.
         return content if isinstance(content, dict) else {}
-
-    def _default_text(self, path: str) -> str:
-        if not self.known(path):
-            return MISSING
-        source = "from the mesh" if path in self.derived else "by default"
-        value, key = self.values[path], self.schema.key_at(tuple(path.split(".")))
-        if isinstance(value, float) and key.takes.dimension is not None:
-            value = format_quantity(value, key.takes.dimension, key.usual_unit)
-        return f"{toml_text(value)} ({source})"
 
     def completed(self) -> SceneReading:
         """Fill in the defaults that follow from other values, as far as those are known.
@@ -137,8 +132,11 @@ class SceneReading:
             if not keys and name != "liquid":
                 continue
             if self.given(name):
-                paths = (f"{name}.{key}" for key in keys)
-                yield from (self._needed(path) for path in paths if self.lacks(path))
+                for key in keys:
+                    if self.lacks(path := f"{name}.{key}"):
+                        needs = self.schema.key_at((name, key)).presence.needs
+                        others = (need.split(".")[1] for need in needs)
+                        yield self.missing(path, " or ".join(["every scene needs it", *others]))
             elif name not in self.broken:
                 inside = ", ".join(keys) or "name and temperature, or density and kinematic_viscosity"
                 yield Fault(
@@ -157,10 +155,14 @@ def read_document(
 
     Args: `before`: tables of another document that this one was made from.
     """
-    tables = {
-        name: _table_read(document.get(name), table.keys, name, before.get(name) if before else None)
-        for name, table in schema.tables.items()
-    }
+    tables = {}
+    for name, table in schema.tables.items():
+        content, known = document.get(name), before.get(name) if before else None
+        if known is None or known.content is not content:
+            inside, wrong = _read_table({} if content is None else content, table.keys, (name,), known)
+            found = {f"{name}.{key}": value for key, value in inside.items()}
+            known = TableRead(content=content, values=found, rejected=tuple(wrong))
+        tables[name] = known
     values, rejected = _read_keys(document, schema.top, ())
     for each in tables.values():
         values.update(each.values)
@@ -193,14 +195,6 @@ def _stands_there(document: Mapping[str, Any], path: str) -> bool:
     return isinstance(content, Mapping) and key in content
 
 
-def _table_read(content: Any, keys: Mapping[str, Key], name: str, before: TableRead | None) -> TableRead:
-    if before is not None and before.content is content:
-        return before
-    inside, rejected = _read_table({} if content is None else content, keys, (name,), before)
-    values = {f"{name}.{key}": value for key, value in inside.items()}
-    return TableRead(content=content, values=values, rejected=tuple(rejected))
-
-
 def _read_table(
     content: object, keys: Mapping[str, Key], place: Place, before: TableRead | None = None
 ) -> tuple[dict[str, Any], list[_Rejected]]:
@@ -223,20 +217,17 @@ def _read_keys(
                 rejected.append(_Rejected(place=(*place, name), content=content, kind="missing"))
             continue
         given = content.get(name, key.presence.default)
-        if before is not None and _same(before, f"{place[0]}.{name}", name, given, key):
-            values[name] = before.values[f"{place[0]}.{name}"]
+        path = f"{place[0]}.{name}" if place else name
+        # Read there already, from the same object.
+        read = before is not None and path in before.values
+        if before and read and (before.content or {}).get(name, key.presence.default) is given:
+            values[name] = before.values[path]
             continue
         value, wrong = _read_value(given, key, (*place, name))
         rejected += wrong
         if not wrong:
             values[name] = value
     return values, rejected
-
-
-def _same(before: TableRead, path: str, name: str, given: object, key: Key) -> bool:
-    """Whether a key was read there already, from the same object."""
-    known = before.content or {}
-    return path in before.values and known.get(name, key.presence.default) is given
 
 
 def _unknown_keys(content: Mapping[str, Any], known: Iterable[str], place: Place) -> list[_Rejected]:
@@ -249,15 +240,13 @@ def _unknown_keys(content: Mapping[str, Any], known: Iterable[str], place: Place
 
 
 def _read_value(content: object, key: Key, place: Place) -> tuple[Any, list[_Rejected]]:
-    if isinstance(key.takes, Entries):
-        return _read_entries(content, key.takes, place)
-    try:
-        return key.takes.read(content), []
-    except FieldError as error:
-        return None, [_Rejected(place=place, content=content, problem=error.problem, allowed=error.allowed)]
-
-
-def _read_entries(content: object, takes: Entries, place: Place) -> tuple[Any, list[_Rejected]]:
+    takes = key.takes
+    if not isinstance(takes, Entries):
+        try:
+            return takes.read(content), []
+        except FieldError as error:
+            wrong = _Rejected(place=place, content=content, problem=error.problem, allowed=error.allowed)
+            return None, [wrong]
     if not takes.example:
         values, rejected = _read_table(content, takes.keys, place)
         return (None if rejected else takes.record(**values)), rejected

@@ -143,15 +143,13 @@ def setting_text(path: str, value: object) -> str:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return ", ".join(setting_text(path, each) for each in value)
     if isinstance(value, float | int):
-        return _short_text(_line_at(path), value)
-    return str(value)
-
-
-def _short_text(line: _SceneLine, value: float) -> str:
-    if not line.dimension:
+        line = _line_at(path)
+        if line.dimension:
+            return format_quantity(value, line.dimension, _suited_unit(line, value), digits=4)
         # Whole numbers count something, or are a seed: every digit counts.
-        return f"{value if isinstance(value, int) else format(value, '.4g')} {line.shown.unit}".rstrip()
-    return format_quantity(value, line.dimension, _suited_unit(line, value), digits=4)
+        number = value if isinstance(value, int) else format(value, ".4g")
+        return f"{number} {line.shown.unit}".rstrip()
+    return str(value)
 
 
 def _suited_unit(line: _SceneLine, *values: float) -> str:

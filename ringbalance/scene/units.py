@@ -64,16 +64,17 @@ class _Dimension:
 
 def _dimensions() -> Mapping[str, _Dimension]:
     rows = packaged_rows("ringbalance.scene", "data", "units.csv")
-    return MappingProxyType({row["dimension"]: _dimension(row) for row in rows})
-
-
-def _dimension(row: Mapping[str, str]) -> _Dimension:
-    return _Dimension(
-        name=row["name"],
-        example=row["example"],
-        units=MappingProxyType(dict(map(_unit, row["units"].split("; ")))),
-        smallest=float(row["smallest"]),
-        largest=float(row["largest"]),
+    return MappingProxyType(
+        {
+            row["dimension"]: _Dimension(
+                name=row["name"],
+                example=row["example"],
+                units=MappingProxyType(dict(map(_unit, row["units"].split("; ")))),
+                smallest=float(row["smallest"]),
+                largest=float(row["largest"]),
+            )
+            for row in rows
+        }
     )
 
 
@@ -158,7 +159,21 @@ def _parsed(text: object, dimension: str) -> float:
     unit = kind.units.get(_canonical(unit_text))
     if unit is None:
         raise FieldError(_wrong_unit(unit_text, kind), _allowed(kind))
-    value = _in_si(number, unit, kind)
+    # The double is looked at first: an exponent of a thousand million must not reach the exact arithmetic.
+    rough = float(number)
+    scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
+    if not abs(rough) * scale <= 10 * kind.largest:
+        raise FieldError(_too_large(kind), _allowed(kind))
+    value = rough + 0.0  # no negative zero
+    if unit.factor != 1 or unit.offset != 0:
+        top, bottom = Decimal(number).as_integer_ratio() if rough != 0 else (0, 1)
+        up, down = unit.offset.numerator, unit.offset.denominator
+        # A quotient of whole numbers is rounded once, and much sooner there than one of fractions.
+        exact = (top * down + up * bottom) * unit.factor.numerator
+        value = exact / (bottom * down * unit.factor.denominator)
+    value *= math.pi if unit.pi else 1.0
+    if abs(value) > kind.largest:
+        raise FieldError(_too_large(kind), _allowed(kind))
     if kind is DIMENSIONS["temperature"] and value <= 0:
         raise FieldError("it lies at or below absolute zero", "a temperature above 0 K (-273.15 degC)")
     return value
@@ -293,25 +308,6 @@ def _canonical(unit: str) -> str:
     tight = re.sub(r"\s*([*/()^])\s*", r"\1", unit)
     product = re.sub(r"\s+", "*", tight)
     return re.sub(r"(?<=m)(?=[23](?![0-9]))", "^", product)
-
-
-def _in_si(number: str, unit: _Unit, kind: _Dimension) -> float:
-    # The double is looked at first: an exponent of a thousand million must not reach the exact arithmetic.
-    rough = float(number)
-    scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
-    if not abs(rough) * scale <= 10 * kind.largest:
-        raise FieldError(_too_large(kind), _allowed(kind))
-    value = rough + 0.0  # no negative zero
-    if unit.factor != 1 or unit.offset != 0:
-        top, bottom = Decimal(number).as_integer_ratio() if rough != 0 else (0, 1)
-        up, down = unit.offset.numerator, unit.offset.denominator
-        # A quotient of whole numbers is rounded once, and much sooner there than one of fractions.
-        exact = (top * down + up * bottom) * unit.factor.numerator
-        value = exact / (bottom * down * unit.factor.denominator)
-    value *= math.pi if unit.pi else 1.0
-    if abs(value) > kind.largest:
-        raise FieldError(_too_large(kind), _allowed(kind))
-    return value
 
 
 def _too_large(kind: _Dimension) -> str:

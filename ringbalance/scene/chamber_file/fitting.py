@@ -56,9 +56,16 @@ def placed(
     """
     turned = _turned(body.points, axis)
     angle = np.arctan2(turned[:, 1], turned[:, 0])
-    start, extent = _taken(angle[np.unique(body.cells)])
+    # The nodes take up all of the circle but the widest gap.
+    ordered = np.sort(angle[np.unique(body.cells)])
+    gaps = np.diff(np.append(ordered, ordered[0] + 2 * math.pi))
+    widest = int(gaps.argmax())
+    start = float(ordered[(widest + 1) % len(ordered)])
+    extent = 2 * math.pi - float(gaps[widest])
     centre = start + extent / 2 if middle is None else middle
-    points = _rotated(turned, -centre)
+    c, s = math.cos(-centre), math.sin(-centre)
+    x, y, z = turned.T
+    points = np.column_stack([c * x - s * y, s * x + c * y, z])
     inner, where = _nearest(points, surface, corners_of(body.kind))
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     points[:, 2] -= (low + high) / 2
@@ -71,12 +78,9 @@ def placed(
         "plate_thickness": 0.0,
     }
     found = [*_about_axis(body, inner, outer, extent, where), *_walls(points, boundaries)]
-    return Placed(points=points, dimensions=_rounded(dimensions)), tuple(found)
-
-
-def _rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
-    """Dimensions to as many digits as a file's rounding leaves."""
-    return {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
+    # As many digits as a file's rounding leaves.
+    rounded = {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
+    return Placed(points=points, dimensions=rounded), tuple(found)
 
 
 def _turned(points: FloatArray, axis: Axis) -> FloatArray:
@@ -85,21 +89,6 @@ def _turned(points: FloatArray, axis: Axis) -> FloatArray:
     order = [(third + 1) % 3, (third + 2) % 3, third]
     signs = np.array([1.0, -1.0, -1.0]) if axis.startswith("-") else np.ones(3)
     return np.asarray(points[:, order] * signs, dtype=np.float64)
-
-
-def _rotated(points: FloatArray, angle: float) -> FloatArray:
-    c, s = math.cos(angle), math.sin(angle)
-    x, y, z = points.T
-    return np.column_stack([c * x - s * y, s * x + c * y, z])
-
-
-def _taken(angles: FloatArray) -> tuple[float, float]:
-    """First angle of what nodes take up of the circle, and its extent: all but the widest gap."""
-    ordered = np.sort(angles)
-    gaps = np.diff(np.append(ordered, ordered[0] + 2 * math.pi))
-    widest = int(gaps.argmax())
-    start = float(ordered[(widest + 1) % len(ordered)])
-    return start, 2 * math.pi - float(gaps[widest])
 
 
 def _nearest(points: FloatArray, surface: IntArray, corners: int) -> tuple[float, int]:
@@ -217,9 +206,19 @@ def _scale_findings(
     Args: `dimensions`: of the mesh in `unit`, SI. `port`: radius of its boundary of that name, m.
     """
 
+    units = DIMENSIONS["length"].units
+
     def misfit(other: str) -> str | None:
-        units = DIMENSIONS["length"].units
-        return _misfit(reading, dimensions, factor=float(units[other].factor / units[unit].factor), port=port)
+        """Why a chamber drawn in another unit cannot be; None where it can."""
+        factor = float(units[other].factor / units[unit].factor)
+        sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
+        if not _SMALLEST <= sized["outer_radius"] <= _LARGEST:
+            return "no disc is of that size"
+        values = {f"disc.{key}": value for key, value in sized.items()}
+        if reading.lacks("tube.port_radius"):
+            values["tube.port_radius"] = sized["outer_radius"] if port is None else factor * port
+        fault = next(failed_checks(reading.adding(values), SIZE_CHECKS), None)
+        return None if fault is None else f"[{fault.table}] {fault.key} = {fault.value}: {fault.problem}"
 
     reason = misfit(unit)
     fitting = [name for name in get_args(MeshUnit) if misfit(name) is None]
@@ -234,20 +233,6 @@ def _scale_findings(
         problem=f"{problem}wrong scale; {reason}",
         allowed=allowed or f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m",
     )
-
-
-def _misfit(
-    reading: SceneReading, dimensions: Mapping[str, float], *, factor: float, port: float | None
-) -> str | None:
-    """Why a chamber so many times as large cannot be; None where it can."""
-    sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
-    if not _SMALLEST <= sized["outer_radius"] <= _LARGEST:
-        return "no disc is of that size"
-    values = {f"disc.{key}": value for key, value in sized.items()}
-    if reading.lacks("tube.port_radius"):
-        values["tube.port_radius"] = sized["outer_radius"] if port is None else factor * port
-    fault = next(failed_checks(reading.adding(values), SIZE_CHECKS), None)
-    return None if fault is None else f"[{fault.table}] {fault.key} = {fault.value}: {fault.problem}"
 
 
 def _opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Iterator[Contradiction]:

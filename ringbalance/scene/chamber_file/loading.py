@@ -14,7 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.chamber_file.body import Body, Contents, MeshFileError
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, Placed, placed, port_radius, unfitting
 from ringbalance.scene.chamber_file.mesh_file import FORMATS, READERS, read_mesh_file
@@ -41,16 +40,24 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
     """The reading with the geometry and the dimensions of the mesh that it names, and all errors of it."""
     keys = [f"disc.{key}" for key in keys_of(MeshKeys)]
     if not reading.given("disc.mesh"):
-        return reading, tuple(_pointless(reading, key) for key in keys if reading.given(key))
+        problem, allowed = "it has no meaning without mesh", "mesh as well, or leave the key out"
+        stated = filter(reading.given, keys)
+        return reading, tuple(reading.fault(key, problem=problem, allowed=allowed) for key in stated)
     superfluous, unit = tuple(_superfluous(reading)), tuple(_unit_faults(reading))
     unknown = replace(reading, broken=reading.broken | {f"disc.{key}" for key in (*SHAPE, "geometry")})
     if unit or reading.broken & set(keys) or not reading.known("accuracy.tolerance"):
         return unknown, (*superfluous, *unit)
     try:
-        known = _following(reading, *_chamber(reading, folder))
+        geometry, found = _chamber(reading, folder)
     except (MeshFileError, MemoryError) as error:
         return unknown, (*superfluous, *_mesh_faults(reading, error))
-    return (unknown, superfluous) if superfluous else (known, ())
+    if superfluous:
+        return unknown, superfluous
+    values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
+    port = port_radius(found.points, geometry.boundaries)
+    if port is not None and reading.lacks(PORT_RADIUS):
+        values[PORT_RADIUS] = port
+    return reading.following({**values, "disc.geometry": geometry}), ()
 
 
 def _mesh_faults(reading: SceneReading, error: MeshFileError | MemoryError) -> Iterator[Fault]:
@@ -61,11 +68,6 @@ def _mesh_faults(reading: SceneReading, error: MeshFileError | MemoryError) -> I
     for each in error.findings if isinstance(error, MeshFileError) else (scarce,):
         problem = "".join(letter if letter.isprintable() else "?" for letter in each.problem)
         yield reading.fault("disc.mesh", problem=problem, allowed=each.allowed)
-
-
-def _pointless(reading: SceneReading, path: str) -> Fault:
-    problem = "it has no meaning without mesh"
-    return reading.fault(path, problem=problem, allowed="mesh as well, or leave the key out")
 
 
 def _superfluous(reading: SceneReading) -> Iterator[Fault]:
@@ -87,21 +89,17 @@ def _unit_faults(reading: SceneReading) -> Iterator[Fault]:
         yield reading.fault(path, problem=problem, allowed=reading.allowed(path))
 
 
-def _following(reading: SceneReading, geometry: ChamberGeometry, found: Placed) -> SceneReading:
-    values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
-    port = port_radius(found.points, geometry.boundaries)
-    if port is not None and reading.lacks(PORT_RADIUS):
-        values[PORT_RADIUS] = port
-    return reading.following({**values, "disc.geometry": geometry})
-
-
 def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
     path = folder / name
     content = _content_of(path)
     unit = _STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
-    contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
+    tolerance = reading.values["accuracy.tolerance"]
+    if _is_step(path):
+        contents = _meshed_step(content, tolerance=tolerance)
+    else:
+        contents = read_mesh_file(content, ending=path.suffix.lower())
     body = Body.of(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
     body, misshapen = oriented(body)
     facets = Facets.of(body)
@@ -117,19 +115,7 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
     ]
     if everything:
         raise MeshFileError(everything)
-    size = reading.values["accuracy.tolerance"] if _is_step(path) else 0.0
-    return _record(name, content, body, boundaries, found, (unit, axis, middle, size)), found
-
-
-def _record(
-    name: str,
-    content: bytes,
-    body: Body,
-    boundaries: dict[str, IntArray],
-    found: Placed,
-    way: tuple[Any, ...],
-) -> ChamberGeometry:
-    """The geometry without nodes that no cell has."""
+    # Without nodes that no cell has.
     used = np.unique(body.cells)
     new = np.zeros(len(body.points), dtype=np.int64)
     new[used] = np.arange(len(used))
@@ -137,7 +123,8 @@ def _record(
     points, cells = found.points[used], new[body.cells]
     for array in (points, cells, *arrays.values()):
         array.flags.writeable = False
-    return ChamberGeometry(
+    way = (unit, axis, middle, tolerance if _is_step(path) else 0.0)
+    geometry = ChamberGeometry(
         file=name,
         digest=hashlib.sha256(content + repr(way).encode()).hexdigest(),
         kind=body.kind,
@@ -145,6 +132,7 @@ def _record(
         cells=cells,
         boundaries=arrays,
     )
+    return geometry, found
 
 
 def _is_step(path: Path) -> bool:
@@ -164,16 +152,6 @@ def _content_of(path: Path) -> bytes:
     if not content.strip():
         raise MeshFileError.of("the file is empty", FORMATS)
     return content
-
-
-def _contents_of(path: Path, content: bytes, *, tolerance: float) -> Contents:
-    """What a mesh file's bytes hold; a solid is meshed. Raises: MeshFileError.
-
-    Args: `tolerance`: of the scene, from which the size of a solid's cells follows.
-    """
-    if _is_step(path):
-        return _meshed_step(content, tolerance=tolerance)
-    return read_mesh_file(content, ending=path.suffix.lower())
 
 
 def _meshed_step(content: bytes, *, tolerance: float) -> Contents:

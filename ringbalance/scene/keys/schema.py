@@ -115,44 +115,12 @@ class Schema:
         )
 
 
-def _disc() -> TableSchema:
-    """The dimensions of its chambers, or the mesh of one from which they follow."""
-    dimensions, mesh = keys_of(models.Disc), keys_of(MeshKeys)
-    return TableSchema(text="the balancing disc", keys={**dimensions, **mesh}, record=models.Disc)
-
-
-def _rotor() -> TableSchema:
-    """Amplitude and phase are entries of one key, and two fields of the record."""
-    vibration = Key(
-        takes=Entries(record=loop_models.Vibration, keys=keys_of(loop_models.Vibration), example=""),
-        presence=standard(
-            {"amplitude": "10 um", "phase": "90 deg"},
-            "{ amplitude, phase } before balancing, zero-to-peak",
-        ),
-    )
-    return TableSchema(
-        text="the rotor as the balancer sees it",
-        keys={**keys_of(loop_models.Rotor), "initial_vibration": vibration},
-        record=loop_models.Rotor,
-    )
-
-
 def _half_width_of(table: str, key: Key) -> Key:
     rule = "that of the known liquid" if table == "liquid" else "exact"
     return Key(
         takes=half_width(key.takes.dimension),
         presence=unused(rule, f"expanded uncertainty of the quantity in [{table}]"),
     )
-
-
-def _uncertainty(tables: Mapping[str, TableSchema]) -> TableSchema:
-    keys = {
-        name: _half_width_of(table, key)
-        for table, content in tables.items()
-        for name, key in content.keys.items()
-        if key.uncertain
-    }
-    return TableSchema(text=_UNCERTAINTY, keys=keys)
 
 
 def _uncertainty_by_table(tables: Mapping[str, TableSchema]) -> TableSchema:
@@ -204,13 +172,30 @@ _RUN = {
 }
 
 
+_VIBRATION = Key(
+    takes=Entries(record=loop_models.Vibration, keys=keys_of(loop_models.Vibration), example=""),
+    presence=standard(
+        {"amplitude": "10 um", "phase": "90 deg"},
+        "{ amplitude, phase } before balancing, zero-to-peak",
+    ),
+)
+"""One key, whose entries are two fields of the rotor's record."""
 _LIQUID_RING = {
-    "disc": _disc(),
+    # The dimensions of the chambers, or the mesh of one from which they follow.
+    "disc": TableSchema(
+        text="the balancing disc",
+        keys={**keys_of(models.Disc), **keys_of(MeshKeys)},
+        record=models.Disc,
+    ),
     "liquid": TableSchema.of(models.Liquid, "the balancing liquid"),
     "tube": TableSchema.of(models.Tube, "the tube that connects two opposite chambers"),
     "gas": TableSchema.of(models.Gas, "the gas that drives the liquid"),
     "environment": TableSchema.of(loop_models.Environment, "gravity and how the shaft lies in it"),
-    "rotor": _rotor(),
+    "rotor": TableSchema(
+        text="the rotor as the balancer sees it",
+        keys={**keys_of(loop_models.Rotor), "initial_vibration": _VIBRATION},
+        record=loop_models.Rotor,
+    ),
     "sensor": TableSchema.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
     "controller": TableSchema.of(loop_models.ControllerSettings, "the control algorithm"),
     "requirement": TableSchema.of(
@@ -222,7 +207,15 @@ _LIQUID_RING = {
 LIQUID_RING = Schema.of(
     _LIQUID_RING,
     balancer=standard("liquid_ring", "kind of balancer"),
-    uncertainty=_uncertainty(_LIQUID_RING),
+    uncertainty=TableSchema(
+        text=_UNCERTAINTY,
+        keys={
+            name: _half_width_of(table, key)
+            for table, content in _LIQUID_RING.items()
+            for name, key in content.keys.items()
+            if key.uncertain
+        },
+    ),
     scene=models.Scene,
 )
 """A scene whose balancer is a liquid ring."""

@@ -78,8 +78,14 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     """Estimate for the walls of a mesh."""
     facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
     patches, outer = wall_patches(geometry)
-    first, second, ends = _shared_edges(facets[:, :corners])
-    areas = _areas(patches)
+    # Each edge of two facets: its place among the edges of both, facet by facet, and its ends.
+    edges = np.sort(edges_of(facets[:, :corners]).reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    pair = np.flatnonzero(np.all(edges[order][1:] == edges[order][:-1], axis=1))
+    first, second, ends = order[pair], order[pair + 1], edges[order[pair]]
+    points, weights = gauss(3)
+    area_vectors = _normals_at(patches, np.repeat(points, 3), np.tile(points, 3))
+    areas = np.asarray(np.linalg.norm(area_vectors, axis=-1) @ np.outer(weights, weights).ravel())
     normals = _normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
@@ -102,12 +108,6 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     )
 
 
-def _areas(patches: FloatArray) -> FloatArray:
-    places, weights = gauss(3)
-    normals = _normals_at(patches, np.repeat(places, 3), np.tile(places, 3))
-    return np.asarray(np.linalg.norm(normals, axis=-1) @ np.outer(weights, weights).ravel())
-
-
 def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
     """X_u x X_v at points, shape (patches, points, 3)."""
     one, zero = np.ones_like(u), np.zeros_like(u)
@@ -115,14 +115,6 @@ def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray
     slopes = [np.stack([zero, one, 2 * t]) for t in (u, v)]
     along = np.einsum("nijx,ip,jp->npx", patches, slopes[0], at[1])
     return np.cross(along, np.einsum("nijx,ip,jp->npx", patches, at[0], slopes[1]))
-
-
-def _shared_edges(corners: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Each edge of two facets: its place among the edges of both, facet by facet, and its ends."""
-    ends = np.sort(edges_of(corners).reshape(-1, 2), axis=1)
-    order = np.lexsort(ends.T)
-    pair = np.flatnonzero(np.all(ends[order][1:] == ends[order][:-1], axis=1))
-    return order[pair], order[pair + 1], ends[order[pair]]
 
 
 def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatArray:

@@ -71,20 +71,6 @@ def liquid_body(body: Tetrahedra, radius: float) -> Tetrahedra:
     return compacted(_on_surface(cut, radius))
 
 
-def _edge_lengths(body: Tetrahedra) -> FloatArray:
-    ends = body.nodes[body.cells[:, EDGES]]
-    return np.asarray(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
-
-
-def _shortest(body: Tetrahedra) -> FloatArray:
-    """Length of the shortest edge at each node, infinite at mid-nodes."""
-    result = np.full(len(body.nodes), np.inf)
-    lengths = _edge_lengths(body)
-    for end in range(2):
-        np.minimum.at(result, body.cells[:, EDGES[:, end]], lengths)
-    return result
-
-
 def _tangents(body: Tetrahedra) -> FloatArray:
     """Projectors onto the directions in which each node stays on the planes of its walls, (nodes, 3, 3)."""
     spread = np.zeros((len(body.nodes), 3, 3))
@@ -113,7 +99,12 @@ def _move(radius: float, places: FloatArray, tangents: FloatArray) -> FloatArray
 
 def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
     """Corners near the surface moved onto it; which nodes are on it now."""
-    tangents, room = _tangents(body), _shortest(body)
+    tangents, room = _tangents(body), np.full(len(body.nodes), np.inf)
+    ends = body.nodes[body.cells[:, EDGES]]
+    lengths = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    for end in range(2):
+        # The shortest edge at each node; mid-nodes have none.
+        np.minimum.at(room, body.cells[:, EDGES[:, end]], lengths)
     corner = np.isfinite(room)
     moved = body.nodes.copy()
     for _ in range(3):
@@ -122,21 +113,17 @@ def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
     near = np.abs(_level(moved, radius)) < _ON * np.linalg.norm(_outward(moved), axis=1) * room
     taken = corner & near & (np.linalg.norm(shift, axis=1) < _SNAP * np.where(corner, room, 0.0))
     for _ in range(10):
-        result = _shifted(body, np.where(taken[:, None], shift, 0.0))
+        step = np.where(taken[:, None], shift, 0.0)
+        nodes, middle = body.nodes + step, body.cells[:, 4:].ravel()
+        # Each mid-node by the mean of the moves at its edge's ends.
+        nodes[middle] = body.nodes[middle] + step[body.cells[:, EDGES]].mean(axis=2).reshape(-1, 3)
+        result = replace(body, nodes=nodes)
         folded = _folded(body, result)
         if not taken[body.cells[folded, :4]].any():
             break
         taken[body.cells[folded, :4]] = False
     reach = np.linalg.norm(_outward(result.nodes), axis=1) * np.where(corner, room, 0.0)
     return result, taken | (np.abs(_level(result.nodes, radius)) < _ON * reach)
-
-
-def _shifted(body: Tetrahedra, shift: FloatArray) -> Tetrahedra:
-    """Corners moved, and each mid-node by the mean of the moves at its edge's ends."""
-    nodes = body.nodes + shift
-    middle = body.cells[:, 4:].ravel()
-    nodes[middle] = body.nodes[middle] + shift[body.cells[:, EDGES]].mean(axis=2).reshape(-1, 3)
-    return replace(body, nodes=nodes)
 
 
 def _folded(body: Tetrahedra, after: Tetrahedra) -> IntArray:
@@ -172,7 +159,14 @@ def _cuts(body: Tetrahedra, radius: float, value: FloatArray) -> _Cuts:
     kept, first, inverse = np.unique(middles, return_index=True, return_inverse=True)
     first_end, second_end = ends[crossing][first].T
     curve = body.nodes[np.stack([first_end, second_end, kept])]
-    share = _crossing(radius, curve)
+    # Share of each edge at which it crosses, by bisection.
+    low, high = np.zeros(curve.shape[1]), np.ones(curve.shape[1])
+    start = np.sign(_level(curve[0], radius))
+    for _ in range(50):
+        share = (low + high) / 2
+        before = np.sign(_level(_on_curve(curve, share), radius)) == start
+        low, high = np.where(before, share, low), np.where(before, high, share)
+    share = (low + high) / 2
     number = np.full(crossing.shape, -1)
     number[crossing] = len(body.nodes) + inverse
     along = np.zeros(crossing.shape)
@@ -185,17 +179,6 @@ def _cuts(body: Tetrahedra, radius: float, value: FloatArray) -> _Cuts:
 def _on_curve(curve: FloatArray, share: FloatArray) -> FloatArray:
     values = shapes(np.stack([1 - share, share, np.zeros_like(share)], axis=-1))[:, [0, 1, 3]]
     return np.asarray(np.einsum("nk,knx->nx", values, curve))
-
-
-def _crossing(radius: float, curve: FloatArray) -> FloatArray:
-    """Share of each edge, start, end and middle given, at which it crosses: bisection."""
-    low, high = np.zeros(curve.shape[1]), np.ones(curve.shape[1])
-    start = np.sign(_level(curve[0], radius))
-    for _ in range(50):
-        middle = (low + high) / 2
-        before = np.sign(_level(_on_curve(curve, middle), radius)) == start
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return np.asarray((low + high) / 2)
 
 
 # Corners 0 to 3, then the places on edges 0 to 5 as 4 to 9.

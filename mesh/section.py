@@ -178,7 +178,13 @@ def outlines(geometry: ChamberGeometry, *, axis: int, place: float = 0.0) -> tup
     """
     points = geometry.points
     height = points[:, axis] - place - _OFF_NODES * float(np.ptp(points[:, axis]))
-    crossed = np.concatenate([_crossed(piece, height) for piece in _wall_pieces(geometry)])
+    crossing = []
+    for pieces in _wall_pieces(geometry):
+        # Edges from one side of the plane to the other, piece by piece, their nodes in rising order.
+        ends = edges_of(pieces)
+        piece, edge = np.nonzero(height[ends[..., 0]] * height[ends[..., 1]] < 0)
+        crossing.append(np.sort(ends[piece, edge], axis=1))
+    crossed = np.concatenate(crossing)
     edges, number = np.unique(crossed, axis=0, return_inverse=True)
     low, high = height[edges].T
     share = (low / (low - high))[:, None]
@@ -186,13 +192,6 @@ def outlines(geometry: ChamberGeometry, *, axis: int, place: float = 0.0) -> tup
     # Two by two: a plane leaves a piece by one edge for each that it enters by.
     loops = _loops(number.reshape(-1, 2))
     return tuple(np.asarray(np.delete(places[loop], axis, axis=1)) for loop in loops)
-
-
-def _crossed(pieces: IntArray, height: FloatArray) -> IntArray:
-    """Edges from one side of the plane to the other, piece by piece, their nodes in rising order."""
-    ends = edges_of(pieces)
-    piece, edge = np.nonzero(height[ends[..., 0]] * height[ends[..., 1]] < 0)
-    return np.sort(ends[piece, edge], axis=1)
 
 
 def _loops(pairs: IntArray) -> list[list[int]]:

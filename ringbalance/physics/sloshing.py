@@ -284,7 +284,12 @@ def sloshing_response(
     # Peaks are looked for on the mesh in the middle, if there are three.
     middle = 0 if disc.geometry is not None else len(meshes) // 3
     systems = (next(islice(_systems(disc, float(a), meshes), middle, None))[0] for a in radii)
-    ends = np.array([_interval(system, ekman) for system in systems])
+    ends = np.array(
+        [
+            _swept(partial(_answers, system, ekman=ekman), natural=system.natural_frequencies())
+            for system in systems
+        ]
+    )
     # At either end the solution errs by about the same share as in the middle.
     share = widths / found[:, 0]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
@@ -299,12 +304,6 @@ def sloshing_response(
         surface_amplitude_interval=scale * ends[:, :, 1],
         status=_status(fills, disc.outer_radius - radii, scale * ends[:, 1, 1], scale - radii),
     )
-
-
-def _interval(system: SloshingSystem, ekman: float) -> FloatArray:
-    """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
-    response = partial(_answers, system, ekman=ekman)
-    return np.stack(_swept(response, natural=system.natural_frequencies()))
 
 
 def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float) -> None:

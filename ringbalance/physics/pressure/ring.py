@@ -105,7 +105,10 @@ def ring_quantities(
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(disc, fills, density, angular_velocity, gravity)
     axial = gravity > 0 and shaft == "vertical"
-    meshes = _meshes(disc, cells, dimension or (3 if axial else 2))
+    finest = default_cells(disc=disc, dimension=dimension or (3 if axial else 2))
+    meshes = tuple(cells) if cells else tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
+    if len(meshes) != 3 or any(len(c) != len(meshes[0]) for c in meshes):
+        raise ValueError("cells must list three meshes of one dimension, finest first")
     if axial and len(meshes[0]) == 2:
         raise ValueError("gravity along the shaft needs dimension 3")
     liquid = RotatingLiquid(density=density, angular_velocity=angular_velocity)
@@ -128,16 +131,6 @@ def _check(disc: Disc, fills: FloatArray, density: float, omega: float, gravity:
             f"fill_ratio {thin[0]:.3g} leaves a ring shallower than {_SHALLOWEST:g} of the outer radius, "
             "which no mesh resolves; give zero instead"
         )
-
-
-def _meshes(
-    disc: Disc, cells: Sequence[tuple[int, ...]] | None, dimension: int
-) -> tuple[tuple[int, ...], ...]:
-    finest = default_cells(disc=disc, dimension=dimension)
-    meshes = tuple(cells) if cells else tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
-    if len(meshes) != 3 or any(len(c) != len(meshes[0]) for c in meshes):
-        raise ValueError("cells must list three meshes of one dimension, finest first")
-    return meshes
 
 
 def _angles(disc: Disc, liquid: RotatingLiquid, gravity: float) -> FloatArray:
@@ -269,7 +262,11 @@ def _collected(
         )
         widths[k] = [record.uncertainty for record in records[k]] if failed[k].ok else natural
     widths[fills == 0] = 0.0
-    status = _status(fills, failed)
+    first = next(((x, each) for x, each in zip(fills, failed, strict=True) if not each.ok), None)
+    status = Status()
+    if first is not None:
+        x, reason = first
+        status = Status(code=reason.code, text=f"at a fill ratio of {x:.4g}: {reason.text}")
     estimates = {
         name: Estimate(value=values[:, 0, k].copy(), uncertainty=widths[:, k].copy(), status=status)
         for k, name in enumerate(QUANTITIES)
@@ -291,13 +288,6 @@ def _collected(
             extra={"surface_flux_mismatch": mismatch},
         ),
     )
-
-
-def _status(fills: FloatArray, failed: Sequence[Status]) -> Status:
-    for x, status in zip(fills, failed, strict=True):
-        if not status.ok:
-            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}")
-    return Status()
 
 
 def _rounding(disc: Disc, cells: tuple[int, ...], x: float, moved: float) -> float:

@@ -123,8 +123,14 @@ def _find_surface(
         basis = quadratic_basis(chamber.mesh)
         move, before, steps = float(np.abs(wanted).max()) / depth, move, steps + 1
         status = _near_walls(disc, chamber.surface_radius, depth)
-    if status.ok:
-        status = _end_of_search(disc, chamber.surface_radius, move, _settled(move, before))
+    if status.ok and not _settled(move, before):
+        status = Status(
+            code=StatusCode.NOT_CONVERGED,
+            text=f"the free surface still moves by {move:.1e} of its depth; "
+            "raise the speed or refine the mesh",
+        )
+    elif status.ok and float(chamber.surface_radius.min()) < disc.inner_radius * (1 - 1e-9):
+        status = _SPILLS
     chamber, basis = _hold_volume(disc, chamber, basis, target) if status.ok else (first, unmoved)
     extra = {
         "surface_last_move": move,
@@ -229,13 +235,3 @@ def _near_walls(disc: Disc, radius: FloatArray, depth: float) -> Status:
     if float(radius.min()) < max(disc.inner_radius / 2, 1.001 * disc.plate_thickness):
         return _SPILLS
     return Status()
-
-
-def _end_of_search(disc: Disc, radius: FloatArray, move: float, settled: bool) -> Status:
-    if not settled:
-        return Status(
-            code=StatusCode.NOT_CONVERGED,
-            text=f"the free surface still moves by {move:.1e} of its depth; "
-            "raise the speed or refine the mesh",
-        )
-    return _SPILLS if float(radius.min()) < disc.inner_radius * (1 - 1e-9) else Status()

@@ -143,30 +143,25 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         entrance_uncertainty(tube=tube, reynolds=re, critical_ratio=ratio),
         exit_uncertainty(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value),
     )
+    smooth = friction_factor(reynolds=re, relative_roughness=rough)
+    bends = (
+        bend_uncertainty(
+            bend=bend,
+            bore=tube.bore,
+            friction_factor=smooth,
+            critical_ratio=ratio,
+            **numbers,
+        )
+        for bend in tube.bends
+    )
     return {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
         "rotation entry": _development_part(tube, state, lam.value),
         "ends": np.sqrt(sum(e**2 for e in ends)),
-        "bends": _bends_part(tube, state),
+        # One cause, so those of all bends add up.
+        "bends": np.asarray(sum(bends, start=np.zeros(state.reynolds.shape))),
     }
-
-
-def _bends_part(tube: Tube, state: TubeState) -> FloatArray:
-    """One cause, so those of all bends add up."""
-    straight = friction_factor(reynolds=state.reynolds, relative_roughness=tube.roughness / tube.bore)
-    parts = (
-        bend_uncertainty(
-            bend=bend,
-            bore=tube.bore,
-            friction_factor=straight,
-            reynolds=state.reynolds,
-            rotation_reynolds=state.rotation_reynolds,
-            critical_ratio=state.critical_ratio,
-        )
-        for bend in tube.bends
-    )
-    return np.asarray(sum(parts, start=np.zeros(state.reynolds.shape)))
 
 
 def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
@@ -181,7 +176,14 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     """
     if not tube.model_errors:
         return state
-    parts, terms, bends = _all_parts(tube, state), dict(state.terms), state.bends
+    terms, bends = dict(state.terms), state.bends
+    # By the models, and by what differs in a tube that was built.
+    built = {
+        cause: share * np.abs(state.terms[term])
+        for cause, (term, share) in BUILT_CAUSES.items()
+        if term in state.terms
+    }
+    parts = model_parts(tube=tube, state=state) | built
     angle, lumped = np.log(state.reynolds), np.zeros(state.k.shape)
     for each in tube.model_errors:
         if each.cause not in parts:
@@ -196,7 +198,9 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error
     if "decree" in terms:
-        terms["decree"] = terms["decree"] + _limited(lumped, _LARGEST_ERROR * state.k)
+        # Below the largest error, and unchanged while it is small against that.
+        largest = _LARGEST_ERROR * state.k
+        terms["decree"] = terms["decree"] + lumped * (1 + (lumped / largest) ** 4) ** -0.25
     return _still_a_loss(state, replace(state, terms=terms, bends=bends))
 
 
@@ -209,21 +213,6 @@ def _still_a_loss(right: TubeState, wrong: TubeState) -> TubeState:
     terms = {name: right.terms[name] + part * (wrong.terms[name] - right.terms[name]) for name in right.terms}
     bends = tuple(one + part * (other - one) for one, other in zip(right.bends, wrong.bends, strict=True))
     return replace(wrong, terms=terms, bends=bends)
-
-
-def _all_parts(tube: Tube, state: TubeState) -> Mapping[str, FloatArray]:
-    """Half-widths of k by its models, and by what differs in a tube that was built."""
-    built = {
-        cause: share * np.abs(state.terms[term])
-        for cause, (term, share) in BUILT_CAUSES.items()
-        if term in state.terms
-    }
-    return model_parts(tube=tube, state=state) | built
-
-
-def _limited(width: FloatArray, largest: FloatArray) -> FloatArray:
-    """A half-width that stays below another one, and is unchanged while it is small against that."""
-    return np.asarray(width * (1 + (width / largest) ** 4) ** -0.25)
 
 
 def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:

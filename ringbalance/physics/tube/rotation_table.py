@@ -173,13 +173,6 @@ def _smooth_step(x: FloatArray) -> FloatArray:
     return np.asarray(c**3 * (10 - 15 * c + 6 * c**2), dtype=np.float64)
 
 
-def _coordinates(re: FloatArray, rotation: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Kl, b = S/(1 + S) and 1/S; without rotation 1/S is taken as 0, where F = 1 for any S."""
-    turning = np.where(rotation > 0.0, rotation, 1.0)
-    total = np.where(rotation + re > 0.0, rotation + re, 1.0)
-    return rotation * re, rotation / total, np.where(rotation > 0.0, re / turning, 0.0)
-
-
 def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
     """Whether the table of laminar friction ratios holds: Kl <= 1e7 and R <= 1e5."""
     rotation = np.asarray(rotation_reynolds, dtype=np.float64)
@@ -194,16 +187,6 @@ def _carried_on(slow: FloatArray, fast: FloatArray, kl: FloatArray, rotation: Fl
     return np.exp(slow) * growth, np.exp(fast) + more
 
 
-def _status(inside: BoolArray) -> Status:
-    if np.all(inside):
-        return Status()
-    text = (
-        f"outside the table (R Re <= {KL_LIMIT:.0e} and R <= {ROTATION_LIMIT:.0e}), carried on from its "
-        "edge: use a smaller bore or a more viscous liquid, or allow for the wide uncertainty"
-    )
-    return Status(code=StatusCode.OUT_OF_RANGE, text=text)
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Place:
     """Where the two rectangles are looked up: two coordinates in each, and the fast one's weight."""
@@ -215,7 +198,10 @@ class _Place:
 
 
 def _place(re: FloatArray, rotation: FloatArray) -> _Place:
-    kl, share, inverse = _coordinates(re, rotation)
+    kl, turns = rotation * re, rotation > 0.0
+    share = rotation / np.where(rotation + re > 0.0, rotation + re, 1.0)
+    # Without rotation 1/S is taken as 0, where F = 1 for any S.
+    inverse = np.where(turns, re / np.where(turns, rotation, 1.0), 0.0)
     s = share / np.maximum(1 - share, 1e-300)
     return _Place(
         slow=(slow_first(kl), share),
@@ -272,15 +258,18 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
         + _interpolation_uncertainty(table, at.kl, rotation)
     )
     # Both vanish with the excess: without rotation F is 1 exactly.
-    relative = uncertainty_95 * np.minimum((ratio - 1) / 0.05, 1.0) + _unsteady(at.kl, rotation)
-    return Estimate(value=ratio, uncertainty=np.asarray(ratio * relative), status=_status(inside))
-
-
-def _unsteady(kl: FloatArray, rotation: FloatArray) -> FloatArray:
-    """What flow that fluctuates may need beyond the steady solution, relative."""
-    decades = np.log10(np.maximum(kl, _STEADY_KL) / _STEADY_KL)
-    far = rotation > ROTATION_LIMIT
-    return np.asarray(np.where(far, _OUTSIDE, np.minimum(_UNSTEADY * decades, _OUTSIDE)), dtype=np.float64)
+    relative = uncertainty_95 * np.minimum((ratio - 1) / 0.05, 1.0)
+    # Flow that fluctuates may need more than the steady solution.
+    decades = np.log10(np.maximum(at.kl, _STEADY_KL) / _STEADY_KL)
+    relative += np.where(rotation > ROTATION_LIMIT, _OUTSIDE, np.minimum(_UNSTEADY * decades, _OUTSIDE))
+    status = Status()
+    if not np.all(inside):
+        text = (
+            f"outside the table (R Re <= {KL_LIMIT:.0e} and R <= {ROTATION_LIMIT:.0e}), carried on from its "
+            "edge: use a smaller bore or a more viscous liquid, or allow for the wide uncertainty"
+        )
+        status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
+    return Estimate(value=ratio, uncertainty=np.asarray(ratio * relative), status=status)
 
 
 def _interpolation_uncertainty(table: _FrictionTable, kl: FloatArray, rotation: FloatArray) -> FloatArray:

@@ -73,7 +73,7 @@ class ChamberTable:
 
     @property
     def volume(self) -> float:
-        """Of the whole chamber, m^3."""
+        """Volume of the whole chamber, m^3."""
         return float(self.columns[0, 0])
 
     def at(self, levels: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -299,7 +299,7 @@ def tilted_liquid(
 
 
 def _deep(table: ChamberTable, fills: FloatArray, length: float) -> BoolArray:
-    """Whether liquid that leaves a part of the outer wall dry without gravity is deeper than G."""
+    """True where liquid that leaves a part of the outer wall dry without gravity is deeper than G."""
     level = table.level_of(fills * table.volume)
     return np.asarray((level > table.wall_start) & (np.sqrt(table.nodes[-1]) - np.sqrt(level) > length))
 

@@ -62,7 +62,7 @@ class _DrawingError:
     """Expanded uncertainties (95 %) by facets and table, along the fills."""
 
     volume: float
-    """Of the whole chamber, m^3."""
+    """Volume of the whole chamber, m^3."""
     moment: FloatArray
     """First moment along x, m^4."""
     centroid: FloatArray
@@ -118,7 +118,7 @@ def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray
 
 
 def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatArray:
-    """Of h delta, by which a wall stands off a facet; quadratic ones with straight edges count as flat."""
+    """Share of h delta by which a wall stands off a facet; quadratic ones of straight edges are flat."""
     if facets.shape[1] == corners:
         return np.full(len(facets), _FLAT)
     at = geometry.points[facets[:, : 2 * corners]]

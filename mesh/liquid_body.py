@@ -142,7 +142,7 @@ def _jacobians(body: Tetrahedra) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True)
 class _Cuts:
-    """Where edges cross the surface, for every cell and edge."""
+    """Points at which edges cross the surface, for every cell and edge."""
 
     number: IntArray
     """Of the new node, shape (cells, 6); -1 where the edge does not cross."""

@@ -126,7 +126,7 @@ def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
 
 
 def lonely(cells: IntArray, size: int) -> BoolArray:
-    """Whether each face of each cell belongs to that cell alone, shape (cells, 4)."""
+    """True for each face that belongs to one cell alone, shape (cells, 4)."""
     return np.asarray(repeats(key_of(cells[:, FACES], size)) == 1)
 
 
@@ -181,7 +181,7 @@ def _named_faces(geometry: ChamberGeometry, cells: IntArray, corners: int) -> In
 
 
 def compacted(body: Tetrahedra) -> Tetrahedra:
-    """The same without nodes that no cell has."""
+    """Body without nodes that no cell has."""
     used, numbers = np.unique(body.cells, return_inverse=True)
     cells = numbers.reshape(body.cells.shape)
     return Tetrahedra(nodes=body.nodes[used], cells=cells, faces=body.faces, names=body.names)

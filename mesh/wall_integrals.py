@@ -276,7 +276,7 @@ _BATCH: Final = 4000
 
 
 def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray) -> FloatArray:
-    """Of patches that a surface crosses, each with its level."""
+    """Integrals over patches that a surface crosses, each with its level."""
     total = np.zeros((2 * COLUMNS, levels.size))
     patches, outer = walls.patches[patch], walls.outer[patch]
     excess = walls.level[patch]
@@ -313,12 +313,12 @@ def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray
 
 
 def _size(walls: Walls) -> float:
-    """Of the chamber's volume, about."""
+    """Approximate size of the chamber's volume."""
     return float((np.abs(walls.samples[4]).sum(axis=1) * walls.highest).sum())
 
 
 def _turned(values: FloatArray) -> FloatArray:
-    """The same polynomials of v and 1 - u, which keeps the direction of X_u x X_v."""
+    """Polynomials in v and 1 - u, which keeps the direction of X_u x X_v."""
     size = values.shape[1]
     mirrored = np.tensordot(values, _mirror(size - 1), axes=(1, 1))
     return np.moveaxis(mirrored, -1, 1).swapaxes(1, 2)
@@ -340,7 +340,7 @@ def _steepness(bounds: FloatArray) -> FloatArray:
 def _over_graphs(
     patches: FloatArray, outer: BoolArray, excess: FloatArray, slope: float, level: FloatArray
 ) -> FloatArray:
-    """Of patches on which h grows or falls along every line of u, shape (8, n)."""
+    """Integrals over patches on which h grows or falls along every line of u, shape (8, n)."""
     ends = np.sort(np.stack([_root(excess[:, 0]), _root(excess.sum(axis=1))], axis=1), axis=1)
     breaks = np.concatenate([np.zeros((len(ends), 1)), ends, np.ones((len(ends), 1))], axis=1)
     row, part = np.nonzero(np.diff(breaks, axis=1) > 0)
@@ -360,7 +360,7 @@ def _over_graphs(
 
 
 def _root(powers: FloatArray) -> FloatArray:
-    """Where a polynomial on [0, 1] changes its sign, once at most, shape (...); 0 where it does not."""
+    """Point of [0, 1] at which a polynomial changes its sign, once at most, shape (...); 0 without one."""
     first, last = powers[..., 0], powers.sum(axis=-1)
     changes = first * last < 0
     p = powers[changes] * np.where(last[changes] > 0, 1.0, -1.0)[:, None]

@@ -21,7 +21,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 
 
 class GridVerdict(StrEnum):
-    """What the sequence of values looks like."""
+    """Kind of the sequence of values."""
 
     MONOTONE = "monotone"
     OSCILLATORY = "oscillatory"
@@ -105,7 +105,7 @@ def _check(phi: FloatArray, h: FloatArray, formal_order: float) -> None:
 
 
 def _is_noise(phi: FloatArray, h: FloatArray, formal_order: float, noise: float) -> bool:
-    """Whether the last change is rounding, and no accident of errors that cross zero on the finest meshes."""
+    """True when the last change is rounding, not errors that cross zero by accident on the finest meshes."""
     first, second = np.abs(np.diff(phi[:3]))
     foretold = second / ((h[2] / h[1]) ** formal_order - 1) / (h[1] / h[0]) ** formal_order
     return bool(first <= noise and foretold <= 10 * noise)

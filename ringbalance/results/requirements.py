@@ -72,7 +72,7 @@ class Proportion:
 
 @dataclass(frozen=True, kw_only=True)
 class Paired:
-    """How many devices meet something under the first of two, the second, both or neither."""
+    """Numbers of devices that meet something under the first of two, the second, both or neither."""
 
     both: int
     first_alone: int

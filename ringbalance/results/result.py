@@ -77,11 +77,11 @@ class _TermUsed(Protocol):
 
     @property
     def model(self) -> str:
-        """What stands for it."""
+        """Model of the term."""
 
     @property
     def why(self) -> str:
-        """How the contribution was estimated."""
+        """Basis of the estimated contribution."""
 
     @property
     def estimated_contribution(self) -> float | None:

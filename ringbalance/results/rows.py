@@ -65,7 +65,7 @@ class Quantity:
 
     @property
     def width(self) -> Width:
-        """What lies between the value and both ends; None without an interval."""
+        """Distances of both ends from the value; None without an interval."""
         if self.value is None or (self.lower is None and self.upper is None):
             return None
         below = math.inf if self.lower is None else self.value - self.lower
@@ -125,7 +125,7 @@ class Finding:
 
     @property
     def severity(self) -> Severity:
-        """Of the code."""
+        """Severity of the code."""
         return sentences()[self.code].severity
 
     @property
@@ -162,7 +162,7 @@ def text_of(code: str, **values: Value) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class _Sentence:
-    """What stands in `sentences.toml` under a code."""
+    """Entry of `sentences.toml` under a code."""
 
     severity: Severity
     text: str

@@ -121,7 +121,7 @@ def rechecked(scene: AnyScene) -> AnyScene:
 
 
 def checked_scene(scene: SceneFile) -> AnyScene:
-    """The same scene, when its values are those that were checked as it was read or changed.
+    """Refuse a scene whose values are not those that were checked as it was read or changed.
 
     Raises: SceneError: a record that was made or changed in another way, with each value that differs.
     Raises: TypeError: no scene.
@@ -218,7 +218,7 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
 
 
 def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None:
-    """Of a changed value; what stood there was said of the value before."""
+    """Note the origin of a changed value in place of that of the value before."""
     before = table.pop(ORIGIN, {})
     stated = (
         {name: each for name, each in before.items() if name != key} if isinstance(before, Mapping) else {}

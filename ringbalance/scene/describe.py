@@ -99,7 +99,7 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_SceneLine]:
 
 
 def _line_at(path: str) -> _SceneLine:
-    """How a value of any kind of scene is described; by its path where its declaration has no name for it."""
+    """Description of a value of any kind of scene; by its path where its declaration has no name for it."""
     if path in _LINES:
         return _LINES[path]
     table, _, key = path.split("[")[0].partition(".")

@@ -127,7 +127,7 @@ def _taken(value: Any, rows: IntArray) -> Any:
 
 
 def _alike(first: Any, second: Any) -> bool:
-    """Whether two records differ in numbers alone."""
+    """True for two records that differ in numbers alone."""
     if first is second or (isinstance(first, _NUMBERS) and isinstance(second, _NUMBERS)):
         return True
     if type(first) is not type(second):

@@ -30,7 +30,7 @@ _NOISE: Final = 3
 
 
 def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
-    """Where an input lies in its distribution, in (0, 1), of devices by number."""
+    """Quantile of an input in its distribution, in (0, 1), for devices by number."""
     wanted = np.asarray(numbers, dtype=np.int64)
     block, place = np.divmod(wanted, BLOCK)
     drawn = np.empty(wanted.size)
@@ -41,7 +41,7 @@ def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
 
 
 def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
-    """The same of a standard normal distribution."""
+    """Standard normal deviates of an input, for devices by number."""
     return np.asarray(ndtri(quantiles(name, numbers, seed=seed)))
 
 

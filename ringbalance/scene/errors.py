@@ -157,7 +157,7 @@ class Uncertainty:
 
     @property
     def is_model(self) -> bool:
-        """Whether it is an error of a model and not of an input."""
+        """True for an error of a model, false for one of an input."""
         return self.name.startswith(MODEL)
 
     def deviation(self, quantile: Any) -> Any:

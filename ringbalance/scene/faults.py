@@ -99,5 +99,5 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def meant_text(name: str) -> str:
-    """The same of a word that is known to be meant; empty for none."""
+    """' (did you mean "x"?)' for a word that is meant; empty for none."""
     return f' (did you mean "{name}"?)' if name else ""

@@ -53,7 +53,7 @@ _DIMENSIONS = {"mm": "length", "um": "length", "deg": "angle", "kPa": "pressure"
 
 @dataclass(frozen=True, kw_only=True)
 class Contradiction:
-    """What is wrong with a combination of values."""
+    """Error in a combination of values."""
 
     problem: str
     allowed: str
@@ -103,7 +103,7 @@ def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[
 def reader_of(
     schema: Schema, checks: tuple[Check, ...]
 ) -> Callable[..., tuple[SceneReading, tuple[Fault, ...]]]:
-    """How a kind of scene is read that consists of its keys and rules alone; see `SceneKind.read`."""
+    """Reader of a kind of scene that consists of its keys and rules alone; see `SceneKind.read`."""
 
     def read(
         document: Mapping[str, Any], *, file: str, before: Mapping[str, TableRead], **_: object

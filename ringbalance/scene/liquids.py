@@ -71,7 +71,7 @@ class KnownLiquid:
         return first if len(self.temperatures) == 1 else f"{first} to {last}"
 
     def holds(self, temperature: float) -> bool:
-        """Whether there are data for a temperature (K), plus or minus 0.01 K."""
+        """True when there are data for a temperature (K), plus or minus 0.01 K."""
         low, high = self.temperatures[0], self.temperatures[-1]
         return low - _SAME_TEMPERATURE <= temperature <= high + _SAME_TEMPERATURE
 

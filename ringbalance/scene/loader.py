@@ -111,7 +111,7 @@ def scene_of(
 def nameless_scene(
     document: Mapping[str, Any], *, file: str, derived: Mapping[str, Any], before: CheckedValues
 ) -> AnyScene:
-    """As `scene_of`, without names, hashes and origins: several times faster."""
+    """Make a scene as `scene_of` does, without names, hashes and origins: several times faster."""
     reading = _checked_reading(document, file=file, folder=before.folder, derived=derived, before=before)
     names = dict.fromkeys(("name", "source", "sha256"), "")
     scene: AnyScene = reading.schema.scene(**_records(reading, before), **names, file=file)
@@ -136,7 +136,7 @@ def _checked_reading(
 
 
 def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, Any]:
-    """What results depend on: tolerance, uncertainties, and a record of each table.
+    """Values that results depend on: tolerance, uncertainties, and a record of each table.
 
     A record's fields are named after keys, and an absent key is the default or None.  One with the values of
     `before` is that record itself, so that comparing thousands of scenes costs little.

@@ -15,7 +15,7 @@ Kind = TypeVar("Kind", bound=SceneFile)
 
 
 def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
-    """The same scene, when it is of that kind. Raises: SceneError: it has another balancer."""
+    """Narrow a scene to a kind. Raises: SceneError: it has another balancer."""
     if isinstance(scene, kind):
         return scene
     fault = Fault(
@@ -29,7 +29,7 @@ def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
 
 
 def liquid_ring_scene(scene: SceneFile) -> Scene:
-    """The same scene, when its balancer is a liquid ring. Raises: SceneError: it has another."""
+    """Narrow a scene to one of a liquid ring. Raises: SceneError: it has another balancer."""
     return scene_as(Scene, scene)
 
 

@@ -115,7 +115,7 @@ class InputUncertainty:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CheckedValues:
-    """What was read and checked: a record that differs was changed without a check."""
+    """Values as they were read and checked: a record that differs was changed without a check."""
 
     document: Mapping[str, Any]
     """Of the scene file, as TOML has it."""

@@ -40,7 +40,7 @@ def balancers() -> tuple[str, ...]:
 
 
 def registered(part: Part, name: str) -> Any:
-    """What was registered under a name. Raises: KeyError: nothing was."""
+    """Object registered under a name. Raises: KeyError: nothing was."""
     return imported(_PLACES[part, name])
 
 

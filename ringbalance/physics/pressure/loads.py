@@ -173,7 +173,7 @@ def _mean(wall: BoundarySide, nodal: FloatArray) -> float:
 
 
 def _load(wall: BoundarySide, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
-    """With a doubt of the pressure by the walls' facets, Pa."""
+    """Load on a wall, with a doubt of the pressure by the walls' facets, Pa."""
     force, still = ((wall.area * wall.at_points(values)).sum(axis=(1, 2)) for values in (nodal, exact))
     area = float(wall.weights.sum())
     return _BoundaryLoad(

@@ -154,7 +154,7 @@ def refined_surface(radius: FloatArray) -> FloatArray:
 
 
 def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid) -> float:
-    """How far the flux through the free surface is from the force on it, root mean square, relative.
+    """Difference of the flux through the free surface from the force on it, root mean square, relative.
 
     |n.grad p - rho (omega^2 r + g).n| / |rho (omega^2 r + g).n| over the surface.
     """

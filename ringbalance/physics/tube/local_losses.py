@@ -214,7 +214,7 @@ def entrance_uncertainty(
 def exit_loss(
     *, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0, friction_ratio: npt.ArrayLike = 1.0
 ) -> FloatArray:
-    """What a laminar exit adds to the "+1": alpha - 1 + K_exit, as the stream carries alpha u^2/2 away.
+    """Addition of a laminar exit to the "+1": alpha - 1 + K_exit, as the stream carries alpha u^2/2 away.
 
     Turbulent it is zero, because there the "+1" is the whole exit loss.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
@@ -316,7 +316,7 @@ def _broadcast(
 
 
 def _laminar_excess(bend: Bend, bore: float, re: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What a laminar bend at rest adds to the friction of its arc, and s, its curvature as a rotation."""
+    """Addition of a laminar bend at rest to the friction of its arc, and s, its curvature as a rotation."""
     tight = bore / (2 * bend.radius)
     dean, shift = re * np.sqrt(tight), MOMENTUM_FACTOR * re * tight
     shape = bend.angle / (math.pi / 2) * np.sqrt(tight) / 0.5
@@ -342,7 +342,7 @@ def _turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayL
 
 
 def bend_in_range(*, bend: Bend, bore: npt.ArrayLike) -> BoolArray:
-    """Whether a bend lies within the formula's range: an angle up to 180 degrees and r/d of at least 0.5."""
+    """True for a bend within the formula's range: an angle up to 180 degrees and r/d of at least 0.5."""
     return np.asarray((bend.angle <= math.pi * (1 + 1e-9)) & (bend.radius >= np.asarray(bore) / 2))
 
 

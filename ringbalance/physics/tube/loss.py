@@ -221,7 +221,7 @@ def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:
 
 
 def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:
-    """What laminar flow that is still developing may add to k."""
+    """Largest addition to k by laminar flow that is still developing."""
     laminar = 1 - turbulent_share(reynolds=state.reynolds, critical_ratio=state.critical_ratio)
     developing = developing_length(
         reynolds=state.reynolds, rotation_reynolds=state.rotation_reynolds, friction_ratio=friction_ratio

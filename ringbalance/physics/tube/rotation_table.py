@@ -174,7 +174,7 @@ def _smooth_step(x: FloatArray) -> FloatArray:
 
 
 def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> BoolArray:
-    """Whether the table of laminar friction ratios holds: Kl <= 1e7 and R <= 1e5."""
+    """True where the table of laminar friction ratios holds: Kl <= 1e7 and R <= 1e5."""
     rotation = np.asarray(rotation_reynolds, dtype=np.float64)
     kl = rotation * np.asarray(reynolds, dtype=np.float64)
     return np.asarray((kl <= KL_LIMIT) & (rotation <= ROTATION_LIMIT))
@@ -189,7 +189,7 @@ def _carried_on(slow: FloatArray, fast: FloatArray, kl: FloatArray, rotation: Fl
 
 @dataclass(frozen=True, kw_only=True)
 class _Place:
-    """Where the two rectangles are looked up: two coordinates in each, and the fast one's weight."""
+    """Point at which the two rectangles are looked up: two coordinates in each, and the fast one's weight."""
 
     slow: tuple[FloatArray, FloatArray]
     fast: tuple[FloatArray, FloatArray]

@@ -44,7 +44,7 @@ class Mark:
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """What a mesh file holds; kinds of elements and orders of nodes are meshio's."""
+    """Content of a mesh file; kinds of elements and orders of nodes are meshio's."""
 
     points: FloatArray
     """In the file's unit, shape (nodes, 3)."""
@@ -94,7 +94,7 @@ class Body:
         return self.cells[:, : CORNERS[self.kind]]
 
     def at(self, nodes: IntArray) -> str:
-        """Where some nodes lie, or the middles of entities that are given as rows of nodes, for a message."""
+        """Coordinates of nodes, or of the middles of rows of nodes, for a message."""
         places = self.points[nodes[:_MOST_SHOWN]]
         middles = places.mean(axis=1) if places.ndim == 3 else places
         few = ", ".join(f"({x:.4g}, {y:.4g}, {z:.4g}) mm" for x, y, z in (1e3 * middles).tolist())

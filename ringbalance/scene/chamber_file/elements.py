@@ -58,7 +58,7 @@ MOST_NODES: Final = 2_000_000
 
 
 def dimension(kind: str) -> int:
-    """Of an element of a kind: 0 for a point to 3 for a cell."""
+    """Dimension of an element of a kind: 0 for a point to 3 for a cell."""
     lower = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
     return next((count for name, count in lower.items() if kind.startswith(name)), 3)
 
@@ -140,7 +140,7 @@ def _lattice(kind: str) -> FloatArray:
 
 
 def corners_of(kind: str) -> int:
-    """Of one facet of a kind of cells."""
+    """Number of corners of one facet of a kind of cells."""
     return 3 if CORNERS[kind] == 4 else 4
 
 
@@ -164,7 +164,7 @@ def key_of(corners: IntArray, nodes: int) -> IntArray:
 
 
 def repeats(keys: IntArray) -> IntArray:
-    """How often each number stands among all, the shape of `keys`."""
+    """Count of each number among all, in the shape of `keys`."""
     _, place, counts = np.unique(keys, return_inverse=True, return_counts=True)
     return np.asarray(counts[place].reshape(keys.shape))
 

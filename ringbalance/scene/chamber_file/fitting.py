@@ -170,7 +170,7 @@ _FRAME: Final = [0, 1, 2, -1]
 def unfitting(
     reading: SceneReading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
 ) -> Iterator[Contradiction]:
-    """What does not fit between the mesh and other keys of the scene."""
+    """Contradictions between the mesh and other keys of the scene."""
     extent = found.dimensions["central_angle"]
     if reading.lacks("disc.chambers") and even_number_of_chambers(extent) is None:
         problem = f"chambers is needed: the mesh takes {written(extent, 'deg')}, no even part of 360 deg"

@@ -136,7 +136,7 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
 
 
 def _is_step(path: Path) -> bool:
-    """Whether a file is a solid that is yet to be meshed, and has its own unit."""
+    """True for a file of a solid, which is yet to be meshed and has its own unit."""
     return path.suffix.lower() in _STEP_ENDINGS
 
 

@@ -253,7 +253,7 @@ _SKIPPED: Final = re.compile(r"(surface|line|volume)\d+|_.*|", re.IGNORECASE)
 
 @dataclass
 class _MeshContent:
-    """What was read so far; names in small letters."""
+    """Content read so far; names in small letters."""
 
     nodes: list[FloatArray] = field(default_factory=list)
     """Rows of number and coordinates."""
@@ -372,7 +372,7 @@ def _table(data: list[str], width: int, what: str) -> FloatArray:
 
 
 def _whole(values: FloatArray, what: str) -> IntArray:
-    """The same numbers as integers. Raises: MeshFileError: one of them is none."""
+    """Convert numbers to integers. Raises: MeshFileError: one of them is none."""
     with np.errstate(invalid="ignore"):
         numbers = values.astype(np.int64)
     if not ((numbers == values) & (np.abs(values) < 2**53)).all():

@@ -73,7 +73,7 @@ class Facets:
         )
 
     def findings(self, body: Body) -> Iterator[Contradiction]:
-        """What is wrong with how cells hang together."""
+        """Errors in the way cells hang together."""
         ordered = np.sort(body.cells, axis=1)
         twice = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
         yield from _about(body, "cells have a node twice", body.corners[twice], "cells with different nodes")
@@ -162,7 +162,7 @@ def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> 
 
 
 def _inside(at: FloatArray, one: FloatArray, two: FloatArray) -> BoolArray:
-    """Whether places, seen from a corner, lie on the triangles of two sides, away from their corners."""
+    """True for places that, from a corner, lie on the triangles of two sides, away from their corners."""
     normal = np.cross(one, two)
     area = np.maximum((normal**2).sum(axis=1), 1e-300)
     height = np.abs((at * normal).sum(axis=1)) / np.sqrt(area)
@@ -292,7 +292,7 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
 
 
 def _places(body: Body, facets: Facets, named: NamedFacets, keys: IntArray) -> tuple[IntArray, BoolArray]:
-    """Where named facets stand among sorted keys, and which of them do."""
+    """Indices of named facets among sorted keys, and which facets have one."""
     corners = named.corners
     wanted = key_of(corners, len(body.points))
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)

@@ -25,7 +25,7 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True, kw_only=True)
 class Presence:
-    """What a key means and how it may be absent."""
+    """Meaning of a key, and the rule when it is absent."""
 
     kind: Literal["needed", "standard", "derived", "unused"]
     """Always needed; with a default value; following from other keys; or leaving out a term."""
@@ -91,7 +91,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Shown:
-    """How a field is described to people."""
+    """Description of a field for a reader."""
 
     name: str
     """Such as "outer radius R2"."""

@@ -23,7 +23,7 @@ LEAST_CHAMBERS = 4
 
 @dataclass(frozen=True, kw_only=True)
 class ValueReader:
-    """How the values of one key are read."""
+    """Reader of the values of one key."""
 
     read: Callable[[object], Any]
     """TOML value to SI; raises FieldError."""
@@ -49,7 +49,7 @@ class Bounds:
     """Exclusive."""
 
     def holds(self, value: float) -> bool:
-        """Whether a value, in the unit of the bounds, lies inside."""
+        """True for a value, in the unit of the bounds, that lies inside."""
         return (
             (self.above is None or value > self.above)
             and (self.at_least is None or value >= self.at_least)

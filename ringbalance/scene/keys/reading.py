@@ -45,7 +45,7 @@ class TableRead:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneReading:
-    """What is known of a scene file so far; paths are "table.key", or "key" at the top level."""
+    """Content of a scene file as read so far; paths are "table.key", or "key" at the top level."""
 
     file: str
     """As it was named, for messages."""
@@ -71,20 +71,20 @@ class SceneReading:
         return replace(self.adding(values), derived=self.derived | frozenset(values))
 
     def given(self, path: str) -> bool:
-        """Whether the file itself has a value at a path, readable or not."""
+        """True when the file itself has a value at a path, readable or not."""
         table, _, key = path.rpartition(".")
         return key in self._table(table)
 
     def known(self, *paths: str) -> bool:
-        """Whether there is a value for each path, read or by default."""
+        """True when there is a value for each path, read or by default."""
         return all(path in self.values for path in paths)
 
     def lacks(self, path: str) -> bool:
-        """Whether a value is missing, rather than present but unreadable."""
+        """True when a value is missing, rather than present but unreadable."""
         return path not in self.values and not {path, path.rpartition(".")[0]} & self.broken
 
     def allowed(self, path: str) -> str:
-        """What a key takes, for messages."""
+        """Values that a key takes, for messages."""
         return self.schema.key_at(tuple(path.split("."))).takes.allowed
 
     def fault(self, path: str, *, problem: str, allowed: str) -> Fault:
@@ -151,7 +151,7 @@ class SceneReading:
 def read_document(
     document: Mapping[str, Any], *, file: str, schema: Schema, before: Mapping[str, TableRead] | None = None
 ) -> tuple[SceneReading, tuple[Fault, ...]]:
-    """What could be read of a TOML document, and an error for each value, key or table that could not.
+    """Read a TOML document: its values, and an error for each value, key or table that could not.
 
     Args: `before`: tables of another document that this one was made from.
     """
@@ -288,7 +288,7 @@ def _key_text(keys: Place) -> str:
 
 
 def _unknown(rejected: _Rejected, schema: Schema, meant: str) -> tuple[str, str]:
-    """What is said of an unknown key or table, and the names that are known there."""
+    """Message on an unknown key or table, and the names that are allowed there."""
     place = rejected.place
     whole = len(place) == 1 and isinstance(rejected.content, Mapping)
     kind, known = ("table", list(schema.tables)) if whole else ("key", schema.names_at(place[:-1]))

@@ -60,7 +60,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def in_place(function: Callable[P, R]) -> Callable[P, R]:
-    """The same, of a function that makes no array, so that it need not count references to those it is given.
+    """Compile a function that makes no array, so that it counts no references to its arguments.
 
     A seventh of the time of a short function goes into such counts, each safe against other threads.
     """
@@ -68,7 +68,7 @@ def in_place(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """As `in_place`, within each compiled function that calls it: what that does not use costs nothing."""
+    """Compile as `in_place` does, within each compiled function that calls it; unused results cost nothing."""
     return _dispatcher(function, _nrt=False, forceinline=True)
 
 
@@ -104,7 +104,7 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
 
 
 def _calls_python(function: Callable[..., Any]) -> bool:
-    """Whether the result may hold an array or a named tuple, as far as the annotation tells."""
+    """True when, by the annotation, the result may hold an array or a named tuple."""
     told = str(function.__annotations__.get("return", "unknown"))
     return not set(re.findall(r"\w+", told)) <= _PLAIN
 

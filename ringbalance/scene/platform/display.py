@@ -20,7 +20,7 @@ _FORMAT: Final = "%(asctime)s %(levelname)s %(message)s"
 
 @dataclass(frozen=True, kw_only=True)
 class _Display:
-    """How much of a result and of the work is shown."""
+    """Extent to which a result and the work are shown."""
 
     brief: bool = False
     """About five lines in place of a result's tables."""
@@ -44,12 +44,12 @@ _DISPLAY: Final[ContextVar[_Display]] = ContextVar("display")
 
 
 def display() -> _Display:
-    """What holds for the command line that is running; all is shown outside one."""
+    """Display of the command line that is running; all is shown outside one."""
     return _DISPLAY.get(_Display())
 
 
 class Progress(Protocol):
-    """What a command does at present, as it is shown."""
+    """Present activity of a command, as it is shown."""
 
     text: str
 

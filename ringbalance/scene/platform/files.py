@@ -196,7 +196,7 @@ def _folder(folder: Path, files: Sequence[str], folders: Sequence[str]) -> Path:
 
 @contextmanager
 def _refused(path: Path) -> Iterator[None]:
-    """What the machine refuses, reported with the path that the user gave."""
+    """Report what the machine refuses with the path that the user gave."""
     try:
         yield
     except OSError as error:

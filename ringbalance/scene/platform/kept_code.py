@@ -75,7 +75,7 @@ def write_checked(path: Path, content: bytes) -> None:
 
 @cache
 def trusted(folder: Path) -> bool:
-    """Whether what a folder holds may be used: nobody else can have written it.
+    """True for a folder whose content may be used: nobody else can have written it.
 
     A folder of this user's that others may write is made private first. Otherwise that is said once.
     """

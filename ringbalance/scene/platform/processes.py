@@ -79,7 +79,7 @@ class Workers(ProcessPoolExecutor):
         return future
 
     def result(self, future: Future[_R], again: Callable[[], _R]) -> _R:
-        """What a worker returned, or, when the system ended it, what this process finds itself.
+        """Result of a worker, or, when the system ended it, what this process finds itself.
 
         A worker that was killed for memory leaves this process more of it, and one process at a time needs
         less than several side by side; a report is not lost for it.
@@ -174,7 +174,7 @@ def end_with(gone: Callable[[], object]) -> None:
 
 
 def _begin() -> None:
-    """What a worker does first."""
+    """Prepare a worker."""
     gc.set_threshold(*COLLECTED_AT)
     parent = parent_process()
     if parent is not None:

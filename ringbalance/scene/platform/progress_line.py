@@ -52,7 +52,7 @@ def _text(how_far: tuple[object, ...]) -> str:
 
 
 def _notebook_line() -> Callable[..., Any] | None:
-    """What replaces a line in the output of a cell; None outside a notebook."""
+    """Line that replaces one in the output of a cell; None outside a notebook."""
     ipython = sys.modules.get("IPython")
     if ipython is None or not hasattr(ipython.get_ipython(), "kernel"):
         return None

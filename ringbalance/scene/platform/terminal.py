@@ -81,7 +81,7 @@ def print_error(text: str) -> None:
 
 
 class Activity:
-    """What a command is doing at present; lives inside one `activity`.
+    """Present activity of a command; lives inside one `activity`.
 
     Args: `text`: what it does first. `bar`: the display on a terminal.
     """

@@ -46,7 +46,7 @@ _Said = tuple[str, str] | None
 
 
 def _name(reading: SceneReading, each: FittedQuantity, before: list[str]) -> _Said:
-    """Whether the scene has such an uncertain quantity, once."""
+    """Error when the scene has no such uncertain quantity, or has it twice."""
     if each.quantity in before:
         return "it stands there twice", "each quantity once"
     match = ERROR_NAME.fullmatch(each.quantity)

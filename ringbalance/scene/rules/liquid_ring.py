@@ -41,7 +41,7 @@ def _read(
 
 
 def _shortest_length(reading: SceneReading) -> Mapping[str, float]:
-    """With a given k the length matters for the liquid's inertia only: that of the shortest tube is used."""
+    """Length of the shortest tube: with a given k it matters for the liquid's inertia only."""
     hump_settled = reading.known("tube.hump_radius") or reading.lacks("tube.hump_radius")
     settled = reading.known("tube.drag_coefficient", "tube.port_radius") and hump_settled
     if not settled or not reading.lacks("tube.length"):

@@ -243,7 +243,7 @@ def _length_holds_bends(length: float, bends: tuple[Bend, ...]) -> Contradiction
 def _length_reaches_over_crest(
     length: float, angle: float, port: float, crest: float
 ) -> Contradiction | None:
-    """As `_length_reaches`, over the crest."""
+    """Check that the tube's length reaches over the crest."""
     return _length_reaches(length, angle, port, crest)
 
 
@@ -283,7 +283,7 @@ _NO_PATH = (_port_in_chamber, _crest_in_disc, _crest_inside_port)
 
 
 def _drawn(reading: SceneReading) -> bool:
-    """Whether the keys give the chamber; a mesh is looked at itself."""
+    """True when keys give the chamber; a mesh has checks of its own."""
     return not reading.known("disc.geometry")
 
 

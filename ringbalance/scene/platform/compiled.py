@@ -68,7 +68,7 @@ def in_place(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile as `in_place` does, within each compiled function that calls it; unused results cost nothing."""
+    """Compile as `in_place` does, in each compiled function that calls it: unused results cost nothing."""
     return _dispatcher(function, _nrt=False, forceinline=True)
 
 

@@ -87,9 +87,9 @@ def _longer(balancer: Balancer) -> Record:
     return _watched(longer, LONGER)
 
 
-def choice_records(balancer: Balancer) -> list[Record]:
-    """What can be bought for a scene that leaves it open, and what each makes of it."""
-    return [each.document() for each in tried_choices(balancer, search=_coarsely)]
+def choice_records(balancer: Balancer, some: slice) -> list[Record]:
+    """Some of what can be bought for a scene that leaves it open, and what each makes of it."""
+    return [each.document() for each in tried_choices(balancer, search=_coarsely, some=some)]
 
 
 def _coarsely(balancer: Balancer) -> Settings:

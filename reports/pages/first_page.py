@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -97,11 +98,11 @@ def _tuning(work: Work) -> Record:
     }
 
 
-def _choices(_work: Work, tuning: Record) -> list[Record]:
-    return choice_records(LiquidRingBalancer(tuning["scene"]))
+def _choices(some: slice, _work: Work, tuning: Record) -> list[Record]:
+    return choice_records(LiquidRingBalancer(tuning["scene"]), some)
 
 
-def _collect(work: Work, tuning: Record, choices: list[Record], other_reading: Record | None) -> Record:
+def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices: list[Record]) -> Record:
     scene, limit = work.ring, LiquidRingBalancer(work.ring).limit
     shown = ("settings", "gas_pressure_Pa", "recommended_pressure_Pa", "run")
     return {
@@ -110,7 +111,7 @@ def _collect(work: Work, tuning: Record, choices: list[Record], other_reading: R
         **tuning["judged"],
         "noise_open": not scene.sensor.amplitude_noise
         and scene.origin_of("sensor.amplitude_noise") == "default",
-        "choices": choices,
+        "choices": [each for some in choices for each in some],
         **{key: tuning[key] for key in shown},
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
         "requirement": _requirement_record(scene, limit=limit),
@@ -265,8 +266,11 @@ SECTION: Final = Section(
     collect=_collect,
     parts=(
         Job(name="tuning", title="Settings by runs", do=_tuning),
-        Job(name="choices", title="Valves that can be bought", needs=("tuning",), do=_choices),
         Job(name="other_reading", title="The paper’s disc with its other bore", do=_other_reading),
+        *(
+            Job(name=f"valve {n}", needs=("tuning",), do=partial(_choices, slice(n - 1, end)))
+            for n, end in ((1, 1), (2, 2), (3, None))
+        ),
     ),
     show=_view,
     always=True,

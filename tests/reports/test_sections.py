@@ -174,8 +174,9 @@ def test_a_field_is_packed_to_four_digits() -> None:
 def test_the_evidence_of_a_section_is_the_answer_of_its_last_job() -> None:
     work = Work(scene=paper_scene(), level="light")
     jobs = {section.name: section.jobs(work) for section in SECTIONS}
-    assert [job.name for job in jobs["summary"]] == ["tuning", "choices", "other_reading", "summary"]
-    assert jobs["summary"][-1].needs == ("tuning", "choices", "other_reading")
+    parts = ("tuning", "other_reading", "valve 1", "valve 2", "valve 3")
+    assert [job.name for job in jobs["summary"]] == [*parts, "summary"]
+    assert jobs["summary"][-1].needs == parts
     assert [job.name for job in jobs["sloshing"]] == ["sloshing"]
     assert jobs["disc"] == []
     names = [job.name for some in jobs.values() for job in some]

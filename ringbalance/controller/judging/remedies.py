@@ -119,11 +119,16 @@ def tried_remedies(
 
 
 def tried_choices(
-    balancer: Balancer, *, search: Search, along: str = "", told: Told | None = None
+    balancer: Balancer,
+    *,
+    search: Search,
+    along: str = "",
+    told: Told | None = None,
+    some: slice = slice(None),
 ) -> tuple[Remedied, ...]:
-    """What things that can be bought make of a scene that leaves them open."""
+    """Judge a scene that leaves open what can be bought with each of these things. Args: `some`: which."""
     trial = _Trial(balancer=balancer, search=search, along=along, told=told or (lambda _: None), start=FRESH)
-    return tuple(row for each in balancer.choices() if (row := trial.of([each])) is not None)
+    return tuple(row for each in balancer.choices()[some] if (row := trial.of([each])) is not None)
 
 
 def amplitude_reached(judgement: Judgement) -> float | None:

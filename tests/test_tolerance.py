@@ -13,6 +13,7 @@ from ringbalance import cli
 from ringbalance.reduced_model.terms import ModelUsed, models_used
 from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene
 from ringbalance.scene.narrowing import with_tolerance
+from scenes import with_tables
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 COMMANDS = (
@@ -50,7 +51,7 @@ def test_a_tolerance_of_zero_models_everything(paper: Scene) -> None:
     assert by_term(paper)["gravity, mean over a turn"].modelled
     assert by_term(scene)["surface tension"].model == "not modelled in this version"
     # Without gravity there is nothing to model, at any tolerance.
-    weightless = replace(scene, environment=replace(scene.environment, gravity=0.0))
+    weightless = with_tables(scene, environment={"gravity": 0.0})
     assert not by_term(weightless)["gravity, mean over a turn"].modelled
 
 

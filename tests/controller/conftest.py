@@ -22,6 +22,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from scenes import with_tables
 
 Velocity = Callable[[FloatArray, FloatArray, FloatArray, BoolArray], tuple[Any, Any]]
 
@@ -110,7 +111,7 @@ def laws() -> Mapping[str, FunctionLaw]:
 @pytest.fixture(scope="session")
 def scene(paper_scene: models.Scene) -> models.Scene:
     """The paper's disc with an exact sensor, and every number that these tests count on by hand."""
-    return replace(
+    return with_tables(
         paper_scene,
         source="test.toml",
         rotor=loop_models.Rotor(
@@ -121,16 +122,15 @@ def scene(paper_scene: models.Scene) -> models.Scene:
             initial_phase=math.pi / 2,
         ),
         sensor=loop_models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
-        controller=replace(
-            paper_scene.controller,
-            period=0.5,
-            integral_time=48.0,
-            derivative_time=0.06,
-            assumed_lag_angle=math.radians(17),
-            first_trial=0.05,
-            long_step=0.1,
-            short_step=0.004,
-        ),
+        controller={
+            "period": 0.5,
+            "integral_time": 48.0,
+            "derivative_time": 0.06,
+            "assumed_lag_angle": math.radians(17),
+            "first_trial": 0.05,
+            "long_step": 0.1,
+            "short_step": 0.004,
+        },
         run=loop_models.RunSettings(seed=0, time_limit=120.0),
     )
 
@@ -170,7 +170,7 @@ def ring_of(scene: models.Scene) -> Callable[..., LiquidRing]:
     """A disc whose liquid moves by its flow law alone, under a gas pressure."""
 
     def make(model: BalancerModel, *, gas_pressure: float = 0.7e6, chambers: int = 4) -> LiquidRing:
-        under = replace(scene, gas=replace(scene.gas, pressure=gas_pressure))
+        under = with_tables(scene, gas={"pressure": gas_pressure})
         dynamics = dynamics_of(scene=under, model=model, modelled=())
         return LiquidRing(model=model, chambers=chambers, dynamics=dynamics, total=0.5)
 
@@ -199,7 +199,7 @@ def plant(scene: models.Scene) -> Callable[..., Dynamics]:
 
     def make(model: BalancerModel, *terms: str, length: float | None = None, **gas: Any) -> Dynamics:
         tube = replace(scene.tube, length=length or scene.tube.length)
-        own = replace(scene, tube=tube, gas=replace(scene.gas, **gas))
+        own = with_tables(scene, tube=tube, gas=gas)
         return dynamics_of(scene=own, model=model, modelled=terms)
 
     return make

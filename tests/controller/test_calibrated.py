@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from transfers import Drive, adaptive_ode, marched
@@ -18,6 +16,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 
@@ -72,7 +71,7 @@ def test_the_papers_gain_overshoots_on_the_calibrated_tube(
 ) -> None:
     run = simulate(paper_scene, calibrated)
     assert run.overshoots > 2
-    gentle = replace(paper_scene, controller=replace(paper_scene.controller, proportional=0.02e6))
+    gentle = with_tables(paper_scene, controller={"proportional": 0.02e6})
     calm = simulate(gentle, calibrated)
     assert calm.overshoots == 0
 
@@ -80,7 +79,7 @@ def test_the_papers_gain_overshoots_on_the_calibrated_tube(
 def test_too_little_pressure_names_the_priming_threshold(
     paper_scene: Scene, calibrated: BalancerModel
 ) -> None:
-    low = replace(paper_scene, gas=replace(paper_scene.gas, pressure=0.3e6))
+    low = with_tables(paper_scene, gas={"pressure": 0.3e6})
     run = simulate(low, calibrated)
     assert run.outcome is Outcome.STALLED
     # Column from the crest to the free surface at a quarter's fill, rho omega^2 (a^2 - r_m^2)/2, in MPa.
@@ -88,12 +87,7 @@ def test_too_little_pressure_names_the_priming_threshold(
 
 
 def test_a_slow_rotor_siphons_its_correction_away(paper_scene: Scene) -> None:
-    slow = replace(
-        paper_scene,
-        rotor=replace(paper_scene.rotor, speed=314.0),
-        gas=replace(paper_scene.gas, pressure=0.1e6),
-        run=replace(paper_scene.run, time_limit=6.0),
-    )
+    slow = with_tables(paper_scene, rotor={"speed": 314.0}, gas={"pressure": 0.1e6}, run={"time_limit": 6.0})
     run = simulate(slow, calibrate(slow).model)
     assert run.outcome is Outcome.DRIFTING
     assert "run back" in run.status
@@ -102,9 +96,9 @@ def test_a_slow_rotor_siphons_its_correction_away(paper_scene: Scene) -> None:
 def test_devices_differ_in_the_measured_factor_of_the_moment(
     paper_scene: Scene, calibrated: BalancerModel
 ) -> None:
-    measured = replace(
+    measured = with_tables(
         paper_scene,
-        disc=replace(paper_scene.disc, lambda_factor=0.8),
+        disc={"lambda_factor": 0.8},
         uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
     )
     made = devices(measured, calibrated, Spread.of(measured, calibrated), range(64), seed=0)

@@ -21,6 +21,7 @@ from ringbalance.controller.rotor import CommonRotor, one_rotor, rotors_of
 from ringbalance.results.requirements import Paired
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.origins import SceneFile
+from scenes import with_tables
 
 RPM = math.pi / 30
 
@@ -80,15 +81,14 @@ def test_the_scene_made_for_that_rotor_has_it_already(paper_scene: Scene, small:
 
 def test_a_liquid_ring_on_the_eccentric_masses_rotor(paper_scene: Scene, small: EccentricScene) -> None:
     """There and back again; valve-open times per unbalance and wrong assumptions are kept."""
-    wrong = replace(
+    wrong = with_tables(
         paper_scene,
-        controller=replace(
-            paper_scene.controller,
-            assumed_influence_coefficient=1.1 * paper_scene.rotor.influence_coefficient,
-            assumed_lag_angle=paper_scene.rotor.lag_angle + 0.2,
-        ),
+        controller={
+            "assumed_influence_coefficient": 1.1 * paper_scene.rotor.influence_coefficient,
+            "assumed_lag_angle": paper_scene.rotor.lag_angle + 0.2,
+        },
     )
-    other = replace(small, rotor=replace(small.rotor, stiffness=2 * small.rotor.stiffness))
+    other = with_tables(small, rotor={"stiffness": 2 * small.rotor.stiffness})
     told = liquid_ring_scene(moved(wrong, other))
     parameters = PlantParameters.of(other)
     alpha = parameters.influence(small.rotor.speed_profile[0].speed)
@@ -123,7 +123,7 @@ def test_no_ring_at_the_speed_of_the_eccentric_masses(driven: EccentricScene, pa
 
 def _at(driven: EccentricScene, speed: float) -> EccentricScene:
     profile = (SpeedPoint(time=0.0, speed=speed),)
-    return replace(driven, rotor=replace(driven.rotor, speed_profile=profile))
+    return with_tables(driven, rotor={"speed_profile": profile})
 
 
 def test_what_cannot_be_compared(driven: EccentricScene, paper_scene: Scene) -> None:
@@ -132,17 +132,17 @@ def test_what_cannot_be_compared(driven: EccentricScene, paper_scene: Scene) -> 
     with pytest.raises(SceneError, match="does not turn forwards"):
         rotor_of(_at(driven, -10.0))
     with pytest.raises(SceneError, match="never becomes steady"):
-        rotor_of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
+        rotor_of(with_tables(driven, rotor={"damping": 0.0}))
     with pytest.raises(SceneError, match="does not vibrate"):
         compare(
-            balancer_of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0))),
+            balancer_of(with_tables(driven, imbalance={"mass": 0.0})),
             balancer_of(paper_scene),
         )
-    ahead = replace(paper_scene, rotor=replace(paper_scene.rotor, lag_angle=-0.3))
+    ahead = with_tables(paper_scene, rotor={"lag_angle": -0.3})
     with pytest.raises(SceneError, match=r"no bearing of this kind gives a lag of -17\.19 deg"):
         moved(driven, ahead)
-    light = balancer_of(replace(driven, rotor=replace(driven.rotor, mass=0.2))).rotor()
-    heavy = replace(driven, masses=replace(driven.masses, mass=3.0))
+    light = balancer_of(with_tables(driven, rotor={"mass": 0.2})).rotor()
+    heavy = with_tables(driven, masses={"mass": 3.0})
     with pytest.raises(SceneError, match="heavier than the rotor itself"):
         balancer_of(heavy).on_rotor(light)
 
@@ -254,7 +254,7 @@ def test_the_small_masses_balance_the_liquid_rings_rotor_with_every_seed(
 ) -> None:
     """With seed 3 a friction arm is estimated 1.3 % too small: 2.5 of its standard deviations."""
     told = eccentric_scene(moved(small, paper_scene))
-    brief = replace(told, run=replace(told.run, time_limit=12.0))
+    brief = with_tables(told, run={"time_limit": 12.0})
     for seed in range(5):
         run = simulate_eccentric(brief, seed=seed)
         assert run.settled
@@ -267,9 +267,7 @@ def test_the_masses_do_as_well_on_their_own_rotor_as_on_the_same_one_of_a_ring(
 ) -> None:
     """Both rotors are one to the digits of the scene file: the order of a comparison makes no difference."""
     scenes = moved(small, small), moved(small, paper_scene)
-    one, other = (
-        eccentric_scene(replace(scene, run=replace(scene.run, time_limit=10.0))) for scene in scenes
-    )
+    one, other = (eccentric_scene(with_tables(scene, run={"time_limit": 10.0})) for scene in scenes)
     for seed in range(2):
         times = [simulate_eccentric(scene, seed=seed).settling_time for scene in (one, other)]
         assert times[0] == pytest.approx(times[1], rel=0.03)
@@ -287,7 +285,7 @@ def test_the_order_of_ring_and_masses_makes_no_difference(paper_scene: Scene, sm
 
 def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
     """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
-    strong = replace(driven, run=replace(driven.run, time_limit=40.0))
+    strong = with_tables(driven, run={"time_limit": 40.0})
     weak = replace(strong, masses=replace(driven.masses, mass=0.06), source="weak.toml")
     found = compare(under_paper_law(strong), under_paper_law(weak), rotor="first", most=8)
     good, poor = found.sides

@@ -13,6 +13,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports.pages.loop import _loop_gain, _LoopGain
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def gain_of(scene: Scene, model: BalancerModel) -> _LoopGain:
@@ -57,6 +58,6 @@ def test_an_operation_leaves_one_minus_h(scene: Scene, model: BalancerModel, h: 
 
 
 def test_no_flow_no_gain(scene: Scene, model: BalancerModel, laws: Mapping[str, Any]) -> None:
-    weak = replace(scene, gas=replace(scene.gas, pressure=0.0))
+    weak = with_tables(scene, gas={"pressure": 0.0})
     assert _loop_gain(weak, model) is None
     assert gain_of(scene, replace(model, flow=laws["constant"])).velocity_m_s == 5.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 from paper_disc import CREST, VAPOUR, level, pressure
@@ -13,6 +12,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.scene import Scene
+from scenes import with_tables
 
 
 def test_unbalances_and_vibrations_follow_from_the_amplitudes(paper_scene: Scene) -> None:
@@ -50,11 +50,11 @@ def test_a_run_prints_the_sure_speed_first(paper_scene: Scene) -> None:
 
 def test_a_crest_that_only_dissolved_gas_lets_part_is_undecided(paper_scene: Scene) -> None:
     """Between the speeds of vapour and of a cavity halfway to ambient pressure."""
-    slower = replace(paper_scene, rotor=replace(paper_scene.rotor, speed=6000 * math.pi / 30))
+    slower = with_tables(paper_scene, rotor={"speed": 6000 * math.pi / 30})
     held = Holding.of(slower, fill_ratio=0.42)
     assert (held.sure_speed, held.holds) == (None, False)
     assert held.likely_speed == pytest.approx(5090 * math.pi / 30, rel=1e-3)
     assert held.finding is not None
     assert held.finding.code == "crest_undecided"
-    without = replace(paper_scene, tube=replace(paper_scene.tube, hump_radius=None))
+    without = with_tables(paper_scene, tube={"hump_radius": None})
     assert Holding.of(without, fill_ratio=0.4).likely_speed is None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths, nominal_value
+from scenes import with_tables
 
 GAINS = [{"controller.proportional": gain} for gain in (0.02e6, 0.08e6)]
 
@@ -88,7 +88,7 @@ def test_devices_have_the_stated_spread(paper_scene: Scene) -> None:
 
 
 def test_a_scene_may_restrict_the_direction(paper_scene: Scene) -> None:
-    narrow = replace(paper_scene, requirement=replace(paper_scene.requirement, phase_range=0.1))
+    narrow = with_tables(paper_scene, requirement={"phase_range": 0.1})
     model = paper_model(narrow)
     made = devices(narrow, model, Spread.of(narrow, model), range(64), seed=0)
     phases = [each.scene.rotor.initial_phase for each in made]

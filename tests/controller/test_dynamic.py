@@ -24,6 +24,7 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tube.heads import roots_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -36,7 +37,7 @@ def blocked(dynamics: Dynamics) -> Dynamics:
     """The same with a crest that no gas lifts liquid over."""
     law = dynamics.law
     assert isinstance(law, CalibratedLaw)
-    return replace(dynamics, law=replace(law, path=replace(law.path, hump_pressure=1e9)))
+    return replace(dynamics, law=with_tables(law, path={"hump_pressure": 1e9}))
 
 
 # --- the column ---
@@ -83,7 +84,7 @@ def test_the_accelerations_vanish_at_the_laws_velocity(
 def test_the_derivatives_of_the_column_are_those_of_its_acceleration(
     scene: Scene, hump: Any, primed: bool, plant_of: Plant
 ) -> None:
-    own = replace(scene, tube=replace(scene.tube, hump_gas=hump))
+    own = with_tables(scene, tube={"hump_gas": hump})
     known = plant_of(own, calibrate(own).model, "tube inertia").kept_plant(total=0.5)[0]
     random, seen = np.random.default_rng(3), set()
     for _ in range(60):
@@ -135,7 +136,7 @@ def test_a_column_under_constant_head_starts_by_tanh(
     model: BalancerModel, plant: Plant, pulse: Pulse
 ) -> None:
     assert isinstance(model.flow, PaperLaw)
-    level = replace(model, flow=replace(model.flow, angular_velocity=1e-6))
+    level = with_tables(model, flow={"angular_velocity": 1e-6})
     u0 = math.sqrt(2 * 0.7e6 / (1000 * 51))
     tau = 2 * 0.12 / (51 * u0)
     t = tau * np.array([0.1, 1.0, 3.0, 10.0])
@@ -150,7 +151,7 @@ def test_a_column_without_drive_slows_down_by_its_loss(
 ) -> None:
     # du/dt = -(k + 1) u^2/(2 L): u = u0/(1 + t/tau), so the distance grows like a logarithm.
     assert isinstance(model.flow, PaperLaw)
-    level = replace(model, flow=replace(model.flow, angular_velocity=1e-6))
+    level = with_tables(model, flow={"angular_velocity": 1e-6})
     dynamics = plant(level, "tube inertia")
     coasting = dynamics.kept_plant(total=0.5)
     coasting["one_way"], coasting["port_pressure"] = False, -1.0
@@ -167,7 +168,7 @@ def test_liquid_swings_in_a_full_tube_with_the_peaks_of_its_energy(
     # u du/ds = -w^2 s - c u^2/2 with c = (k + 1)/L: linear in u^2, so a peak s1 follows a peak s0 by
     # (1 + c s0) exp(-c s0) = (1 - c s1) exp(c s1).
     assert isinstance(model.flow, PaperLaw)
-    easy = replace(model, flow=replace(model.flow, drag_coefficient=0.2))
+    easy = with_tables(model, flow={"drag_coefficient": 0.2})
     dynamics = plant(easy, "tube inertia")
     dynamics.kept_plant(total=0.5)["one_way"] = False
     t = np.linspace(1e-3, 2.0, 2000)

@@ -21,6 +21,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.tube.heads import roots_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
+from scenes import with_tables
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -275,11 +276,11 @@ def test_work_bounds_the_integrators_steps(
 def creeping(scene: Scene, plant: Plant, monkeypatch: pytest.MonkeyPatch) -> Dynamics:
     """Of a thick liquid, and few steps for it."""
     monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 5000)
-    thick = replace(
+    thick = with_tables(
         scene,
-        liquid=replace(scene.liquid, name="custom", kinematic_viscosity=1e-3),
-        rotor=replace(scene.rotor, speed=250.0),
-        environment=replace(scene.environment, gravity=0.0),
+        liquid={"name": "custom", "kinematic_viscosity": 1e-3},
+        rotor={"speed": 250.0},
+        environment={"gravity": 0.0},
     )
     return plant(calibrate(thick).model, "tube inertia")
 
@@ -324,12 +325,7 @@ def test_a_creep_near_its_balance_takes_few_steps(creeping: Dynamics) -> None:
 
 def test_the_controller_commands_and_the_plant_follows(scene: Scene, calibrated: BalancerModel) -> None:
     gas = replace(scene.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=0.02)
-    slow = replace(
-        scene,
-        gas=gas,
-        controller=replace(scene.controller, kind="law_based"),
-        run=replace(scene.run, time_limit=4.0),
-    )
+    slow = with_tables(scene, gas=gas, controller={"kind": "law_based"}, run={"time_limit": 4.0})
     run = simulate(slow, calibrated)
     assert {
         t.term for t in run.models_used if t.term in {"gas filling", "valve lag"} and t.model != "left out"
@@ -350,10 +346,10 @@ def test_the_controller_commands_and_the_plant_follows(scene: Scene, calibrated:
 
 
 def test_short_trials_settle_with_moving_liquid(scene: Scene, calibrated: BalancerModel) -> None:
-    trial = replace(
+    trial = with_tables(
         scene,
-        controller=replace(scene.controller, kind="trial", short_step=0.002, minimum_gas_time=0.001),
-        run=replace(scene.run, time_limit=6.0),
+        controller={"kind": "trial", "short_step": 0.002, "minimum_gas_time": 0.001},
+        run={"time_limit": 6.0},
     )
     run = simulate(trial, calibrated)
     assert {t.term: t.model for t in run.models_used}["tube inertia"].startswith("rho L du/dt")

@@ -23,6 +23,7 @@ from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -89,7 +90,7 @@ def test_the_dead_time_is_that_of_the_plant(
 def test_a_tube_that_is_never_primed_needs_the_time_to_pass_the_crest(plant_of: Plant, scene: Scene) -> None:
     """A fast line has filled the chamber before a viscous liquid is over the crest."""
     gas = replace(scene.gas, conductance=1e-7, critical_ratio=0.3, valve_lag=1e-3)
-    viscous = replace(scene, gas=gas, liquid=replace(scene.liquid, kinematic_viscosity=1e-4))
+    viscous = with_tables(scene, gas=gas, liquid={"kinematic_viscosity": 1e-4})
     law = BalancerModel.of(calibrate(viscous).flow_law)
     dynamics = plant_of(viscous, law, "gas filling", "tube inertia", LIFT)
     injections = Injections.of(dynamics, law, fill=0.25, total=0.5)
@@ -104,7 +105,7 @@ def test_a_tube_that_is_never_primed_needs_the_time_to_pass_the_crest(plant_of: 
 def test_what_runs_back_has_no_dead_time(plant_of: Plant, scene: Scene) -> None:
     """Without a crest the full tube lets the fuller chamber give back what an injection has moved."""
     gas = replace(scene.gas, conductance=1e-7, critical_ratio=0.3, valve_lag=1e-3)
-    full = replace(scene, gas=gas, tube=replace(scene.tube, hump_radius=None))
+    full = with_tables(scene, gas=gas, tube={"hump_radius": None})
     law = BalancerModel.of(calibrate(full).flow_law)
     dynamics = plant_of(full, law, "gas filling", "tube inertia")
     assert Injections.of(dynamics, law, fill=0.25, total=0.5).dead_time(0.01) is None
@@ -154,13 +155,13 @@ def test_a_pressure_on_the_axis_counts_with_its_column(
 ) -> None:
     """The spinning gas adds exp(omega^2 a^2/(2 R T)) - 1 up to the liquid, about 1 %, to the surroundings'
     pressure in the vented chamber too."""
-    own = replace(scene, gas=replace(scene.gas, measured_at="shaft"))
+    own = with_tables(scene, gas={"measured_at": "shaft"})
     a = float(surface_radius(disc=scene.disc, fill_ratio=0.25))
     factor = math.exp((10000 * math.pi / 30 * a) ** 2 / (2 * 287.05 * scene.gas.temperature))
     assert 1.005 < factor < 1.02
     # The vented chamber has such a column as well.
     ambient = factor * scene.gas.ambient_pressure
-    here = calibrate(replace(scene, gas=replace(scene.gas, ambient_pressure=ambient)))
+    here = calibrate(with_tables(scene, gas={"ambient_pressure": ambient}))
     there = calibrate(own)
     for name in ("priming_pressure_vented", "stall_pressure"):
         near, far = (float(getattr(found.answers, name)) for found in (here, there))
@@ -249,7 +250,7 @@ def test_what_a_cavity_decides_is_not_said_to_last(scene: Scene) -> None:
     """At equal fills the column is sure to stand down to 5446 rpm, and under half of the gas to 3851 rpm."""
     hangs = "hangs on the pressure of a cavity"
     for rpm, holds in ((5600, True), (5300, None), (4000, None), (3700, False)):
-        slower = replace(scene, rotor=replace(scene.rotor, speed=rpm * math.pi / 30))
+        slower = with_tables(scene, rotor={"speed": rpm * math.pi / 30})
         answers = line_answers(slower, BalancerModel.of(calibrate(slower).flow_law))
         assert {each.holds for each in answers} == {holds}
         assert (hangs in line_text(answers)) is (holds is None)

@@ -21,6 +21,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.chambers import disc_chamber
+from scenes import with_tables
 
 ANGLE = 0.35
 
@@ -47,7 +48,7 @@ def exact(scene: Scene) -> Scene:
     """A run without noise, whose controller assumes the scene's lag whatever the rotor has."""
     quiet = replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0)
     settings = replace(scene.controller, assumed_lag_angle=scene.rotor.lag_angle)
-    return replace(scene, sensor=quiet, controller=settings, run=replace(scene.run, time_limit=8.0))
+    return with_tables(scene, sensor=quiet, controller=settings, run={"time_limit": 8.0})
 
 
 def test_chambers_beside_their_middles_act_as_a_rotor_with_less_lag(exact: Scene) -> None:

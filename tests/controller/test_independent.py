@@ -22,6 +22,7 @@ from ringbalance.controller.simulation import Injection, Simulation
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 AGREEMENT = 1e-6
 
@@ -203,15 +204,14 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
 @pytest.fixture(scope="module")
 def disc(paper_scene: Scene) -> Scene:
     """prescribed k, an exact sensor, no gravity, few samples."""
-    return replace(
+    return with_tables(
         paper_scene,
-        # The crest touched at a point, degassed liquid: the reference's own balance is this short then.
-        liquid=replace(paper_scene.liquid, dissolved_gas="none"),
-        tube=replace(paper_scene.tube, hump_shape="point", drag_coefficient=20.0, bends=()),
-        environment=replace(paper_scene.environment, gravity=0.0),
-        sensor=replace(paper_scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
-        controller=replace(paper_scene.controller, proportional=0.05e6),
-        run=replace(paper_scene.run, time_limit=2.5),
+        liquid={"dissolved_gas": "none"},
+        tube={"hump_shape": "point", "drag_coefficient": 20.0, "bends": ()},
+        environment={"gravity": 0.0},
+        sensor={"amplitude_noise": 0.0, "phase_noise": 0.0},
+        controller={"proportional": 0.05e6},
+        run={"time_limit": 2.5},
     )
 
 
@@ -231,7 +231,7 @@ def with_speed(scene: Scene, speed: float, pressure: float) -> Scene:
 
 
 def scenes(disc: Scene) -> dict[str, Scene]:
-    low_port = replace(disc, tube=replace(disc.tube, port_radius=42e-3))
+    low_port = with_tables(disc, tube={"port_radius": 42e-3})
     return {
         "the siphon crest separates the column": with_hump(disc, 31.5e-3),
         "no hump, and the siphon stalls": with_speed(with_hump(disc, None), 1047.0, 0.2e6),
@@ -241,7 +241,7 @@ def scenes(disc: Scene) -> dict[str, Scene]:
         ),
         "gas reaches a port above the wall": with_hump(low_port, 31.5e-3),
         "eight chambers run empty": with_hump(
-            with_chambers(replace(disc, disc=replace(disc.disc, max_fill_ratio=0.1, initial_fill=0.05)), 8),
+            with_chambers(with_tables(disc, disc={"max_fill_ratio": 0.1, "initial_fill": 0.05}), 8),
             None,
         ),
     }

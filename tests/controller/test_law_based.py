@@ -36,6 +36,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 RingOf = Callable[..., LiquidRing]
 
@@ -43,7 +44,7 @@ K = cmath.rect(0.0108, -math.radians(17))
 
 
 def law_based(scene: Scene, **controller: Any) -> Scene:
-    return replace(scene, controller=replace(scene.controller, kind="law_based", **controller))
+    return with_tables(scene, controller={"kind": "law_based", **controller})
 
 
 def exact(scene: Scene) -> Scene:
@@ -59,7 +60,7 @@ def exact(scene: Scene) -> Scene:
 
 def with_chambers(scene: Scene, chambers: int) -> Scene:
     disc = replace(scene.disc, chambers=chambers, central_angle=2 * math.pi / max(chambers, 3))
-    return replace(scene, disc=disc, rotor=replace(scene.rotor, initial_amplitude=4e-6))
+    return with_tables(scene, disc=disc, rotor={"initial_amplitude": 4e-6})
 
 
 # --- valve-open times ---
@@ -322,7 +323,7 @@ def test_right_beliefs_settle_in_one_operation(scene: Scene, chambers: int) -> N
     disc = law_based(with_chambers(exact(scene), chambers))
     if chambers == 2:
         # One axis: the unbalance must lie along it, and the vibration lags behind.
-        disc = replace(disc, rotor=replace(disc.rotor, initial_phase=-disc.rotor.lag_angle))
+        disc = with_tables(disc, rotor={"initial_phase": -disc.rotor.lag_angle})
     run = simulate(disc, paper_model(disc))
     assert run.settled
     assert len(run.samples) == 2
@@ -332,7 +333,7 @@ def test_right_beliefs_settle_in_one_operation(scene: Scene, chambers: int) -> N
 def test_a_law_without_closed_form_does_as_well(
     scene: Scene, model: BalancerModel, laws: Mapping[str, Any]
 ) -> None:
-    small = law_based(exact(replace(scene, rotor=replace(scene.rotor, initial_amplitude=4e-6))))
+    small = law_based(exact(with_tables(scene, rotor={"initial_amplitude": 4e-6})))
     for name in ("two_regimes", "square_root"):
         run = simulate(small, replace(model, name=name, flow=laws[name]))
         assert run.amplitude[-1] < 1e-6 * run.amplitude[0]
@@ -358,7 +359,7 @@ def test_a_wrong_coefficient_and_a_wrong_k_are_learnt_together(
     scene: Scene, model: BalancerModel, factor: float
 ) -> None:
     assumed = scene.controller.assumed_influence_coefficient * factor
-    small = replace(scene, rotor=replace(scene.rotor, initial_amplitude=5e-6))
+    small = with_tables(scene, rotor={"initial_amplitude": 5e-6})
     asked = law_based(small, assumed_influence_coefficient=assumed)
     # The algorithm assumes k = 20 where it is 50: 1.56 times too fast.
     tube = replace(scene.tube, drag_coefficient=20.0)
@@ -370,19 +371,19 @@ def test_a_wrong_coefficient_and_a_wrong_k_are_learnt_together(
 
 def test_an_empty_belief_does_not_stop_it(scene: Scene, model: BalancerModel) -> None:
     # 9.5 um need nearly all that a pair can use; believing 1.4 times the flow empties it on paper first.
-    heavy = replace(scene, rotor=replace(scene.rotor, initial_amplitude=9.5e-6))
-    fast = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=25.0)))
+    heavy = with_tables(scene, rotor={"initial_amplitude": 9.5e-6})
+    fast = paper_model(with_tables(scene, tube={"drag_coefficient": 25.0}))
     asked = law_based(heavy)
     assert simulate(asked, model, controller=LawBased(scene=asked, model=fast)).settled
     # The same with k believed 15 times too small: empty on paper after a quarter of the way.
-    wild = paper_model(replace(scene, tube=replace(scene.tube, drag_coefficient=2.4)))
+    wild = paper_model(with_tables(scene, tube={"drag_coefficient": 2.4}))
     assert simulate(asked, model, controller=LawBased(scene=asked, model=wild)).settled
 
 
 def test_beyond_the_capacity_and_without_pressure_it_says_so(scene: Scene, model: BalancerModel) -> None:
-    far = replace(scene, rotor=replace(scene.rotor, initial_amplitude=40e-6))
+    far = with_tables(scene, rotor={"initial_amplitude": 40e-6})
     assert simulate(law_based(far), model).outcome is Outcome.CAPACITY_EXCEEDED
-    weak = replace(scene, gas=replace(scene.gas, pressure=0.0))
+    weak = with_tables(scene, gas={"pressure": 0.0})
     assert simulate(law_based(weak), model).outcome is Outcome.STALLED
 
 

@@ -22,6 +22,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -103,7 +104,7 @@ class Column:
 @pytest.fixture(scope="module")
 def smooth(scene: Scene) -> Scene:
     """Without bends, whose loss the column of the reference would meet in steps."""
-    return replace(scene, tube=replace(scene.tube, bends=()))
+    return with_tables(scene, tube={"bends": ()})
 
 
 def gained(dynamics: Dynamics, pulse: Pulse, duration: float, tail: float = 0.0) -> float:
@@ -114,7 +115,7 @@ def gained(dynamics: Dynamics, pulse: Pulse, duration: float, tail: float = 0.0)
 def test_liquid_passes_the_crest_when_a_second_model_has_it_there(
     shape: str, smooth: Scene, plant_of: Callable[..., Dynamics], pulse: Pulse
 ) -> None:
-    scene = replace(smooth, tube=replace(smooth.tube, hump_shape=shape))  # type: ignore[arg-type]
+    scene = with_tables(smooth, tube={"hump_shape": shape})
     model = calibrate(scene).model
     assert isinstance(model.flow, CalibratedLaw)
     column = Column(scene, model.flow)
@@ -170,7 +171,7 @@ def test_a_long_injection_lacks_what_fell_back(
     scene: Scene, calibrated: BalancerModel, plant_of: Callable[..., Dynamics], pulse: Pulse
 ) -> None:
     """From the level to the middle of the crest, at a front that is faster than the column."""
-    late = replace(scene, gas=replace(scene.gas, valve_lag=0.0))
+    late = with_tables(scene, gas={"valve_lag": 0.0})
     own, bare = (
         gained(plant_of(late, calibrated, "valve lag", *terms), pulse, 0.1, 0.5) for terms in ((LIFT,), ())
     )

@@ -26,23 +26,24 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def with_controller(scene: Scene, **changes: Any) -> Scene:
-    return replace(scene, controller=replace(scene.controller, **changes))
+    return with_tables(scene, controller=changes)
 
 
 def with_rotor(scene: Scene, **changes: Any) -> Scene:
-    return replace(scene, rotor=replace(scene.rotor, **changes))
+    return with_tables(scene, rotor=changes)
 
 
 def with_gas(scene: Scene, pressure: float) -> Scene:
-    return replace(scene, gas=replace(scene.gas, pressure=pressure))
+    return with_tables(scene, gas={"pressure": pressure})
 
 
 def with_noise(scene: Scene, *, seed: int = 0) -> Scene:
     noisy = replace(scene.sensor, amplitude_noise=0.01e-6, phase_noise=math.radians(0.5))
-    return replace(scene, sensor=noisy, run=replace(scene.run, seed=seed))
+    return with_tables(scene, sensor=noisy, run={"seed": seed})
 
 
 def document(simulation: Simulation) -> str:
@@ -227,7 +228,7 @@ def test_commands_below_the_valves_minimum_are_reported(scene: Scene, model: Bal
 
 
 def test_the_time_limit_ends_a_run_in_mid_operation(scene: Scene, model: BalancerModel) -> None:
-    short = replace(scene, run=replace(scene.run, time_limit=0.3))
+    short = with_tables(scene, run={"time_limit": 0.3})
     run = simulate(short, model)
     assert run.outcome is Outcome.TIME_LIMIT
     assert run.time[-1] == pytest.approx(0.3)
@@ -277,7 +278,7 @@ def test_a_faulty_sensor_delays_but_does_not_mislead(scene: Scene, model: Balanc
         amplitude = math.nan if count % 3 == 2 and count < 6 else abs(vibration)
         return Measurement(time=time, amplitude=amplitude, phase=float(np.angle(vibration)) + 4 * math.pi)
 
-    short = replace(scene, run=replace(scene.run, time_limit=20.0))
+    short = with_tables(scene, run={"time_limit": 20.0})
     run = simulate(short, model, sensor=faulty)
     assert run.amplitude[-1] <= run.limit
     assert run.misadjustments == 0
@@ -312,13 +313,13 @@ def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:
 def test_a_rotor_too_slow_for_a_ring_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
     # sqrt(g/a) at a = 34.9 mm: 16.76 rad/s, 160 rpm.
     for speed, slow in ((16.7, True), (16.9, False)):
-        turning = replace(scene, rotor=replace(scene.rotor, speed=speed))
+        turning = with_tables(scene, rotor={"speed": speed})
         if slow:
             with pytest.raises(SceneError, match=r"\[rotor\] speed.*160"):
                 simulate(turning, model)
         else:
             assert simulate(turning, model).status
-    upright = replace(scene, environment=replace(scene.environment, shaft="vertical"))
+    upright = with_tables(scene, environment={"shaft": "vertical"})
     assert simulate(replace(upright, rotor=replace(scene.rotor, speed=5.0)), model).status
 
 

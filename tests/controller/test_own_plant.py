@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
 
@@ -24,6 +23,7 @@ from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import with_values_at
+from scenes import with_tables
 
 ASKED: Final = 0.9
 SEED: Final = 29
@@ -205,7 +205,7 @@ def test_recommended_settings_hold_in_the_own_plant(name: str, lowest: float, hi
     assert Share.of(np.isfinite(settling_times(scene, settings, numbers=256, seed=SEED))).low >= ASKED
     for degrees in range(0, 360, 30):
         phase = math.radians(degrees)
-        turned = replace(scene, rotor=replace(scene.rotor, initial_phase=phase))
+        turned = with_tables(scene, rotor={"initial_phase": phase})
         assert balancer_of(turned).run_all([{}], AS_GIVEN)[0].settled.all(), degrees
         machine = drawn(scene, number=-1, seed=0, phase=phase)
         assert math.isfinite(run(machine, settings, noise_seed=degrees).settling_time), degrees

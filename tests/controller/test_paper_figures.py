@@ -19,6 +19,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 PHASES = [90.0, 180.0, 270.0, 360.0]
 
@@ -89,7 +90,7 @@ def test_fig_6_the_trial_settles_slowly_and_misadjusts(
 def test_the_literal_integral_of_an_amplitude_never_lets_go(scene: Scene, model: BalancerModel) -> None:
     # With Kc = 0.12 and the paper's Ti the residual turns round once; an integral that cannot fall then
     # pushes for ever, while one that is dropped at the turn settles.
-    high = replace(scene, controller=replace(scene.controller, proportional=0.12e6))
+    high = with_tables(scene, controller={"proportional": 0.12e6})
     literal = simulate(high, model, controller=TargetVector(scene=high, on_reversal="accumulate"))
     assert not literal.settled
     assert literal.misadjustments > 10

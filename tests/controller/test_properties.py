@@ -23,6 +23,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from scenes import with_tables
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 
@@ -36,41 +37,37 @@ def scenes(draw: st.DrawFn, base: Scene) -> Scene:
     """Random changes of everything that the loop reads."""
     number = st.floats
     maximum = draw(number(0.1, 0.9))
-    return replace(
+    return with_tables(
         base,
-        disc=replace(
-            base.disc,
-            chambers=draw(st.sampled_from([2, 4, 6, 8])),
-            max_fill_ratio=maximum,
-            initial_fill=maximum * draw(number(0.05, 0.95)),
-        ),
-        tube=replace(base.tube, bore=draw(number(0.3e-3, 6e-3)), drag_coefficient=draw(number(0.0, 500.0))),
-        gas=replace(base.gas, pressure=draw(number(0.0, 3e6))),
-        rotor=replace(
-            base.rotor,
-            speed=draw(number(50.0, 2000.0)),
-            influence_coefficient=draw(number(1e-4, 1.0)),
-            lag_angle=draw(number(-4.0, 4.0)),
-            initial_amplitude=draw(number(0.0, 1e-4)),
-            initial_phase=draw(number(-7.0, 7.0)),
-        ),
-        sensor=replace(
-            base.sensor,
-            amplitude_noise=draw(st.sampled_from([0.0, 1e-8, 1e-6])),
-            phase_noise=draw(number(0.0, 0.5)),
-        ),
-        controller=replace(
-            base.controller,
-            kind=draw(st.sampled_from(["target_vector", "trial", "law_based"])),
-            period=draw(number(0.01, 2.0)),
-            proportional=draw(number(1e2, 1e7)),
-            integral_time=draw(st.none() | number(0.1, 1e3)),
-            derivative_time=draw(number(0.0, 1.0)),
-            minimum_gas_time=draw(number(0.0, 0.01)),
-            maximum_gas_time=draw(number(0.02, 10.0)),
-            sequence=("A", "B"),
-        ),
-        run=replace(base.run, time_limit=draw(number(0.1, 5.0)), seed=draw(st.integers(0, 99))),
+        disc={
+            "chambers": draw(st.sampled_from([2, 4, 6, 8])),
+            "max_fill_ratio": maximum,
+            "initial_fill": maximum * draw(number(0.05, 0.95)),
+        },
+        tube={"bore": draw(number(0.3e-3, 6e-3)), "drag_coefficient": draw(number(0.0, 500.0))},
+        gas={"pressure": draw(number(0.0, 3e6))},
+        rotor={
+            "speed": draw(number(50.0, 2000.0)),
+            "influence_coefficient": draw(number(1e-4, 1.0)),
+            "lag_angle": draw(number(-4.0, 4.0)),
+            "initial_amplitude": draw(number(0.0, 1e-4)),
+            "initial_phase": draw(number(-7.0, 7.0)),
+        },
+        sensor={
+            "amplitude_noise": draw(st.sampled_from([0.0, 1e-8, 1e-6])),
+            "phase_noise": draw(number(0.0, 0.5)),
+        },
+        controller={
+            "kind": draw(st.sampled_from(["target_vector", "trial", "law_based"])),
+            "period": draw(number(0.01, 2.0)),
+            "proportional": draw(number(1e2, 1e7)),
+            "integral_time": draw(st.none() | number(0.1, 1e3)),
+            "derivative_time": draw(number(0.0, 1.0)),
+            "minimum_gas_time": draw(number(0.0, 0.01)),
+            "maximum_gas_time": draw(number(0.02, 10.0)),
+            "sequence": ("A", "B"),
+        },
+        run={"time_limit": draw(number(0.1, 5.0)), "seed": draw(st.integers(0, 99))},
     )
 
 
@@ -129,7 +126,7 @@ def test_any_run_with_any_terms_under_the_calibrated_law(
 ) -> None:
     drawn = data.draw(scenes(scene))
     # The law is that of one disc at one speed and pressure; all else may be anything.
-    own = replace(drawn, disc=scene.disc, rotor=replace(drawn.rotor, speed=scene.rotor.speed))
+    own = with_tables(drawn, disc=scene.disc, rotor={"speed": scene.rotor.speed})
     own = replace(own, gas=scene.gas, tube=scene.tube)
     changed, asked = data.draw(terms(own))
     check(changed, calibrated, asked)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import HumpGas, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from scenes import with_tables
 
 STRAIGHT = """
 [disc]
@@ -169,7 +170,7 @@ def test_no_crest_is_the_limit_of_a_crest_at_the_port(tmp_path: Path, inertia: b
     runs = []
     for crest in ("", "44.4 mm"):
         scene = scene_of(tmp_path, crest=crest)
-        scene = replace(scene, tube=replace(scene.tube, hump_gas=gas))
+        scene = with_tables(scene, tube={"hump_gas": gas})
         runs.append(once(scene, calibrated_model(scene), inertia=inertia))
     ours, limit = (np.interp(np.linspace(0, 2, 200), run.time, run.fill_ratio["A"]) for run in runs)
     assert np.max(np.abs(ours - limit)) < 1e-8
@@ -224,7 +225,7 @@ def test_other_algorithms_lose_the_correction_too(tmp_path: Path, kind: str) -> 
 
 def test_a_vibration_within_its_limit_needs_no_crest(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, time_limit=20.0, more=LOOP.format(kind="target_vector"))
-    small = replace(scene, rotor=replace(scene.rotor, initial_amplitude=0.4e-6))
+    small = with_tables(scene, rotor={"initial_amplitude": 0.4e-6})
     assert simulate(small, calibrated_model(scene)).settled
 
 
@@ -233,7 +234,7 @@ def test_an_untraced_run_is_the_traced_one(tmp_path: Path, crest: str) -> None:
     loop = LOOP.format(kind="target_vector")
     scene = scene_of(tmp_path, crest=crest, time_limit=6.0, more=loop)
     if crest != "44 mm":
-        scene = replace(scene, rotor=replace(scene.rotor, initial_amplitude=4e-6))
+        scene = with_tables(scene, rotor={"initial_amplitude": 4e-6})
     model = calibrated_model(scene)
     run = simulate(scene, model)
     found = balancer_of(scene).run({}, AS_GIVEN)

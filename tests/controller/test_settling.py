@@ -28,6 +28,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 STEPS = 200_000
 
@@ -35,11 +36,11 @@ STEPS = 200_000
 def noisy(
     scene: Scene, *, noise: float = 1e-8, seed: int = 0, time_limit: float = 60.0, **settings: Any
 ) -> Scene:
-    return replace(
+    return with_tables(
         scene,
-        sensor=replace(scene.sensor, amplitude_noise=noise, phase_noise=0.005),
-        controller=replace(scene.controller, **settings),
-        run=replace(scene.run, seed=seed, time_limit=time_limit),
+        sensor={"amplitude_noise": noise, "phase_noise": 0.005},
+        controller=settings,
+        run={"seed": seed, "time_limit": time_limit},
     )
 
 
@@ -69,7 +70,7 @@ def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerMo
 
 
 def test_the_balanced_fills_of_many_chambers_keep_the_residual_fill(scene: Scene) -> None:
-    eight = replace(scene, disc=replace(scene.disc, chambers=8, central_angle=math.pi / 4))
+    eight = with_tables(scene, disc={"chambers": 8, "central_angle": math.pi / 4})
     model = paper_model(eight)
     fills = _balanced_fills(eight, model)
     assert np.min(fills) == pytest.approx(residual_fill_ratio(eight, law=model.flow))
@@ -78,7 +79,7 @@ def test_the_balanced_fills_of_many_chambers_keep_the_residual_fill(scene: Scene
 
 
 def test_the_rate_at_level_chambers_is_kappa_lambda_rho_s_u(scene: Scene, model: BalancerModel) -> None:
-    level = replace(scene, rotor=replace(scene.rotor, initial_amplitude=0.0))
+    level = with_tables(scene, rotor={"initial_amplitude": 0.0})
     # Eq. 19 at equal fills: u = sqrt(2 p/((k + 1) rho)) = 5.2394 m/s; lambda = 72 mm a transferred mass.
     area = math.pi * 1.5e-3**2 / 4
     expected = 0.0108 * 0.072 * 1000 * area * math.sqrt(2 * 0.7e6 / 51 / 1000)
@@ -186,7 +187,7 @@ def random_scene(scene: Scene, number: int) -> Scene:
 
 
 def doubled(scene: Scene) -> Scene:
-    return replace(scene, run=replace(scene.run, time_limit=2 * scene.run.time_limit))
+    return with_tables(scene, run={"time_limit": 2 * scene.run.time_limit})
 
 
 def runs_that_survive(scene: Scene, model: BalancerModel, numbers: range) -> list[Simulation]:
@@ -217,6 +218,6 @@ def test_no_settled_run_of_many_changes_its_answer(
 
 def test_a_run_that_comes_to_rest_needs_no_hold(scene: Scene, model: BalancerModel) -> None:
     run = simulate(noisy(scene, noise=0.0, hold_time=50.0), model)
-    exact = replace(scene, controller=replace(scene.controller, hold_time=1e3))
+    exact = with_tables(scene, controller={"hold_time": 1e3})
     assert simulate(exact, model).outcome is Outcome.SETTLED
     assert run.verdict in {RunVerdict.SETTLED, RunVerdict.HOVERING}

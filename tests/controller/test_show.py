@@ -13,6 +13,7 @@ from ringbalance.controller.document import _sparkline
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def printed(scene: Scene, model: BalancerModel) -> str:
@@ -22,9 +23,9 @@ def printed(scene: Scene, model: BalancerModel) -> str:
 
 
 def test_a_run_without_injections_and_one_with_too_many(scene: Scene, model: BalancerModel) -> None:
-    quiet = replace(scene, rotor=replace(scene.rotor, initial_amplitude=0.0))
+    quiet = with_tables(scene, rotor={"initial_amplitude": 0.0})
     assert "Injections" not in printed(quiet, model)
-    trial = replace(scene, controller=replace(scene.controller, kind="trial"))
+    trial = with_tables(scene, controller={"kind": "trial"})
     assert "more: see --json" in printed(trial, model)
 
 

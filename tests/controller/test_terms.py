@@ -14,6 +14,7 @@ from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 @pytest.mark.parametrize(("lag", "share"), [(2e-5, "0.5 %"), (1e-3, "25 %")])
@@ -21,7 +22,7 @@ def test_a_term_with_numbers_is_modelled_however_small(
     scene: Scene, model: BalancerModel, lag: float, share: str
 ) -> None:
     """Of the 4 ms that Kc gives to the limit of 0.05 um."""
-    run = simulate(replace(scene, gas=replace(scene.gas, valve_lag=lag)), model)
+    run = simulate(with_tables(scene, gas={"valve_lag": lag}), model)
     found = {term.term: term for term in run.models_used}
     assert found["valve lag"].model == "pure delay, in injections"
     assert found["valve lag"].estimated_contribution == pytest.approx(lag / 4e-3)
@@ -32,7 +33,7 @@ def test_a_term_with_numbers_is_modelled_however_small(
 
 
 def test_the_papers_law_has_no_mass_in_the_tube(scene: Scene, model: BalancerModel) -> None:
-    trial = replace(scene, tolerance=1e-3, controller=replace(scene.controller, kind="trial"))
+    trial = with_tables(scene, tolerance=1e-3, controller={"kind": "trial"})
     found = {used.term: used for used in run_models(scene=trial, model=model)}
     assert not found["tube inertia"].modelled
     assert "no mass in the tube" in found["tube inertia"].why
@@ -43,7 +44,7 @@ def test_the_papers_law_has_no_mass_in_the_tube(scene: Scene, model: BalancerMod
 def test_a_law_without_forces_carries_no_terms(
     scene: Scene, model: BalancerModel, laws: Mapping[str, Any]
 ) -> None:
-    late = replace(scene, gas=replace(scene.gas, valve_lag=50e-3))
+    late = with_tables(scene, gas={"valve_lag": 50e-3})
     run = simulate(late, replace(model, name="constant", flow=laws["constant"]))
     found = {term.term: term for term in run.models_used}
     assert found["valve lag"].model == "not modelled in this version"
@@ -58,7 +59,7 @@ def test_terms_without_numbers_are_refused(scene: Scene, model: BalancerModel, a
 
 def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(scene: Scene) -> None:
     calibrated = calibrate(scene).model
-    short = replace(scene, run=replace(scene.run, time_limit=0.5 * scene.controller.period))
+    short = with_tables(scene, run={"time_limit": 0.5 * scene.controller.period})
     nothing = simulation_document(simulate(short, calibrated))["neglected"]
     assert nothing["bound"] == 0
     assert nothing["text"].startswith(
@@ -81,11 +82,7 @@ def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(s
 
 def test_a_line_that_is_not_given_is_run_at_both_ends(scene: Scene, calibrated: BalancerModel) -> None:
     gain = 0.3 * scene.controller.proportional
-    asked = replace(
-        scene,
-        controller=replace(scene.controller, proportional=gain),
-        run=replace(scene.run, time_limit=15.0),
-    )
+    asked = with_tables(scene, controller={"proportional": gain}, run={"time_limit": 15.0})
     nominal = simulate(asked, calibrated)
     runs = line_runs(nominal)
     slow, fast = runs["slow"], runs["fast"]
@@ -103,7 +100,7 @@ def test_a_line_that_is_not_given_is_run_at_both_ends(scene: Scene, calibrated: 
     # Late gas moves less in the same valve-open time, and the slow line is later.
     moved = [run.injections[0].fill_before - run.injections[0].fill_after for run in (slow, fast, nominal)]
     assert 0 < moved[0] < moved[1] < 1.1 * moved[2]
-    given = replace(asked, gas=replace(asked.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=5e-3))
+    given = with_tables(asked, gas={"conductance": 1e-8, "critical_ratio": 0.3, "valve_lag": 5e-3})
     assert line_runs(simulate(given, calibrated)) == {}
     # The fast end is the run of a scene that gives that line.
     assert simulate(given, calibrated).amplitude[-1] == fast.amplitude[-1]

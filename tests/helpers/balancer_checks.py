@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from ringbalance.controller.balancer import AS_GIVEN, Balancer, Draws, Outcomes,
 from ringbalance.scene import SceneError
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.units import DIMENSIONS
+from scenes import with_tables
 
 UNITS = {unit for kind in DIMENSIONS.values() for unit in kind.units} | {"1"}
 Check = Callable[[Balancer], None]
@@ -129,7 +129,7 @@ def a_changed_record_is_checked_again(balancer: Balancer) -> None:
     scene = balancer.scene
     assert scene.with_values({"run.seed": 5}).run.seed == 5
     with pytest.raises(SceneError):
-        replace(scene, run=replace(scene.run, seed=6)).with_values({"run.seed": 7})
+        with_tables(scene, run={"seed": 6}).with_values({"run.seed": 7})
 
 
 def its_scene_describes_itself(balancer: Balancer) -> None:

@@ -10,7 +10,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -28,6 +28,7 @@ from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted, with_model_error
+from scenes import with_tables
 
 SCENES: Final = ("liquid_ring_paper", "six_chamber", "perfluorinated_oil")
 FITTED: Final = ("influence_coefficient", "lag_angle", "bore", "lambda_factor")
@@ -77,10 +78,10 @@ def rig(number: int) -> Rig:
 def _scene(name: str, random: np.random.Generator) -> Scene:
     scene = liquid_ring_scene(load_scene(bundled_scene(name)))
     factor = InputUncertainty(quantity="lambda_factor", half_width=_LAMBDA_WIDTH, relative=False)
-    return replace(
+    return with_tables(
         scene,
-        disc=replace(scene.disc, lambda_factor=1.0),
-        gas=replace(scene.gas, pressure=scene.gas.pressure * random.uniform(1.0, 1.4)),
+        disc={"lambda_factor": 1.0},
+        gas={"pressure": scene.gas.pressure * random.uniform(1.0, 1.4)},
         uncertainty=(*scene.uncertainty, factor),
     )
 

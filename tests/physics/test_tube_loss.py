@@ -21,6 +21,7 @@ from ringbalance.scene.fitted import ModelError
 from ringbalance.scene.models import Bend, Liquid, Scene, Tube
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import NORMAL_95
+from scenes import with_tables
 
 SCENE = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
 WATER = Liquid(
@@ -361,8 +362,6 @@ def test_an_error_of_bends_stays_with_the_bends(paper_scene: Scene) -> None:
 
 
 def test_a_prescribed_loss_has_no_model_to_err(paper_scene: Scene) -> None:
-    prescribed = dataclasses.replace(
-        paper_scene, tube=dataclasses.replace(paper_scene.tube, drag_coefficient=50.0)
-    )
+    prescribed = with_tables(paper_scene, tube={"drag_coefficient": 50.0})
     errors = [(cause, 1.0, 1.0) for cause in MODEL_CAUSES]
     assert np.array_equal(erring(prescribed, *errors)[1].k, np.full(4, 50.0))

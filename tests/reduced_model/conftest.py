@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
 from ringbalance.reduced_model.calibration import calibrate
@@ -11,6 +9,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from scenes import with_tables
 
 LIQUID = models.Liquid(
     name="custom",
@@ -30,11 +29,11 @@ def table_1_scene() -> models.Scene:
     """Table 1 of the liquid-ring paper with its density of 1 g/ml and an assumed tube."""
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     trial = {"first_trial": 0.1, "long_step": 0.5, "short_step": 0.05}
-    return dataclasses.replace(
+    return with_tables(
         scene,
         liquid=LIQUID,
         sensor=loop_models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
-        controller=dataclasses.replace(scene.controller, **trial),  # type: ignore[arg-type]
+        controller=trial,
         uncertainty=(),
     )
 
@@ -42,11 +41,7 @@ def table_1_scene() -> models.Scene:
 @pytest.fixture(scope="session")
 def point_scene(table_1_scene: models.Scene) -> models.Scene:
     """The same with a crest that the tube touches at a point, and degassed liquid."""
-    return dataclasses.replace(
-        table_1_scene,
-        tube=dataclasses.replace(table_1_scene.tube, hump_shape="point"),
-        liquid=dataclasses.replace(table_1_scene.liquid, dissolved_gas="none"),
-    )
+    return with_tables(table_1_scene, tube={"hump_shape": "point"}, liquid={"dissolved_gas": "none"})
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.regime import driving_pressure, stall_pressure
 from ringbalance.scene.models import HumpGas, Scene
+from scenes import with_tables
 
 AMBIENT = 101325.0
 
@@ -33,7 +34,7 @@ def law(point_calibration: Calibration) -> CalibratedLaw:
 def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> CalibratedLaw:
     """Law of the paper's disc with another tube or speed."""
     rotor = dataclasses.replace(scene.rotor, speed=speed or scene.rotor.speed)
-    changed = dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, **tube), rotor=rotor)  # type: ignore[arg-type]
+    changed = with_tables(scene, tube=tube, rotor=rotor)
     return chamber_and_law(changed)[1]
 
 
@@ -215,7 +216,7 @@ def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
     separated over vapour as well, and holds alike at rest."""
     tube = dataclasses.replace(point_scene.tube, hump_gas=crest_gas)
     scene = dataclasses.replace(point_scene, tube=tube)
-    on_shaft = dataclasses.replace(scene, gas=dataclasses.replace(scene.gas, measured_at="shaft"))
+    on_shaft = with_tables(scene, gas={"measured_at": "shaft"})
     ratio = pressure_factor(on_shaft)
     gas = dataclasses.replace(
         scene.gas,
@@ -246,7 +247,7 @@ def test_laws_of_many_scenes_are_those_of_each(
     point_scene: Scene, tube: dict[str, float | None], speeds: tuple[float, ...]
 ) -> None:
     """Whether everything that the tube's head depends on differs between them, a part of it, or nothing."""
-    scene = dataclasses.replace(point_scene, tube=dataclasses.replace(point_scene.tube, **tube))  # type: ignore[arg-type]
+    scene = with_tables(point_scene, tube=tube)
     rotors = [dataclasses.replace(scene.rotor, speed=each * scene.rotor.speed) for each in speeds]
     scenes = [dataclasses.replace(scene, rotor=each) for each in rotors]
     many, single = nominal_laws(scenes, gravity=False), [nominal_law(each, gravity=False) for each in scenes]

@@ -16,6 +16,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 discs = st.builds(
     lambda outer, inner, width, n, share, plate, fill: Disc(
@@ -109,9 +110,7 @@ def test_paper_disc_prints_the_known_numbers(table_1_calibration: Calibration) -
 @pytest.mark.parametrize("tolerance", [0.3, 1e-7])
 def test_gravity_is_in_the_values_at_every_tolerance(table_1_scene: Scene, tolerance: float) -> None:
     """Against the closed forms, which have none; finite elements hold it below its size, 2e-5, alone."""
-    slow = dataclasses.replace(
-        table_1_scene, tolerance=tolerance, rotor=dataclasses.replace(table_1_scene.rotor, speed=150.0)
-    )
+    slow = with_tables(table_1_scene, tolerance=tolerance, rotor={"speed": 150.0})
     calibration = calibrate(slow)
     chamber = calibration.chamber
     still = RingValues.of(slow, fill_ratio=chamber.fill_ratio, gravity=False)

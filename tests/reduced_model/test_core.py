@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -22,6 +21,7 @@ from ringbalance.scene.designs import Designs, changes_of, in_batches
 from ringbalance.scene.errors import both_sides, by_group, uncertainties
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 Gas = Literal["vented", "trapped"]
 
@@ -35,10 +35,8 @@ def _drawn(scene: Scene, *, seed: int, count: int, gas: Gas = "vented", saturate
     speed = random.uniform(15, 60, count) / outer
     density = random.uniform(800, 1900, count)
     lift = density * speed**2 * (outer**2 - hump**2) / 2
-    kind = replace(
-        scene,
-        tube=replace(scene.tube, hump_gas=gas),
-        liquid=replace(scene.liquid, dissolved_gas="saturated" if saturated else "none"),
+    kind = with_tables(
+        scene, tube={"hump_gas": gas}, liquid={"dissolved_gas": "saturated" if saturated else "none"}
     )
     return Designs.of(
         kind,
@@ -106,7 +104,7 @@ def test_a_full_siphon_balances_its_driving_pressure(
 
 
 def test_without_a_crest_nothing_is_primed(table_1_scene: Scene) -> None:
-    plain = replace(table_1_scene, tube=replace(table_1_scene.tube, hump_radius=None))
+    plain = with_tables(table_1_scene, tube={"hump_radius": None})
     answers = Answers.of(Designs.of(plain, {"gas.pressure": np.array([1e5, 7e5])}))
     assert np.all(np.isnan(answers.priming_pressure_vented) & np.isnan(answers.cavitation_margin))
     assert answers.velocity[1] > answers.velocity[0] > 0
@@ -121,8 +119,8 @@ def test_batches_larger_than_a_cache_are_answered_in_parts(table_1_scene: Scene)
 
 
 def test_scenes_of_other_kinds_are_answered_in_their_order(table_1_scene: Scene) -> None:
-    trapped = replace(table_1_scene, tube=replace(table_1_scene.tube, hump_gas="trapped"))
-    faster = replace(table_1_scene, rotor=replace(table_1_scene.rotor, speed=700.0))
+    trapped = with_tables(table_1_scene, tube={"hump_gas": "trapped"})
+    faster = with_tables(table_1_scene, rotor={"speed": 700.0})
 
     def speeds(designs: Designs) -> FloatArray:
         return np.array([np.broadcast_to(designs.scene.rotor.speed, designs.size)])

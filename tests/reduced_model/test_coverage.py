@@ -26,6 +26,7 @@ from ringbalance.scene.fitted import ErrorCause
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.uncertain import NORMAL_95
+from scenes import with_tables
 
 DRAWS: Final = 4000
 JUDGED: Final = ("velocity", "drag_coefficient", "moment_per_mass", "stall_pressure", "usable_moment")
@@ -118,12 +119,12 @@ def random_scene(number: int) -> Scene:
         kinematic_viscosity=scene.liquid.kinematic_viscosity * times(1.0),
         dissolved_gas=("none", "saturated")[int(random.integers(2))],
     )
-    return replace(
+    return with_tables(
         scene,
         tube=tube,
         liquid=liquid,
-        gas=replace(scene.gas, pressure=scene.gas.pressure * times(0.4)),
-        rotor=replace(scene.rotor, speed=scene.rotor.speed * times(0.1)),
+        gas={"pressure": scene.gas.pressure * times(0.4)},
+        rotor={"speed": scene.rotor.speed * times(0.1)},
     )
 
 

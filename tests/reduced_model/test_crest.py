@@ -22,6 +22,7 @@ from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_a
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0
 PORT, CREST, BORE, LENGTH = 44.5e-3, 31.5e-3, 1.5e-3, 120e-3
@@ -38,7 +39,7 @@ def changed(scene: Scene, *, viscosity: float | None = None, **tube: Any) -> Sce
     liquid = dataclasses.replace(
         scene.liquid, kinematic_viscosity=viscosity or scene.liquid.kinematic_viscosity
     )
-    return dataclasses.replace(scene, liquid=liquid, tube=dataclasses.replace(scene.tube, **tube))
+    return with_tables(scene, liquid=liquid, tube=tube)
 
 
 def law_of(scene: Scene) -> CalibratedLaw:
@@ -89,7 +90,7 @@ def test_velocity_over_the_arc_for_each_cavity_pressure(
     """The bounds of the interval and its middle; the whole interval lies within the stated uncertainty."""
     vapour = VAPOUR - AMBIENT
     expected = by_hand(table_1_scene, cavity=(1 - released) * vapour, fill=0.25, gas=0.7e6, law=law)
-    each = dataclasses.replace(law, path=dataclasses.replace(law.path, released=released))
+    each = with_tables(law, path={"released": released})
     flow = each.evaluate(fill_ratio=0.25, gas_pressure=0.7e6)
     assert float(flow.velocity) == pytest.approx(expected, rel=2e-7)
     middle = law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6)
@@ -167,7 +168,7 @@ def test_slow_liquid_spills_over_gas_and_fast_liquid_carries_it_out(
     for each, runs_full in ((law, True), (viscous, False)):
         at = {"fill_ratio": 0.3, "gas_pressure": 0.7e6}
         empty, full = (each.evaluate(**at, primed=primed) for primed in (False, True))
-        spill = dataclasses.replace(each, path=dataclasses.replace(each.path, released=1.0))
+        spill = with_tables(each, path={"released": 1.0})
         gas = float(spill.evaluate(**at, primed=True).velocity)
         assert bool(empty.primed) is runs_full
         if runs_full:

@@ -18,6 +18,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 CHAMBER = (
     "free_surface_radius_m",
@@ -134,14 +135,14 @@ def test_fill_range_that_is_no_multiple_of_the_step(table_1_scene: Scene) -> Non
 
 
 def test_blocked_scene_still_makes_a_clean_document(table_1_scene: Scene) -> None:
-    weak = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=0.0))
+    weak = with_tables(table_1_scene, gas={"pressure": 0.0})
     document = calibration_document(calibrate(weak))
     json.dumps(document, allow_nan=False)
     assert document["regime"] == "blocked"
     assert "drag_coefficient" not in by_key(document)
     assert by_key(document)["priming_pressure_vented"]["value"] == pytest.approx(0.5417e6, rel=1e-3)
     # 0.3 MPa drives a primed tube, and lifts nothing over the crest of an empty one.
-    lower = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=0.3e6))
+    lower = with_tables(table_1_scene, gas={"pressure": 0.3e6})
     found = calibrate(lower)
     assert "drag_coefficient" not in {each.key for each in found.rows().quantities}
     # Advice is the safe end of an interval, and what is only told has its interval.

@@ -20,6 +20,7 @@ from ringbalance.reports.pages.drag_map import DragMap, _velocity_paper, liquids
 from ringbalance.scene.fitted import CLEARING_ERROR, MODEL
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 POINTS = [(0.3e-3, 1e-6), (0.9e-3, 3e-7), (1.5e-3, 5e-5), (2.4e-3, 6e-6), (4.1e-3, 2.2e-4)]
 
@@ -38,7 +39,7 @@ def with_scene(calibration: Calibration, scene: Scene) -> Calibration:
 def moved(scene: Scene, bore: float, viscosity: float) -> Scene:
     """The scene with another bore and an exactly known viscosity."""
     liquid = replace(scene.liquid, kinematic_viscosity=viscosity, viscosity_uncertainty=0.0)
-    return replace(scene, tube=replace(scene.tube, bore=bore), liquid=liquid)
+    return with_tables(scene, tube={"bore": bore}, liquid=liquid)
 
 
 def of_primed_tube(scene: Scene) -> float:
@@ -119,14 +120,14 @@ def test_separated_columns_look_like_more_drag(calibration: Calibration) -> None
 
 def test_without_a_hump_every_point_is_a_siphon(calibration: Calibration) -> None:
     scene = calibration.scene
-    straight = calibrate(replace(scene, tube=replace(scene.tube, hump_radius=None)))
+    straight = calibrate(with_tables(scene, tube={"hump_radius": None}))
     point = DragMap.of(calibration=straight).point
     assert np.all(point.regime == Regime.SIPHON)
     np.testing.assert_allclose(point.apparent_k, point.k, rtol=1e-7)
 
 
 def test_a_gas_that_drives_nothing_maps_nothing(calibration: Calibration) -> None:
-    scene = replace(calibration.scene, gas=replace(calibration.scene.gas, pressure=0.0))
+    scene = with_tables(calibration.scene, gas={"pressure": 0.0})
     found = DragMap.of(calibration=with_scene(calibration, scene))
     assert not np.any(found.point.runs)
     assert np.all(found.point.regime == Regime.BLOCKED)

@@ -14,6 +14,7 @@ from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def test_the_closed_forms_are_checked_at_both_ends_of_the_range(table_1_calibration: Calibration) -> None:
@@ -52,12 +53,7 @@ def test_a_tighter_tolerance_takes_a_finer_mesh(table_1_scene: Scene) -> None:
 
 @pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
 def test_gravity_is_in_the_check_above_the_tolerance(table_1_scene: Scene, shaft: Shaft) -> None:
-    slow = dataclasses.replace(
-        table_1_scene,
-        tolerance=1e-3,
-        rotor=dataclasses.replace(table_1_scene.rotor, speed=60.0),
-        environment=dataclasses.replace(table_1_scene.environment, shaft=shaft),
-    )
+    slow = with_tables(table_1_scene, tolerance=1e-3, rotor={"speed": 60.0}, environment={"shaft": shaft})
     chamber = calibrate(slow).chamber
     assert chamber.check.gravity
     assert chamber.check.status.ok

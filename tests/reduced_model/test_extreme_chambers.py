@@ -6,7 +6,6 @@ import json
 import math
 import random
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from ringbalance.mesh.geometry import half_angle, liquid_first_moment, surface_r
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene import SceneError, liquid_ring_scene, scene_from
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 Calibrate = Callable[[str], tuple[int, dict[str, Any], str]]
 
@@ -199,7 +199,7 @@ def test_the_least_that_the_message_allows_is_calibrated(
 
 def test_a_solve_that_failed_enters_nothing() -> None:
     scene = loaded(text_of(angle=1.0))
-    hair = replace(scene, disc=replace(scene.disc, central_angle=1e-7))
+    hair = with_tables(scene, disc={"central_angle": 1e-7})
     with pytest.raises(SceneError, match="central_angle") as refused:
         calibrate(hair)
     assert "relative residual" in str(refused.value)

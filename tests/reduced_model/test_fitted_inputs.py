@@ -22,6 +22,7 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import Fitted, FittedQuantity, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95, with_value
+from scenes import with_tables
 
 SIZES = {
     "tube.bore": 3e-5,
@@ -67,7 +68,7 @@ def by_hand(scene: Scene, correlation: float) -> float:
         return [
             with_value(scene=scene, quantity="bore", value=scene.tube.bore + step * 3e-5),
             with_value(scene=scene, quantity="length", value=scene.tube.length + step * 2e-3),
-            replace(scene, tube=replace(scene.tube, model_errors=(error,))),
+            with_tables(scene, tube={"model_errors": (error,)}),
             with_value(scene=scene, quantity="pressure", value=scene.gas.pressure + step * 7e3),
         ]
 
@@ -117,7 +118,7 @@ def test_a_law_with_fitted_inputs_is_read_back_as_it_was(paper_scene: Scene, tmp
 def test_a_correction_of_a_model_changes_the_law(paper_scene: Scene) -> None:
     """Two standard deviations of friction more, at cos(ln Re) of either sign: another k, another velocity."""
     error = ModelError(cause="friction correlation", even=2.0)
-    corrected = replace(paper_scene, tube=replace(paper_scene.tube, model_errors=(error,)))
+    corrected = with_tables(paper_scene, tube={"model_errors": (error,)})
     both = [calibrate(scene) for scene in (paper_scene, corrected)]
     k = [float(each.tube.k.value[-1]) for each in both]
     velocity = [each.answers.velocity for each in both]

@@ -16,16 +16,12 @@ from ringbalance.scene import SceneError
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def turning(scene: Scene, omega: float, shaft: Shaft = "horizontal", plates: float | None = None) -> Scene:
     disc = scene.disc if plates is None else dataclasses.replace(scene.disc, plate_thickness=plates)
-    return dataclasses.replace(
-        scene,
-        disc=disc,
-        rotor=dataclasses.replace(scene.rotor, speed=omega),
-        environment=dataclasses.replace(scene.environment, shaft=shaft),
-    )
+    return with_tables(scene, disc=disc, rotor={"speed": omega}, environment={"shaft": shaft})
 
 
 class _Effect(NamedTuple):
@@ -38,7 +34,7 @@ class _Effect(NamedTuple):
 
 def by_quadrature(scene: Scene, fills: FloatArray) -> _Effect:
     """Zero where empty."""
-    still = dataclasses.replace(scene, environment=dataclasses.replace(scene.environment, gravity=0.0))
+    still = with_tables(scene, environment={"gravity": 0.0})
     changes = np.zeros((3, fills.size))
     ring, level = (TiltedRing.of(each, fills[fills > 0]) for each in (scene, still))
     for change, name in zip(changes, _Effect._fields, strict=True):
@@ -95,10 +91,10 @@ def test_the_effect_agrees_with_finite_elements(table_1_scene: Scene, shaft: Sha
 
 
 def test_slow_rotors_are_refused_with_the_lowest_speed(table_1_scene: Scene) -> None:
-    slow = dataclasses.replace(table_1_scene, rotor=dataclasses.replace(table_1_scene.rotor, speed=10.0))
+    slow = with_tables(table_1_scene, rotor={"speed": 10.0})
     with pytest.raises(SceneError, match=r"\[rotor\] speed.*above 160.* rpm"):
         check_ring(slow)
-    upright = dataclasses.replace(slow, environment=dataclasses.replace(slow.environment, shaft="vertical"))
+    upright = with_tables(slow, environment={"shaft": "vertical"})
     check_ring(upright)
     check_ring(table_1_scene)
 

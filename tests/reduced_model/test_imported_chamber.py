@@ -21,6 +21,7 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.making import nominal_law
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 FILLS = np.array([0.1, 0.25, 0.5])
 
@@ -113,7 +114,7 @@ def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
 
 def test_a_gas_pressure_at_which_nothing_flows(scene: Scene) -> None:
     """No gas is drawn into a port on the wall, but no liquid leaves a chamber either: a pair can use none."""
-    found = calibrate(replace(scene, gas=replace(scene.gas, pressure=0.1e6)))
+    found = calibrate(with_tables(scene, gas={"pressure": 0.1e6}))
     answers = found.answers
     assert answers.residual_fill_ratio == 0
     assert answers.least_fill_ratio == pytest.approx(scene.disc.initial_fill)

@@ -12,10 +12,11 @@ from scipy.integrate import quad
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def with_mass(scene: Scene, kilograms: float) -> Scene:
-    return replace(scene, rotor=replace(scene.rotor, influence_coefficient=1 / kilograms))
+    return with_tables(scene, rotor={"influence_coefficient": 1 / kilograms})
 
 
 @pytest.mark.parametrize("kilograms", [93.0, 5.0])

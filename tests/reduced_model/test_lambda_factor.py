@@ -12,6 +12,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.estimates import injection_time
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 FACTOR = 0.93
 WIDTH = 0.02
@@ -65,5 +66,5 @@ def test_its_uncertainty_is_in_the_budget(by_geometry: Calibration, measured: Ca
 def test_the_injection_that_decides_is_longer_by_it(paper_scene: Scene) -> None:
     law_based = replace(paper_scene.controller, kind="law_based")
     plain = replace(paper_scene, controller=law_based)
-    smaller = replace(plain, disc=replace(plain.disc, lambda_factor=0.5))
+    smaller = with_tables(plain, disc={"lambda_factor": 0.5})
     assert injection_time(smaller) == pytest.approx(2 * injection_time(plain))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads, roots_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
+from scenes import with_tables
 
 NAMES = ("velocity", "uncertainty", "regime", "primed")
 
@@ -32,7 +32,7 @@ def test_numbers_few_and_many_points_give_the_same_bits(
     law: CalibratedLaw, crest: bool, regimes: set[int]
 ) -> None:
     if not crest:
-        law = dataclasses.replace(law, path=dataclasses.replace(law.path, hump_pressure=None))
+        law = with_tables(law, path={"hump_pressure": None})
     asked = queries(law, 4000)
 
     def evaluated(part: FloatArray) -> Flow:
@@ -85,7 +85,7 @@ def test_as_many_knots_as_the_tolerance_asks_for(table_1_scene: Scene) -> None:
 
 
 def test_the_error_of_tables_is_part_of_the_uncertainty(law: CalibratedLaw) -> None:
-    coarse = dataclasses.replace(law, heads=dataclasses.replace(law.heads, interpolation_error=0.02))
+    coarse = with_tables(law, heads={"interpolation_error": 0.02})
     at = {"fill_ratio": 0.3, "gas_pressure": 2e6, "primed": True}
     sharp, wide = law.evaluate(**at), coarse.evaluate(**at)
     added = np.sqrt(wide.uncertainty**2 - sharp.uncertainty**2) / sharp.velocity

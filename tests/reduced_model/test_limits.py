@@ -16,6 +16,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Bend, Scene
+from scenes import with_tables
 
 # Blocked, stalls, draws gas first, draws gas at many fills.
 PRESSURES = 0.1e6, 0.45e6, 0.7e6, 2e6
@@ -23,7 +24,7 @@ PRESSURES = 0.1e6, 0.45e6, 0.7e6, 2e6
 
 def test_limits_of_plants_are_those_of_their_law(paper_scene: Scene) -> None:
     model, total = calibrate(paper_scene).model, 2 * paper_scene.disc.initial_fill
-    scenes = [replace(paper_scene, gas=replace(paper_scene.gas, pressure=p)) for p in PRESSURES]
+    scenes = [with_tables(paper_scene, gas={"pressure": p}) for p in PRESSURES]
     plants = np.zeros(len(scenes), dtype=PLANT)
     for place, scene in enumerate(scenes):
         Dynamics.of(scene, model).fill(plants[place : place + 1], total=total)
@@ -56,13 +57,10 @@ def test_bends_that_are_nearly_the_whole_tube_are_refused_by_their_key(paper_sce
         hump_shape="point",
         roughness=0.0,
     )
-    scene = replace(
-        paper_scene,
-        tube=tube,
-        liquid=replace(paper_scene.liquid, kinematic_viscosity=31e-6),
-        rotor=replace(paper_scene.rotor, speed=1446.0),
+    scene = with_tables(
+        paper_scene, tube=tube, liquid={"kinematic_viscosity": 31e-6}, rotor={"speed": 1446.0}
     )
-    varied = replace(scene, rotor=replace(scene.rotor, speed=1440.0))
+    varied = with_tables(scene, rotor={"speed": 1440.0})
     for heads in (lambda: TubeHeads.of(scene), lambda: TubeHeads.nominal(Designs.stacked([scene, varied]))):
         with pytest.raises(SceneError, match=r"\[tube\] bends: .* does not grow with the velocity"):
             heads()

@@ -8,6 +8,7 @@ import pytest
 
 from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, ModelUsed, models_used, terms_of
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def chosen(scene: Scene) -> dict[str, ModelUsed]:
@@ -57,7 +58,7 @@ def test_prescribed_k_and_blocked_tubes_have_no_rotation_fraction(table_1_scene:
     tube = dataclasses.replace(table_1_scene.tube, drag_coefficient=50.0)
     fixed = chosen(dataclasses.replace(table_1_scene, tube=tube))
     assert fixed["friction by rotation"].model == LEFT_OUT
-    weak = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=1e3))
+    weak = with_tables(table_1_scene, gas={"pressure": 1e3})
     blocked = chosen(weak)
     assert blocked["friction by rotation"].estimated_contribution is None
     assert blocked["loss of the tube"].model.startswith("k(u)")

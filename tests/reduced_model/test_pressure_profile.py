@@ -22,6 +22,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reports.pages.drag_map import read_by_eq_18
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0
 
@@ -33,7 +34,7 @@ def law(point_calibration: Calibration) -> CalibratedLaw:
 
 def variant(scene: Scene, **tube: object) -> tuple[Scene, CalibratedLaw]:
     """The paper's disc with another tube; the chamber is the same."""
-    changed = dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, **tube))  # type: ignore[arg-type]
+    changed = with_tables(scene, tube=tube)
     return changed, calibrated_law(scene=changed, chamber=_chamber(scene), heads=TubeHeads.of(changed))
 
 
@@ -144,9 +145,7 @@ def test_trapped_gas_obeys_boyle_or_leaves_at_the_port(point_scene: Scene) -> No
 
 
 def test_reverse_flow_is_the_mirror_image(point_scene: Scene) -> None:
-    slow = dataclasses.replace(
-        point_scene, rotor=dataclasses.replace(point_scene.rotor, speed=314.0), sha256="slow"
-    )
+    slow = with_tables(point_scene, rotor={"speed": 314.0}, sha256="slow")
     near, far = (variant(slow, hump_position=s, bends=slow.tube.bends[:1]) for s in (0.2, 0.8))
     ahead = HumpProfile.of(
         scene=near[0], law=near[1], fill_ratio=0.4, opposite_fill_ratio=0.1, gas_pressure=0.0, primed=True

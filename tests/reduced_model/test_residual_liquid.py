@@ -21,6 +21,7 @@ from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def test_the_residual_fill_rises_with_the_flow_and_vanishes_with_it(table_1_scen
 
 
 def test_liquid_beyond_the_port_stays(table_1_scene: Scene) -> None:
-    inner = replace(table_1_scene, tube=replace(table_1_scene.tube, port_radius=42e-3))
+    inner = with_tables(table_1_scene, tube={"port_radius": 42e-3})
     fill = _fill(inner, 0.0)
     assert float(surface_radius(disc=inner.disc, fill_ratio=fill)) == pytest.approx(42e-3, abs=1e-10)
 
@@ -112,7 +113,7 @@ def test_the_usable_moment_of_the_papers_disc(table_1_calibration: Calibration) 
 @pytest.mark.parametrize("pressure", [0.40e6, 0.45e6, 0.50e6])
 def test_gas_that_stalls_leaves_less_moment(table_1_scene: Scene, pressure: float) -> None:
     """The liquid just reaches the crest: p_gas = rho omega^2 (a^2 - r_m^2)/2, plates counted flat."""
-    scene = replace(table_1_scene, gas=replace(table_1_scene.gas, pressure=pressure))
+    scene = with_tables(table_1_scene, gas={"pressure": pressure})
     found = calibrate(scene)
     disc, square = scene.disc, scene.rotor.speed**2
     assert scene.tube.hump_radius is not None
@@ -133,7 +134,7 @@ def test_gas_that_stalls_leaves_less_moment(table_1_scene: Scene, pressure: floa
 
 def test_a_supply_that_is_less_well_known_makes_the_stall_uncertain(table_1_scene: Scene) -> None:
     """By dp = rho omega^2 a da: 10 kPa at 0.45 MPa and a = 42.37 mm are 0.2152 mm of the level."""
-    scene = replace(table_1_scene, gas=replace(table_1_scene.gas, pressure=0.45e6))
+    scene = with_tables(table_1_scene, gas={"pressure": 0.45e6})
     stated = InputUncertainty(quantity="pressure", half_width=1e4, relative=False)
     budget = calibrate(replace(scene, uncertainty=(stated,))).quantities["least_fill_ratio"]
     wide = 2 * 42.37e-3 * (math.pi / 4) - 2 * scene.disc.plate_thickness
@@ -150,7 +151,7 @@ def test_the_depth_is_an_input_as_any_other(table_1_scene: Scene) -> None:
     # Depth times 0.7 and 1.3: 1029 and 843 g mm by an independent model.
     assert default.causes["tube.draw_down_factor"] == pytest.approx(94e-6, rel=0.03)
     assert less.causes["tube.draw_down_factor"] == pytest.approx(94e-6 / 3, rel=0.05)
-    deeper = replace(table_1_scene, tube=replace(table_1_scene.tube, draw_down_factor=1.3))
+    deeper = with_tables(table_1_scene, tube={"draw_down_factor": 1.3})
     assert calibrate(deeper).answers.usable_moment == pytest.approx(843e-6, rel=5e-3)
 
 
@@ -175,7 +176,7 @@ def test_a_gas_pressure_below_the_uncertainty_of_the_wall_pressure_is_calibrated
     table_1_scene: Scene,
 ) -> None:
     """The lower side of its interval would be below a vacuum: the whole liquid stays at either side."""
-    scene = replace(table_1_scene, gas=replace(table_1_scene.gas, pressure=0.0))
+    scene = with_tables(table_1_scene, gas={"pressure": 0.0})
     found = calibrate(scene)
     assert found.answers.usable_volume == 0
     assert parts_of(found.quantities["least_fill_ratio"]).model == 0

@@ -13,13 +13,14 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import RowStatus, _row_status, calibration_document
 from ringbalance.results.rows import sentences
 from ringbalance.scene import Scene
+from scenes import with_tables
 
 FILLS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 CLOSED = np.ones(6, dtype=np.bool_)
 
 
 def changed(scene: Scene, *, port: float = 44.5e-3, crest: float | None = 31.5e-3) -> Scene:
-    return replace(scene, tube=replace(scene.tube, port_radius=port, hump_radius=crest))
+    return with_tables(scene, tube={"port_radius": port, "hump_radius": crest})
 
 
 OK, OPEN, OVER, DRAWN, DRY = (
@@ -63,7 +64,7 @@ def test_every_mark_has_a_remedy() -> None:
 
 
 def test_both_tables_have_the_same_rings(table_1_scene: Scene) -> None:
-    slow = replace(table_1_scene, rotor=replace(table_1_scene.rotor, speed=50.0))
+    slow = with_tables(table_1_scene, rotor={"speed": 50.0})
     document = calibration_document(calibrate(slow))
     rows, columns = document["chamber"]["row_status"], document["law"]["column_status"]
     assert [s == "no_ring" for s in rows] == [s == "no_ring" for s in columns]
@@ -80,7 +81,7 @@ def test_the_document_marks_the_row(
     """At 50 rad/s on a shaft that lies g/omega^2 = 3.9 mm is deeper than a ring of little liquid (0.9 mm)."""
     scene = changed(table_1_scene, crest=crest)
     environment = replace(scene.environment, gravity=9.80665, shaft="horizontal")
-    scene = replace(scene, rotor=replace(scene.rotor, speed=speed), environment=environment)
+    scene = with_tables(scene, rotor={"speed": speed}, environment=environment)
     calibration = calibrate(scene)
     states = calibration_document(calibration)["chamber"]["row_status"]
     assert states[0] == "ok"

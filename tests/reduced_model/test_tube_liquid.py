@@ -13,6 +13,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.tube.path import path_angle, path_radius
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 LINE = 1000.0 * math.pi / 4 * 1.5e-3**2
 """Mass per length of the full tube, kg/m."""
@@ -40,7 +41,7 @@ def test_the_path_is_the_taut_string(table_1_scene: Scene) -> None:
 
 def test_a_full_tube_without_a_crest_is_an_arc_at_the_port_and_stays_full(table_1_scene: Scene) -> None:
     """2 rho S L r/pi for half a turn; nothing changes, and nothing falls back."""
-    scene = dataclasses.replace(table_1_scene, tube=dataclasses.replace(table_1_scene.tube, hump_radius=None))
+    scene = with_tables(table_1_scene, tube={"hump_radius": None})
     found = calibrate(scene).tube_liquid
     assert found.before.state == found.after.state == "full"
     assert found.before.moment == pytest.approx(2j * LINE * 120e-3 * 44.5e-3 / math.pi, rel=1e-4)

@@ -19,6 +19,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 SOUND_SPEED = 1482.0
 """m/s, in water at 20 degC."""
@@ -31,7 +32,7 @@ def at_speed(scene: Scene, rpm: float) -> Scene:
     # Twice the column's pressure over the siphon crest, whatever the speed.
     column = 998 * rotor.speed**2 * (44.5e-3**2 - 31.5e-3**2) / 2
     run = replace(scene.run, time_limit=0.5)
-    return replace(scene, rotor=rotor, run=run, gas=replace(scene.gas, pressure=2 * column))
+    return with_tables(scene, rotor=rotor, run=run, gas={"pressure": 2 * column})
 
 
 @pytest.mark.parametrize(("rpm", "code"), [(3e4, "ok"), (9e4, "out_of_range"), (2.1e5, "out_of_range")])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,10 +17,11 @@ from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def at_speed(scene: Scene, rpm: float) -> Scene:
-    return replace(scene, rotor=replace(scene.rotor, speed=rpm * math.pi / 30))
+    return with_tables(scene, rotor={"speed": rpm * math.pi / 30})
 
 
 def highest(scene: Scene, fills: FloatArray) -> FloatArray:
@@ -114,5 +114,5 @@ def test_models_are_chosen_by_what_frequencies_may_be(table_1_calibration: Calib
 
 
 def test_a_vertical_shaft_makes_no_waves(table_1_scene: Scene) -> None:
-    upright = replace(table_1_scene, environment=replace(table_1_scene.environment, shaft="vertical"))
+    upright = with_tables(table_1_scene, environment={"shaft": "vertical"})
     assert _wave_mean(upright, np.array(0.4)) == 0.0

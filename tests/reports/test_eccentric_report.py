@@ -19,6 +19,7 @@ from ringbalance.reports.pages import plain
 from ringbalance.reports.pages.eccentric import SECTIONS
 from ringbalance.reports.report import write_report
 from ringbalance.scene import bundled_scene, load_scene
+from scenes import with_tables
 
 Record = dict[str, Any]
 UNCERTAIN = ("rotor.stiffness", "imbalance.mass", "masses.friction_arm")
@@ -30,11 +31,11 @@ def scene() -> EccentricScene:
     told = eccentric_scene(load_scene(bundled_scene("driven_masses_small")))
     first, *_ = told.rotor.speed_profile
     profile = (first, replace(first, time=8.0), replace(first, time=10.0, speed=0.9 * first.speed))
-    return replace(
+    return with_tables(
         told,
         uncertainty=tuple(each for each in told.uncertainty if each.quantity in UNCERTAIN),
-        rotor=replace(told.rotor, speed_profile=profile),
-        run=replace(told.run, time_limit=11.0),
+        rotor={"speed_profile": profile},
+        run={"time_limit": 11.0},
     )
 
 

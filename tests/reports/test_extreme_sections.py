@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from ringbalance.reports.pages import chamber
 from ringbalance.reports.pages.cases import EXTREMES
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
+from scenes import with_tables
 
 Record = dict[str, Any]
 
@@ -50,7 +50,7 @@ def test_no_gravity_no_waves(vertical_scene: Scene) -> None:
 
 @pytest.fixture
 def vertical_scene(paper_scene: Scene) -> Scene:
-    return replace(paper_scene, environment=replace(paper_scene.environment, shaft="vertical"))
+    return with_tables(paper_scene, environment={"shaft": "vertical"})
 
 
 def table() -> Record:

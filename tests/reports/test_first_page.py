@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -15,6 +14,7 @@ from ringbalance.reports.pages.first_page import SECTION, SETTINGS, _requirement
 from ringbalance.reports.prose import opening
 from ringbalance.scene import Scene
 from ringbalance.scene.toml import read_toml
+from scenes import with_tables
 
 Record = dict[str, Any]
 Said = Callable[[Record, str], str]
@@ -109,7 +109,7 @@ def test_the_residual_s_grade_follows_from_the_mass(paper_scene: Scene) -> None:
     assert (
         _requirement_record(paper_scene, limit=paper_scene.controller.limit)["grade_at_residual_m_s"] is None
     )
-    heavy = replace(paper_scene, rotor=replace(paper_scene.rotor, mass=10.0))
+    heavy = with_tables(paper_scene, rotor={"mass": 10.0})
     record = _requirement_record(heavy, limit=heavy.controller.limit)
     # U omega/m by hand: 0.05 um over 0.0108 um/(g mm) at 10 000 rpm on 10 kg.
     assert record["grade_at_residual_m_s"] == pytest.approx(0.05 / 0.0108 * 1e-6 * 1047.2 / 10, rel=1e-4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.process import _start_drawing, _write_fields
 from ringbalance.running import run_command
 from ringbalance.scene import Scene, bundled_scene
+from scenes import with_tables
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
 OPENGL = find_opengl()
@@ -94,5 +94,5 @@ def test_plot_without_opengl_writes_the_fields(
 
 
 def test_fields_are_written_at_two_fills(tmp_path: Path, paper_scene: Scene) -> None:
-    empty = dataclasses.replace(paper_scene, disc=dataclasses.replace(paper_scene.disc, initial_fill=0.0))
+    empty = with_tables(paper_scene, disc={"initial_fill": 0.0})
     assert set(_write_fields(scene=empty, folder=tmp_path)) == {"pressure", "disc"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -31,6 +30,7 @@ from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.catalogue import load_case
+from scenes import with_tables
 
 Record = dict[str, Any]
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -68,7 +68,7 @@ Write = Callable[[Path], Report]
 @pytest.fixture(scope="module")
 def write(paper_scene: Scene) -> Write:
     """Writes a report of the paper's disc without pictures, its loop cut short."""
-    scene = dataclasses.replace(paper_scene, run=dataclasses.replace(paper_scene.run, time_limit=8.0))
+    scene = with_tables(paper_scene, run={"time_limit": 8.0})
     return partial(write_report, scene, scene_text="# a scene\n", opengl=NO_OPENGL)
 
 

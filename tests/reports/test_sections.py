@@ -20,6 +20,7 @@ from ringbalance.reports.section import Section, Work
 from ringbalance.reports.sections import SECTIONS, drawings_in, numbered, views_of
 from ringbalance.scene.models import Scene
 from ringbalance.verification.runner import paper_scene
+from scenes import with_tables
 
 Record = dict[str, Any]
 
@@ -134,7 +135,7 @@ def test_a_margin_within_its_half_width_decides_nothing() -> None:
 
 
 def test_a_tube_without_a_hump_has_no_such_section(evidence: Record, work: Work) -> None:
-    straight = replace(work, scene=replace(work.ring, tube=replace(work.ring.tube, hump_radius=None)))
+    straight = replace(work, scene=with_tables(work.ring, tube={"hump_radius": None}))
     assert tube.CREST.collect(straight) is None
     assert tube.CREST.view(evidence) is None
 

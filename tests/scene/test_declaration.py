@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Annotated, Any, Literal
 
 import pytest
@@ -26,6 +26,7 @@ from ringbalance.scene.keys.fields import Length, PositiveLength
 from ringbalance.scene.keys.reading import SceneReading, read_document
 from ringbalance.scene.keys.schema import LIQUID_RING, Schema, TableSchema
 from ringbalance.scene.loop_models import RequirementSettings
+from scenes import with_tables
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +99,7 @@ def test_a_field_that_declares_no_values_is_refused() -> None:
 def test_every_description_of_a_scene_reaches_its_table() -> None:
     """Each described field gives one row, unless it is absent or belongs to another algorithm."""
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
-    trial = replace(scene, controller=replace(scene.controller, kind="trial"))
+    trial = with_tables(scene, controller={"kind": "trial"})
     names = {
         entry.name
         for table in LIQUID_RING.tables.values()

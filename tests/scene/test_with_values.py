@@ -22,6 +22,7 @@ from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
 from ringbalance.scene.units import DIMENSIONS, parse_quantity
+from scenes import with_tables
 
 PAPER, DRIVEN = "liquid_ring_paper", "eccentric_mass_paper"
 
@@ -151,8 +152,8 @@ def test_a_record_changed_otherwise_is_refused_everywhere(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     driven = eccentric_scene(bundled(DRIVEN))
-    wide = replace(paper_scene, tube=replace(paper_scene.tube, bore=0.08))
-    for scene, key in ((wide, "bore"), (replace(driven, rotor=replace(driven.rotor, mass=1.0)), "mass")):
+    wide = with_tables(paper_scene, tube={"bore": 0.08})
+    for scene, key in ((wide, "bore"), (with_tables(driven, rotor={"mass": 1.0}), "mass")):
         for call in calls(scene):
             with pytest.raises(SceneError) as caught:
                 call()
@@ -170,7 +171,7 @@ def test_another_mesh_under_the_same_name_is_refused() -> None:
     assert geometry is not None
     other = replace(geometry, points=geometry.points * 1.1)
     with pytest.raises(SceneError):
-        rb.calibrate(replace(scene, disc=replace(scene.disc, geometry=other)))
+        rb.calibrate(with_tables(scene, disc={"geometry": other}))
 
 
 @pytest.mark.parametrize(

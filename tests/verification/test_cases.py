@@ -25,6 +25,7 @@ from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases
 from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
+from scenes import with_tables
 
 FOLDER = Path(__file__).resolve().parents[2] / "verification" / "cases"
 CASES = {definition.id: definition for definition in load_cases()}
@@ -250,7 +251,7 @@ def _velocity(scene: Scene, fill: float, pressure: float, *, primed: bool = True
 
 
 def _with_bore(scene: Scene, bore: float) -> Scene:
-    return dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, bore=bore))
+    return with_tables(scene, tube={"bore": bore})
 
 
 def _departures_are_the_law_s(numbers: Mapping[str, float], scene: Scene) -> None:
@@ -265,7 +266,7 @@ def _departures_are_the_law_s(numbers: Mapping[str, float], scene: Scene) -> Non
 
 def _the_gas_needs_more_pressure_than_eq_12_gives(numbers: Mapping[str, float], scene: Scene) -> None:
     """Without a crest the law stalls an empty chamber at the wall pressure of the full one."""
-    straight = dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, hump_radius=None))
+    straight = with_tables(scene, tube={"hump_radius": None})
     stall = brentq(lambda p: _velocity(straight, 0.0, p) - 1e-3, 0.2e6, 0.8e6, xtol=1.0)
     shortfall = numbers.get("shortfall_full", 1 - numbers.get("by_eq_19", 0.0) / stall)
     assert 1 - 0.3811e6 / stall == pytest.approx(shortfall, abs=0.01)

@@ -18,6 +18,7 @@ from ringbalance.reduced_model.terms import IN_INJECTIONS, models_used
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from scenes import with_tables
 
 BUNDLED = ("liquid_ring_paper", "perfluorinated_oil", "silicone_oil_100cst", "six_chamber")
 LINE = {"conductance": 1e-7, "critical_ratio": 0.3, "dead_volume": 5e-6, "valve_lag": 2e-5}
@@ -26,7 +27,7 @@ LINE = {"conductance": 1e-7, "critical_ratio": 0.3, "dead_volume": 5e-6, "valve_
 def short(scene: Scene) -> Scene:
     """The scene with a run of a few samples, a gas line and a valve's lag: what is estimated stays."""
     run = replace(scene.run, time_limit=0.5 * scene.controller.period)
-    return replace(scene, run=run, gas=replace(scene.gas, **LINE))  # type: ignore[arg-type]
+    return with_tables(scene, run=run, gas=LINE)
 
 
 def check(scene: Scene, calibration: Calibration) -> None:
@@ -58,7 +59,7 @@ def test_bundled_scenes_agree_at_every_tolerance(name: str) -> None:
 
 def test_sloshing_is_judged_at_the_worst_fill(paper_scene: Scene) -> None:
     """At 3000 rpm the wall pressure without sloshing is off by 2.3 % at the largest fill."""
-    scene = replace(paper_scene, rotor=replace(paper_scene.rotor, speed=3000 * math.pi / 30))
+    scene = with_tables(paper_scene, rotor={"speed": 3000 * math.pi / 30})
     rows = {row["term"]: row for row in calibration_document(calibrate(scene))["models_used"]}
     found = rows["gravity ripple at 1x and sloshing"]
     assert found["estimated_contribution"] > 0.023
@@ -67,5 +68,5 @@ def test_sloshing_is_judged_at_the_worst_fill(paper_scene: Scene) -> None:
 
 @pytest.mark.parametrize(("rpm", "code"), [(600, "no_ring"), (2000, "out_of_range"), (10_000, "ok")])
 def test_calibrate_inherits_the_status_of_the_waves(paper_scene: Scene, rpm: float, code: str) -> None:
-    scene = replace(paper_scene, rotor=replace(paper_scene.rotor, speed=rpm * math.pi / 30))
+    scene = with_tables(paper_scene, rotor={"speed": rpm * math.pi / 30})
     assert calibration_document(calibrate(scene))["status"]["code"] == code

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from plant_runs import run_free
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.scene.arrays import FloatArray
+from scenes import with_tables
 
 RPM = math.pi / 30
 SPEED = 100 * RPM
@@ -63,11 +63,11 @@ def run_up(scene: EccentricScene, angles: tuple[float, float]) -> FloatArray:
     """The paper's run-up from 100 rpm with the drives off; four times as fast, to be quick."""
     corners = (SpeedPoint(time=0.0, speed=SPEED), SpeedPoint(time=32.5, speed=230 * RPM))
     return run_free(
-        replace(
+        with_tables(
             scene,
-            rotor=replace(scene.rotor, speed_profile=corners),
-            masses=replace(scene.masses, initial_angle=angles),
-            run=replace(scene.run, time_limit=32.5),
+            rotor={"speed_profile": corners},
+            masses={"initial_angle": angles},
+            run={"time_limit": 32.5},
         )
     )
 

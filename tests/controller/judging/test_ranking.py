@@ -17,6 +17,7 @@ from ringbalance.controller.trials import DrawnInput
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.errors import LOSS, MODEL_ERRORS, PHASE
+from scenes import with_tables
 
 NAMES = ("a", "b", "c")
 
@@ -104,7 +105,7 @@ def test_where_all_or_none_meet_time_or_amplitude_is_ranked() -> None:
     for settled, outcome in ((True, "settling_time"), (False, "final_amplitude")):
         found = judgement(np.full(256, settled), drawn)
         ranks: dict[str, Any] = {outcome: drawn["a"]}
-        ranking = ranked(balancer, replace(found, outcomes=replace(found.outcomes, **ranks)))
+        ranking = ranked(balancer, with_tables(found, outcomes=ranks))
         best = ranking.inputs[0]
         assert (best.name, best.outcome) == ("a", outcome)
         assert best.index == pytest.approx(1 - 1 / 64, abs=0.01)
@@ -135,7 +136,7 @@ def test_both_parts_of_a_models_error_are_ranked_as_one() -> None:
     balancer: Any = Paired()
     found = judgement(np.full(1024, True), drawn)
     ranks: dict[str, Any] = {"settling_time": drawn["a"] + drawn["b"]}
-    ranking = ranked(balancer, replace(found, outcomes=replace(found.outcomes, **ranks)))
+    ranking = ranked(balancer, with_tables(found, outcomes=ranks))
     assert [each.name for each in ranking.inputs] == ["both", "c"]
     assert ranking.inputs[0].index == pytest.approx(1.0, abs=0.05)
 

@@ -1,4 +1,4 @@
-"""What every command knows of a balancer: one interface, and how a scene comes to its own.
+"""Interface of every balancer: and how a scene comes to its own.
 
 `simulate`, `tune`, `compare` and the first half of `fit` are written against `Balancer` alone.  A further one
 is a sub-package with its scene's keys and a subclass, and one line that registers it
@@ -32,7 +32,7 @@ from ringbalance.scene.units import DIMENSIONS
 FURTHER: Final = 60.0
 """s, for which a run that has held its limit is watched."""
 REQUIRED_FRACTION: Final = 0.9
-"""Of the devices, that must meet every demand where a scene states none."""
+"""Fraction of the devices that must meet every demand where a scene states none."""
 Settings = Mapping[str, Any]
 """Values of a controller's or designer's choice by path in a scene file, SI; those of text as they are."""
 Progress = Callable[[float, float], None]
@@ -50,12 +50,12 @@ class Input:
     half_width: float
     """Expanded uncertainty (95 %), SI; zero: the scene states none."""
     unit: str
-    """In which it is written, "1" for a number without unit."""
+    """Unit in which it is written, "1" for a number without unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """What a controller or a designer may change without building another machine."""
+    """Value that a controller or a designer may change without building another machine."""
 
     path: str
     value: float
@@ -73,9 +73,9 @@ class Draws:
 
     numbers: tuple[int, ...]
     devices: bool = True
-    """Whether the inputs are drawn; False: each is as the scene says, and the noise alone differs."""
+    """True if the inputs are drawn; False: each is as in the scene, and the noise alone differs."""
     whole: bool = True
-    """Whether every run is carried out; False: one that is known not to settle ends with the least vibration
+    """True if every run is carried out; False: one that is known not to settle ends with the least vibration
     that the device can come to."""
     until: float = math.inf
     """s, at which a run that is above its limit may end undecided; where runs are watched to their end, none
@@ -101,12 +101,12 @@ class Run(Protocol):
 
     @property
     def status(self) -> str:
-        """How it ended and what to do next."""
+        """Sentence on how the run ended and what to do next."""
         ...
 
     @property
     def settled(self) -> bool:
-        """Whether the vibration came below the limit and stayed."""
+        """True if the vibration came below the limit and stayed."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
@@ -116,20 +116,20 @@ class Run(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """What one run comes to."""
+    """Result of one run."""
 
     settling_time: float
     """s, from the start of balancing; infinite where not settled."""
     final_amplitude: float
     """m zero-to-peak."""
     energy: float
-    """That it took, J."""
+    """Energy that the run took, J."""
     usable_moment: float
     """Largest unbalance that the device cancels where its own lies, kg m."""
     unbalance: float
-    """Of its rotor, kg m."""
+    """Unbalance of its rotor, kg m."""
     ended: str
-    """What stopped it: code of the finding that says so."""
+    """Code of the finding on what ended the run."""
     run: Any = None
     """A `Run`; None: it left no trace."""
     worst_amplitude: float = math.nan
@@ -137,13 +137,13 @@ class RunResult:
 
     @property
     def settled(self) -> bool:
-        """Whether it has."""
+        """True if it has settled."""
         return math.isfinite(self.settling_time)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcomes:
-    """Of runs, in the order of the draws: the numbers of `RunResult` as arrays of shape (n,)."""
+    """Results of runs in the order of the draws: the numbers of `RunResult` as arrays of shape (n,)."""
 
     settling_time: FloatArray
     final_amplitude: FloatArray
@@ -152,7 +152,7 @@ class Outcomes:
     unbalance: FloatArray
     ended: tuple[str, ...]
     numbers: tuple[int, ...] = ()
-    """Of the draws."""
+    """Numbers of the draws."""
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
     """Place of every drawn input in its distribution, in (0, 1); empty where no device is drawn."""
     clipped: Mapping[str, int] = field(default_factory=dict)
@@ -161,7 +161,7 @@ class Outcomes:
 
     @property
     def settled(self) -> BoolArray:
-        """Whether each has."""
+        """True for each run that has settled, shape (n,)."""
         return np.isfinite(self.settling_time)
 
     @classmethod
@@ -174,7 +174,7 @@ class Outcomes:
         clipped: Iterable[str] = (),
         trace: bool = False,
     ) -> Outcomes:
-        """Of runs one by one.
+        """Join runs that were made one by one.
 
         Args: `inputs`: place of every drawn input, by device. `clipped`: inputs that some device cannot have
             as drawn, for each. `trace`: whether the runs are kept.
@@ -189,7 +189,7 @@ class Outcomes:
         )
 
     def joined(self, more: Outcomes) -> Outcomes:
-        """These draws and further ones."""
+        """Join the outcomes of these and of further draws."""
         return Outcomes(
             **{name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in ARRAYS},
             ended=self.ended + more.ended,
@@ -209,7 +209,7 @@ class Demand:
     """One thing that is asked of every device, as a function of how its run ended."""
 
     code: str
-    """Of the finding that says it, such as "settling_time"."""
+    """Code of the finding on it, such as "settling_time"."""
     outcome: str
     """Name of the number of `Outcomes` that it is about."""
     sense: str
@@ -218,7 +218,7 @@ class Demand:
     """SI."""
     unit: str
     stated: bool
-    """Whether the scene states it; else what every run is asked for."""
+    """True if the scene states it; else every run is asked for it."""
     amplitude: float | None = None
     """Vibration at or below which a device counts as settled, m zero-to-peak, where [requirement] says so."""
 
@@ -233,13 +233,13 @@ class Remedy:
     """A change of the scene that may mend what its devices do not meet."""
 
     code: str
-    """Of the sentence that names it, such as "bore"."""
+    """Code of the sentence that names it, such as "bore"."""
     changes: Settings
     """By path, SI, as `SceneFile.with_values` takes them."""
     name: str = ""
     """Of a thing that can be bought."""
     continuous: bool = False
-    """Whether a value between this and another of its kind can be had as well."""
+    """True if a value between this and another of its kind can be had as well."""
 
 
 class Balancer(ABC):
@@ -251,7 +251,7 @@ class Balancer(ABC):
     """
 
     scene: Any
-    """That it was made of, of the type of its kind."""
+    """Scene that it was made of, of the type of its kind."""
     options: frozenset[str] = frozenset()
     """Arguments besides the scene that it can be made with, such as "flow_law"."""
     verdict_draws: tuple[int, int] = (16, 64)
@@ -259,7 +259,7 @@ class Balancer(ABC):
     energy_kind: str
     """Code of the sentence that says what its runs count as energy."""
     watched_to_end: bool = True
-    """Whether every run is watched to its time limit, whatever is asked for."""
+    """True if every run is watched to its time limit, whatever is asked for."""
 
     @property
     def models_used(self) -> tuple[Any, ...]:
@@ -272,7 +272,7 @@ class Balancer(ABC):
 
     @abstractmethod
     def settings(self) -> tuple[Setting, ...]:
-        """What `run` takes, each at the scene's value and within its bounds."""
+        """Settings that `run` takes, each at the scene's value and within its bounds."""
 
     @abstractmethod
     def run(
@@ -295,7 +295,7 @@ class Balancer(ABC):
         *,
         further: float = FURTHER,  # noqa: ARG002
     ) -> tuple[Outcomes, ...]:
-        """The same for several settings, without traces.
+        """Run several settings, without traces.
 
         Args: `further`: s, for which a run is watched after it has held its limit, unless to its end.
         """
@@ -306,7 +306,7 @@ class Balancer(ABC):
         return REQUIRED_FRACTION
 
     def demands(self) -> tuple[Demand, ...]:
-        """What is asked of every device: first that it settles in time, then what else the scene states."""
+        """Demands on every device: first that it settles in time, then what else the scene states."""
         return (settles_within(self.span(), stated=False),)
 
     def trials(self) -> tuple[Trials, ...]:
@@ -325,23 +325,23 @@ class Balancer(ABC):
         return ()
 
     def information(self, scene: SceneFile) -> Information:  # noqa: ARG002
-        """What is known without a run of its loop under a scene with other settings."""
+        """Information on its loop without a run, under a scene with other settings."""
         return Information()
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:  # noqa: ARG002
-        """What is said of devices whose runs ended for want of capacity under a scene with other settings.
+        """Findings on devices whose runs ended for want of capacity, under a scene with other settings.
 
         Args: `settings`: what to call these.
         """
         return ()
 
     def drawn_input(self, name: str) -> DrawnInput:
-        """What kind of thing an input of `Outcomes.inputs` is."""
+        """Kind of an input of `Outcomes.inputs`."""
         return drawn_key(self.scene, name)
 
     @abstractmethod
     def on_scene(self, scene: SceneFile) -> Self:
-        """The same, with the same options, of another scene of its kind."""
+        """Balancer of another scene of its kind, with the same options."""
 
     @abstractmethod
     def rotor(self, number: int | None = None) -> CommonRotor:
@@ -369,11 +369,11 @@ class Balancer(ABC):
 
     @abstractmethod
     def lasting(self, span: float) -> Self:
-        """The same with runs that balance for so long, s, and go on when they have settled."""
+        """Balancer with runs that balance for `span`, s, and go on when they have settled."""
 
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
-        """What is known of it without a run; among them "reach", the largest unbalance, kg m, that it cancels
+        """Quantities known without a run; among them "reach", the largest unbalance, kg m, that it cancels
         wherever that lies."""
 
     @abstractmethod
@@ -403,12 +403,12 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 
 
 def takes(scene: SceneFile, option: str) -> bool:
-    """Whether the balancer of a scene has an option, such as "flow_law"."""
+    """True if the balancer of a scene has an option, such as "flow_law"."""
     return option in registered("balancer", scene.balancer).options
 
 
 def quick_balancer(scene: SceneFile) -> Balancer:
-    """The same for runs of many designs: under a law that nothing else has checked, where it has one."""
+    """Balancer for runs of many designs: under a law that nothing else has checked, where it has one."""
     return balancer_of(scene, flow_law=UNCHECKED) if takes(scene, "flow_law") else balancer_of(scene)
 
 
@@ -454,7 +454,7 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
 
 
 def settles_within(time: float, *, stated: bool, amplitude: float | None = None) -> Demand:
-    """That a device settles within a time, s. Args: `amplitude`: see `Demand`."""
+    """Demand that a device settles within a time, s. Args: `amplitude`: see `Demand`."""
     return Demand(
         code="settling_time",
         outcome="settling_time",

@@ -15,7 +15,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.liquid_ring.loop_factor import vibration_left
-from ringbalance.controller.simulation import GasUse, Injection, Sample, Simulation
+from ringbalance.controller.simulation import GasUse, Injection, Simulation
 from ringbalance.physics import balancing
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
 from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
@@ -36,6 +36,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
     what the sensor showed is under `samples`, null where a sample was dropped or not a number.
     """
     scene, gas = simulation.scene, simulation.gas
+    measurements = [sample.measurement for sample in simulation.samples]
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "balancer": simulation.balancer,
@@ -57,7 +58,21 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
-        "injections": [_injection(each) for each in simulation.injections],
+        "injections": [
+            {
+                "time_s": each.time,
+                "chamber": each.chamber,
+                "duration_s": each.duration,
+                "regime": each.regime_start.label,
+                "regime_end": each.regime_end.label,
+                "event": each.event.value,
+                "fill_before": each.fill_before,
+                "fill_after": each.fill_after,
+                "energy_J": each.energy,
+                "run_dry_s": each.run_dry,
+            }
+            for each in simulation.injections
+        ],
         "fill_ratio": {letter: fill.tolist() for letter, fill in simulation.fill_ratio.items()},
         "overshoots": simulation.overshoots,
         "misadjustments": simulation.misadjustments,
@@ -75,7 +90,12 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         },
         "gas_line": line_document(simulation.gas_line),
         "noise_floor_m": simulation.noise_floor,
-        "samples": _samples(simulation.samples),
+        "samples": {
+            "time_s": [sample.time for sample in simulation.samples],
+            "amplitude_m": [None if each is None else finite(each.amplitude) for each in measurements],
+            "phase_rad": [None if each is None else finite(each.phase) for each in measurements],
+            "resting": [sample.command.resting for sample in simulation.samples],
+        },
         "terms_modelled": list(simulation.terms_modelled),
         "tolerance": simulation.tolerance,
         "models_used": [asdict(used) for used in simulation.models_used],
@@ -106,31 +126,6 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
                 gas[(time >= injection.time) & (time <= end)] = 1
         columns |= {f"fill_ratio_{letter}": fill.tolist(), f"valve_open_{letter}": gas.tolist()}
     return columns
-
-
-def _injection(injection: Injection) -> dict[str, Any]:
-    return {
-        "time_s": injection.time,
-        "chamber": injection.chamber,
-        "duration_s": injection.duration,
-        "regime": injection.regime_start.label,
-        "regime_end": injection.regime_end.label,
-        "event": injection.event.value,
-        "fill_before": injection.fill_before,
-        "fill_after": injection.fill_after,
-        "energy_J": injection.energy,
-        "run_dry_s": injection.run_dry,
-    }
-
-
-def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
-    seen = [sample.measurement for sample in samples]
-    return {
-        "time_s": [sample.time for sample in samples],
-        "amplitude_m": [None if m is None else finite(m.amplitude) for m in seen],
-        "phase_rad": [None if m is None else finite(m.phase) for m in seen],
-        "resting": [sample.command.resting for sample in samples],
-    }
 
 
 _BARS: Final = "▁▂▃▄▅▆▇█"
@@ -164,7 +159,11 @@ def simulation_rows(simulation: Simulation) -> Rows:
         ),
         tables=(
             _injection_table(simulation.injections),
-            _conventions_table(simulation),
+            Table(
+                caption="In the units of the shop",
+                heads=("quantity", "value"),
+                rows=[(each.name, plain(each.text)) for each in conventions(simulation)],
+            ),
             models_table(simulation.models_used, tolerance=simulation.tolerance),
         ),
     )
@@ -202,39 +201,24 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
 
 
 def _injection_table(injections: tuple[Injection, ...]) -> Table:
-    """The first injections."""
+    """Table of the first injections."""
+    rows = []
+    for each in injections[:_MOST_INJECTIONS]:
+        regimes = " to ".join(dict.fromkeys((each.regime_start.label, each.regime_end.label)))
+        event = "" if each.event in {Event.NONE, Event.BLOCKED} else f" ({each.event.value})"
+        fills = (f"{each.fill_before:.5f}", f"{each.fill_after:.5f}")
+        rows.append((f"{each.time:.3f}", each.chamber, f"{each.duration:.4f}", *fills, regimes + event))
     more = len(injections) - _MOST_INJECTIONS
     return Table(
         caption="Injections",
         heads=("time, s", "chamber", "gas, s", "fill before", "fill after", "regime"),
-        rows=[
-            (
-                f"{each.time:.3f}",
-                each.chamber,
-                f"{each.duration:.4f}",
-                f"{each.fill_before:.5f}",
-                f"{each.fill_after:.5f}",
-                _regime(each),
-            )
-            for each in injections[:_MOST_INJECTIONS]
-        ],
+        rows=rows,
         note=f"and {more} more: see --json" if more > 0 else "",
     )
 
 
-def _conventions_table(simulation: Simulation) -> Table:
-    rows = [(each.name, plain(each.text)) for each in conventions(simulation)]
-    return Table(caption="In the units of the shop", heads=("quantity", "value"), rows=rows)
-
-
-def _regime(injection: Injection) -> str:
-    names = dict.fromkeys((injection.regime_start.label, injection.regime_end.label))
-    event = "" if injection.event in {Event.NONE, Event.BLOCKED} else f" ({injection.event.value})"
-    return " to ".join(names) + event
-
-
 def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> str:
-    """An amplitude at equal steps of time up to `end`, s, by straight lines; logarithmic."""
+    """Bars of an amplitude at equal steps of time up to `end`, s, by straight lines; logarithmic."""
     return f"{_sparkline(np.interp(np.linspace(0.0, end, _SPARK_WIDTH), time, amplitude))} to {end:.3g} s"
 
 
@@ -265,7 +249,7 @@ def line_runs(nominal: Simulation) -> dict[str, Simulation]:
 
 
 def line_runs_table(runs: Mapping[str, Simulation]) -> Table:
-    """How the runs end."""
+    """Table of the ends of the runs."""
     return Table(
         caption="The scene gives no gas line; with both ends of its default range",
         heads=("line", "run", "settling time", "amplitude at the end"),
@@ -282,7 +266,7 @@ def line_runs_table(runs: Mapping[str, Simulation]) -> Table:
 
 
 def command_document(nominal: Simulation) -> dict[str, Any]:
-    """What `ringbalance simulate --json` prints of a run."""
+    """Document of a run as `ringbalance simulate --json` prints it."""
     runs = [
         {
             "end": end,
@@ -362,19 +346,14 @@ def _gas(run: Simulation) -> Iterator[Quantity]:
     first = min((each.time + each.duration for each in run.injections if each.moved), default=None)
     corrections = len({each.time for each in run.injections})
     per = run.gas.normal_volume / corrections if corrections else None
+    hourly, since, end = None, run.settling_time, float(run.time[-1])
+    if since is not None and end > since:
+        later = [each for each in run.injections if each.time > since]
+        used = GasUse.of(scene=run.scene, model=run.model, injections=later)
+        hourly = used.normal_volume / (end - since) * _HOUR
     yield _row("first_correction", "first correction made after", first, "s")
     yield _row("gas_per_correction", "gas per correction, normal volume", per, "m^3")
-    yield _row("gas_per_hour", "gas per hour to hold it, normal volume", _per_hour(run), "m^3")
-
-
-def _per_hour(run: Simulation) -> float | None:
-    """Of the injections after the run has settled, normal m^3 in an hour; None where it has not."""
-    since, end = run.settling_time, float(run.time[-1])
-    if since is None or end <= since:
-        return None
-    later = [each for each in run.injections if each.time > since]
-    used = GasUse.of(scene=run.scene, model=run.model, injections=later)
-    return used.normal_volume / (end - since) * _HOUR
+    yield _row("gas_per_hour", "gas per hour to hold it, normal volume", hourly, "m^3")
 
 
 def _lasting(run: Simulation) -> Iterator[Quantity]:

@@ -33,7 +33,7 @@ Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
 MAX_SAMPLES: Final = 10_000
-"""Of one run whose trace is kept."""
+"""Samples of one run whose trace is kept, at the most."""
 
 
 def simulate(
@@ -173,29 +173,25 @@ class _Outside:
         seen = self.sensor(float(run["time"]), complex(run["vibration"]))
         show(run, seen)
         self.measurements.append(seen)
-        if self.controller is not None:
-            self.memory, command = self._stepped(self.controller, seen)
-            _write(run, command, self.chambers // 2)
-            self.commands.append(command)
-
-    def _stepped(self, controller: Controller[Any], seen: Measurement | None) -> tuple[Any, Command]:
-        match controller.step(self.memory, seen):
+        if self.controller is None:
+            return
+        match self.controller.step(self.memory, seen):
             case (state, Command() as command):
-                return state, command
+                self.memory = state
             case other:
                 wanted = "the next state and a Command, as in return state, rb.Command(...)"
-                raise TypeError(f"{type(controller).__name__}.step returns {wanted}; it returned {other!r}")
-
-
-def _write(run: np.void, command: Command, half: int) -> None:
-    run["asked"], run["resting"] = 0.0, command.resting
-    for valve in command.valves:
-        if valve.chamber >= 2 * half:
-            raise ValueError(f"chamber {valve.chamber}: this disc has chambers 0 to {2 * half - 1}")
-        pair, side = valve.chamber % half, valve.chamber // half
-        if run["asked"][pair] > 0:
-            raise ValueError(f"gas into chambers {pair} and {pair + half} of one pair at once")
-        run["asked"][pair], run["side"][pair] = valve.duration, side
+                name = type(self.controller).__name__
+                raise TypeError(f"{name}.step returns {wanted}; it returned {other!r}")
+        half = self.chambers // 2
+        run["asked"], run["resting"] = 0.0, command.resting
+        for valve in command.valves:
+            if valve.chamber >= 2 * half:
+                raise ValueError(f"chamber {valve.chamber}: this disc has chambers 0 to {2 * half - 1}")
+            pair, side = valve.chamber % half, valve.chamber // half
+            if run["asked"][pair] > 0:
+                raise ValueError(f"gas into chambers {pair} and {pair + half} of one pair at once")
+            run["asked"][pair], run["side"][pair] = valve.duration, side
+        self.commands.append(command)
 
 
 def _histories(

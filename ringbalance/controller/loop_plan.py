@@ -41,7 +41,7 @@ IDLE_OPERATIONS: Final = 3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """What happened in one run."""
+    """Samples, injections and instants of one run."""
 
     instants: FloatArray
     """Time, s, and the fill of every pair's positive chamber, shape (m, 1 + pairs)."""

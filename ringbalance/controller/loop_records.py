@@ -1,4 +1,4 @@
-"""What the closed loop works on: a record of settings, one for each run, rows of a trace.
+"""Records of the closed loop: a record of settings, one for each run, rows of a trace.
 
 Compiled functions take a record as a single pointer, where arrays and tuples of arrays are taken apart and
 counted at every call, which costs more than the work itself.

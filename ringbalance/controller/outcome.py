@@ -1,4 +1,4 @@
-"""What a finished run says: its numbers and what to do next, as findings."""
+"""Findings on a finished run: its numbers and what to do next."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
 
 
 def _assumed(run: Simulation) -> Iterator[Finding]:
-    """What the result rests on without being in the scene."""
+    """Findings on assumptions that are not in the scene."""
     yield from assumed_rotor(run.scene)
     if run.loop.fixed:
         yield from default_gain(run.scene)
 
 
 def _required(run: Simulation) -> Iterator[Finding]:
-    """What the scene requires and a settled run does not show."""
+    """Findings on requirements of the scene that a settled run does not show."""
     scene, time = run.scene, run.settling_time
     asked, allowed = scene.requirement.settling_time, scene.required_amplitude
     if time is not None and asked is not None and time > asked:
@@ -61,12 +61,12 @@ def _required(run: Simulation) -> Iterator[Finding]:
 
 
 def _moves(run: Simulation) -> bool:
-    """Whether the longest injection of the last command has moved liquid, or there was none."""
+    """True if the longest injection of the last command has moved liquid, or there was none."""
     return run.longest is None or run.longest.moved
 
 
 def _own(run: Simulation) -> bool:
-    """Whether the algorithm was the caller's."""
+    """True if the algorithm was the caller's."""
     return run.controller != run.scene.controller.kind
 
 
@@ -145,7 +145,7 @@ def _noise(run: Simulation) -> Iterator[Finding]:
 
 
 def _dead_time(run: Simulation) -> list[Finding]:
-    """That an amplitude above the limit stands still, as its valve-open time moves nothing."""
+    """Finding that an amplitude above the limit stands still, as its valve-open time moves nothing."""
     scene, loop = run.scene, run.loop
     if _own(run) or scene.controller.kind == "trial" or loop.rate == 0.0:
         return []

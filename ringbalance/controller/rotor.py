@@ -78,7 +78,7 @@ def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> Complex
 
 
 def wrapped(angle: float) -> float:
-    """The same angle, rad, within (-pi, pi]."""
+    """Wrap an angle, rad, to (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
@@ -159,7 +159,7 @@ def rotor_difference(one: CommonRotor, other: CommonRotor) -> str | None:
 
 
 def one_rotor(one: CommonRotor, other: CommonRotor) -> CommonRotor:
-    """Of two descriptions of one rotor: the more vibration, the worse sensor and the narrower limit.
+    """Join two descriptions of one rotor: the more vibration, the worse sensor and the narrower limit.
 
     Symmetric in both: no verdict under it depends on which is named first.
     """
@@ -217,7 +217,7 @@ def rotor_fault(scene: SceneFile, path: str, problem: str, allowed: str) -> Scen
 
 
 def vibrating(scene: SceneFile, rotor: CommonRotor) -> CommonRotor:
-    """The same rotor. Raises: SceneError: it does not vibrate."""
+    """Check that a rotor vibrates, and return it. Raises: SceneError: it does not vibrate."""
     if rotor.amplitude == 0:
         problem = "it does not vibrate: there is nothing to compare"
         raise rotor_fault(scene, "rotor", problem, "an unbalance")

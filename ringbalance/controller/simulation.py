@@ -60,7 +60,7 @@ class Injection:
 
     @property
     def moved(self) -> bool:
-        """Whether any liquid passed."""
+        """True if any liquid passed."""
         return abs(self.fill_after - self.fill_before) > NOTICEABLE
 
 
@@ -85,7 +85,7 @@ class GasUse:
 
     @property
     def finding(self) -> Finding | None:
-        """That gas entered a port; None where none did."""
+        """Finding that gas entered a port; None where none did."""
         if not self.below_residual:
             return None
         numbers = {
@@ -137,7 +137,7 @@ class GasUse:
 
 
 class Outcome(StrEnum):
-    """How a run ended."""
+    """End of a run."""
 
     SETTLED = "settled"
     HOVERING = "hovering"
@@ -183,7 +183,7 @@ class Sample:
     time: float
     """s."""
     measurement: Measurement | None
-    """What the sensor gave; None for a dropped sample."""
+    """Reading of the sensor; None for a dropped sample."""
     command: Command
 
 
@@ -205,17 +205,17 @@ class Simulation(PresentedResult):
     controller: str
     """`controller.kind` of the scene; of another algorithm the name of its type."""
     as_scene: bool
-    """Whether algorithm and sensor are those of the scene."""
+    """True if algorithm and sensor are those of the scene."""
     loop: LoopFactor
     """The loop about the balanced state."""
     findings: tuple[Finding, ...] = ()
-    """How the run ended, what stands behind it, and what to do next."""
+    """Findings on how the run ended, why, and what to do next."""
     time: FloatArray
     """s, shape (m,): samples, and instants within operations and waits."""
     amplitude: FloatArray
     """True vibration, m zero-to-peak, shape (m,)."""
     phase: FloatArray
-    """Of the true vibration, rad within (-pi, pi], shape (m,)."""
+    """Phase of the true vibration, rad within (-pi, pi], shape (m,)."""
     fill_ratio: Mapping[str, FloatArray]
     """x of each chamber by letter, shape (m,) each."""
     injections: tuple[Injection, ...]
@@ -357,7 +357,7 @@ class Simulation(PresentedResult):
 
     @property
     def settled(self) -> bool:
-        """Whether the amplitude held within the limit for the hold time, and stayed there."""
+        """True if the amplitude held within the limit for the hold time, and stayed there."""
         return self.outcome is Outcome.SETTLED
 
     @property
@@ -397,12 +397,12 @@ class Simulation(PresentedResult):
 
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:
-        """What the gas line can deliver, or both ends of a default range of lines."""
+        """Gas that the line can deliver, or both ends of a default range of lines."""
         return line_answers(self.scene, self.model)
 
     @cached_property
     def model_status(self) -> Status:
-        """Whether the models of the chamber hold over the range of fills."""
+        """Status of the models of the chamber over the range of fills."""
         return chamber_status(self.scene)
 
 

@@ -1,4 +1,4 @@
-"""What a run is made of: the terms that it models, and whether scene and balancer can be run at all."""
+"""Composition of a run: the terms that it models, and whether scene and balancer can be run at all."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def dynamics_of(
     residual_fill: float = 0.0,
     checked: bool = False,
 ) -> Dynamics:
-    """What moves the liquid: the flow law, and beyond it the modelled terms.
+    """Dynamics that move the liquid: the flow law, and beyond it the modelled terms.
 
     Args: `residual_fill`: of a driven chamber. `checked`: whether the terms are known to have numbers, as
         for the many scenes of a fit that differ in values alone.
@@ -126,7 +126,7 @@ def _volume_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
 
 
 def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
-    """Of an injection of the size of the limit at equal fills, while gas fills the chamber and liquid rises.
+    """Dead time of an injection of the limit's size at equal fills, while gas fills and liquid rises.
 
     At least the valve's lag and its shortest opening, s.
     """

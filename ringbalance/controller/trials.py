@@ -1,4 +1,4 @@
-"""What a balancer offers to judge: its drawn inputs by kind, and settings to try, levels along axes.
+"""Trials that a balancer offers to judge: its drawn inputs by kind, and settings to try, levels along axes.
 
 A drawn input is spread from device to device, or one value that is not known.  Where all devices have a value
 alike, a fraction of drawn devices is the probability that the design conforms (JCGM 106:2012, section 9), and
@@ -22,10 +22,10 @@ Point = Mapping[str, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Axis:
-    """What is varied."""
+    """Axis of a search."""
 
     name: str
-    """Such as the path of a key."""
+    """Name of what varies, such as the path of a key."""
     levels: tuple[float, ...]
     """All that may be tried, increasing."""
     first: tuple[int, ...]
@@ -43,9 +43,9 @@ class Trials:
     settings: Callable[[Point], Mapping[str, Any] | None]
     """At a point, by path, SI, rounded as a scene file has them; None: there is none."""
     stated: bool = True
-    """Whether the scene states settings of its own that can be judged."""
+    """True if the scene states settings of its own that can be judged."""
     kept: bool = True
-    """Whether another kind that is merely faster is not taken in its place: the scene gives this one."""
+    """True if the scene gives this kind, so that a merely faster one does not replace it."""
     along: Axis | None = None
     """What is chosen only where the others do not suffice, or on request, and is answered for at every level,
     such as the supply's pressure; a point without it is at the scene's."""
@@ -64,11 +64,11 @@ class DrawnInput:
     """A drawn input."""
 
     common: bool
-    """Whether all devices have it alike, so that it is merely not known; else it varies between them."""
+    """True if all devices have the same unknown value; False if it varies between them."""
     measure: str
     """Code of the finding that says what to measure to know it better; empty: nothing can be measured."""
     path: str = ""
-    """Of its key in the scene; empty: the scene has none."""
+    """Path of its key in the scene; empty: the scene has none."""
     name: str = ""
     """Under which it is ranked with what belongs to it, as both parts of a model's error; empty: its own."""
 
@@ -82,7 +82,7 @@ def drawn_key(scene: SceneFile, path: str) -> DrawnInput:
 
 @dataclass(frozen=True, kw_only=True)
 class Information:
-    """What is known of a loop without a run; nothing is judged by it."""
+    """Quantities of a loop that are known without a run; nothing is judged by them."""
 
     quantities: tuple[Quantity, ...] = ()
     facts: Facts = ()

@@ -30,7 +30,7 @@ class Measurement:
     phase: float
     """rad, any multiple of a full turn away."""
     at_residual: tuple[bool, ...] = ()
-    """Of every chamber, whether a sensor says that it has no more liquid to give; empty: there is none."""
+    """True for every chamber that a sensor reports as empty; an empty tuple: there is no such sensor."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -122,7 +122,7 @@ class TargetVector(BuiltIn):
     """
 
     on_reversal: OnReversal = "reset"
-    """What becomes of the integral when the residual turns round."""
+    """Treatment of the integral when the residual turns round."""
 
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
@@ -133,7 +133,7 @@ class TargetVector(BuiltIn):
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """What `target_steps` finds in its constants."""
+        """Constants of `target_steps`, in the order of their places."""
         settings, chambers = self.scene.controller, self.scene.disc.chambers
         sensor = self.scene.sensor
         lag, axes = settings.assumed_lag_angle, chamber_directions(chambers).tolist()
@@ -206,7 +206,7 @@ class Trial(BuiltIn):
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """What `trial_steps` finds in its constants."""
+        """Constants of `trial_steps`, in the order of their places."""
         settings, letters = self.scene.controller, chamber_letters(self.scene.disc.chambers)
         return (
             float(len(letters)),

@@ -131,7 +131,21 @@ class EccentricMassBalancer(Balancer):
                 seed = run_noise(scene.run.seed, number) if draws.devices else scene.run.seed + number
                 plant = with_values_at(each.scene, asked)
                 run = simulate_eccentric(plant, seed=seed, settings=strategy, progress=progress)
-                results.append(_result(run, plant))
+                start = plant.supervisor.start
+                amplitude = run.amplitude[run.time >= start]
+                late = math.inf if run.settling_time is None else max(0.0, run.settling_time - start)
+                results.append(
+                    RunResult(
+                        run=run,
+                        settling_time=late,
+                        final_amplitude=run.final_amplitude,
+                        energy=run.electrical_energy,
+                        worst_amplitude=float(np.max(amplitude)) if amplitude.size else run.worst_amplitude,
+                        ended=run.outcome.value,
+                        usable_moment=reach_of(plant),
+                        unbalance=plant.imbalance.mass * plant.imbalance.radius,
+                    )
+                )
             inputs = [each.inputs for each in drawn]
             outcomes.append(Outcomes.of(results, numbers=draws.numbers, inputs=inputs, trace=trace))
         return tuple(outcomes)
@@ -174,7 +188,9 @@ class EccentricMassBalancer(Balancer):
     def remedies(self) -> tuple[Remedy, ...]:
         """Parts of another size, and what helps runs that end as those of the scene and some devices."""
         own, drawn = (self.run({}, draws) for draws in (AS_GIVEN, Draws.first(_ADVISING)))
-        shares = [_needed_share(self._device(number, drawn=True).scene) for number in range(_SIZING)]
+        scenes = (self._device(number, drawn=True).scene for number in range(_SIZING))
+        # Imbalance over what the masses cancel.
+        shares = [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
         return remedies_of(self.scene, drawn, own, shares)
 
     def drawn_input(self, name: str) -> DrawnInput:
@@ -273,26 +289,6 @@ class EccentricMassBalancer(Balancer):
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
         """See `Balancer`."""
         return eccentric_history(run)
-
-
-def _result(run: EccentricRun, scene: EccentricScene) -> RunResult:
-    start = scene.supervisor.start
-    balancing = run.amplitude[run.time >= start]
-    return RunResult(
-        run=run,
-        settling_time=math.inf if run.settling_time is None else max(0.0, run.settling_time - start),
-        final_amplitude=run.final_amplitude,
-        energy=run.electrical_energy,
-        worst_amplitude=float(np.max(balancing)) if balancing.size else run.worst_amplitude,
-        ended=run.outcome.value,
-        usable_moment=reach_of(scene),
-        unbalance=scene.imbalance.mass * scene.imbalance.radius,
-    )
-
-
-def _needed_share(scene: EccentricScene) -> float:
-    """Imbalance over what the masses cancel."""
-    return scene.imbalance.mass * scene.imbalance.radius / reach_of(scene)
 
 
 def _believed(scene: EccentricScene, found: EccentricRotor, rotor: CommonRotor, *, heavier: float) -> Any:

@@ -136,13 +136,15 @@ def _of_ends(scene: EccentricScene, ended: Counter[str]) -> Iterator[Remedy]:
         if end == EccentricOutcome.TIME_LIMIT and not _stable(scene):
             continue
         for sizes in _BY_END.get(EccentricOutcome(end), ()):
-            changed: list[Settings] = [new for size in sizes if (new := _changed(scene, size))]
-            kinds.setdefault(_code(sizes[0]), changed)
-    for code, changes in list(kinds.items())[:_MOST]:
-        yield from (Remedy(code=code, changes=each) for each in changes)
+            code = "_and_".join(path.partition(".")[2] for path in sizes[0])
+            changes = [_changed(scene, factors) for factors in sizes]
+            kinds.setdefault(code, [each for each in changes if each])
+    for code, several in list(kinds.items())[:_MOST]:
+        yield from (Remedy(code=code, changes=each) for each in several)
 
 
-def _changed(scene: EccentricScene, factors: Mapping[str, float | str]) -> dict[str, float | str]:
+def _changed(scene: EccentricScene, factors: Mapping[str, float | str]) -> Settings:
+    """Changes of a scene by factors on its numbers or by other words, without those that change nothing."""
     changes: dict[str, float | str] = {}
     for path, factor in factors.items():
         before = raw_value_at(scene, path)
@@ -151,10 +153,6 @@ def _changed(scene: EccentricScene, factors: Mapping[str, float | str]) -> dict[
         elif before:
             changes[path] = factor * before
     return changes
-
-
-def _code(changes: Mapping[str, float | str]) -> str:
-    return "_and_".join(path.partition(".")[2] for path in changes)
 
 
 def _of_masses(scene: EccentricScene, shares: Sequence[float]) -> Iterator[Remedy]:

@@ -356,8 +356,21 @@ class EccentricRun(PresentedResult):
     def warned(self) -> tuple[Finding, ...]:
         """What the user should know although the run continued."""
         numbers = {name: value for name, value in _numbers(self).items() if value is not None}
-        due = (_finding(code, numbers) for code, is_due in _due(self).items() if is_due)
-        return (*_unstable(self.scene), *due)
+        unlike = self.innovation is not None and self.innovation > _WRONG_MODEL
+        settled, by_euler = self.outcome is EccentricOutcome.SETTLED, _by_euler(self)
+        stalls = _stalled(self) > _NOTICEABLE_STALL and not self.friction_known
+        due = {
+            "strategy_not_finished": settled and self.stage not in {REST, FAILED},
+            "strategy_failed": settled and self.stage == FAILED,
+            "drive_nearly_stalled": stalls,
+            "voltage_at_limit": self.saturation > 0,
+            "euler_too_coarse": by_euler,
+            "innovations_unlike_model": unlike and not by_euler,
+            "drives_stay_on": int(self.history["hold"][-1]) == HELD,
+            "masses_meet": self.least_gap < _own_angle(self.scene),
+        }
+        findings = (_finding(code, numbers) for code, is_due in due.items() if is_due)
+        return (*_unstable(self.scene), *findings)
 
     @property
     def status(self) -> str:
@@ -417,29 +430,8 @@ def _unstable(scene: EccentricScene) -> Iterator[Finding]:
             )
 
 
-def _due(run: EccentricRun) -> dict[str, bool]:
-    """Whether each warning is."""
-    unlike = run.innovation is not None and run.innovation > _WRONG_MODEL
-    settled = run.outcome is EccentricOutcome.SETTLED
-    return {
-        "strategy_not_finished": settled and run.stage not in {REST, FAILED},
-        "strategy_failed": settled and run.stage == FAILED,
-        "drive_nearly_stalled": _stalled(run) > _NOTICEABLE_STALL and not run.friction_known,
-        "voltage_at_limit": run.saturation > 0,
-        "euler_too_coarse": _by_euler(run),
-        "innovations_unlike_model": unlike and not _by_euler(run),
-        "drives_stay_on": int(run.history["hold"][-1]) == HELD,
-        "masses_meet": run.least_gap < _own_angle(run.scene),
-    }
-
-
 def _stalled(run: EccentricRun) -> float:
     return int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1)
-
-
-def _deviation(run: EccentricRun) -> float:
-    """Standard deviation of the imbalance by noise, kg m."""
-    return float(np.sqrt(np.max(np.linalg.eigvalsh(run.history["imbalance_covariance"][-1]))))
 
 
 def _own_angle(scene: EccentricScene) -> float:
@@ -449,7 +441,9 @@ def _own_angle(scene: EccentricScene) -> float:
 def _numbers(run: EccentricRun) -> dict[str, Value]:
     """Of which a sentence takes what it names."""
     scene, left = run.scene, run.left
-    supervisor = scene.supervisor
+    supervisor, covariance = scene.supervisor, run.history["imbalance_covariance"][-1]
+    # Of the imbalance by noise, kg m.
+    deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(covariance))))
     return {
         "final_amplitude": float(run.amplitude[-1]),
         "time": run.end,
@@ -462,7 +456,7 @@ def _numbers(run: EccentricRun) -> dict[str, Value]:
         "residual": float(run.memory["left"]),
         "lowest_speed": supervisor.lowest_speed,
         "imbalance_time": supervisor.imbalance_time,
-        "deviation_ratio": _deviation(run) / abs(run.imbalance) if run.imbalance else None,
+        "deviation_ratio": deviation / abs(run.imbalance) if run.imbalance else None,
         "imbalance_gate": scene.imbalance_filter.gate,
         "friction_gate": scene.friction_filter.gate,
         "positioning_time": supervisor.positioning_time,

@@ -14,7 +14,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Quantity, around
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 
 _MOST_ROWS: Final = 2500
@@ -28,7 +28,13 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
     the largest vibration among them.
     Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
-    kept = _thinned(run)
+    # Equally spaced samples, with the stages' edges and the largest vibration.
+    last = run.time.size - 1
+    even = np.linspace(0, last, min(_MOST_ROWS, run.time.size)).round().astype(np.int64)
+    edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])
+    extra = np.array([int(np.argmax(run.amplitude)), last], dtype=np.int64)
+    kept = np.unique(np.concatenate([even, np.minimum(edges, last), extra]))
+    targets = run.targets
     return {
         "balancer": run.balancer,
         "scene": {"name": run.scene.name, "source": run.scene.source, "sha256": run.scene.sha256},
@@ -45,7 +51,13 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
         "energy_J": run.electrical_energy,
         "peak_voltage_V": float(np.abs(run.voltage).max()),
         "stages": [{"name": s.name, "start_s": s.start, "end_s": s.end} for s in run.stages],
-        "targets": None if run.targets is None else _targets(run),
+        "targets": targets
+        and {
+            "angle_rad": [targets.first, targets.second],
+            "half_angle_rad": targets.half_angle,
+            "residual_kg_m": targets.residual,
+            "saturated": bool(targets.saturated),
+        },
         "time_s": run.time[kept].tolist(),
         "speed_rad_s": run.speed[kept].tolist(),
         "amplitude_m": run.amplitude[kept].tolist(),
@@ -100,25 +112,6 @@ def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
 
 def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
     return {name.format(mass): row for mass, row in enumerate(values, start=1)}
-
-
-def _thinned(run: EccentricRun) -> IntArray:
-    """Numbers of samples to show: equally spaced, with the stages' edges and the largest vibration."""
-    last = run.time.size - 1
-    even = np.linspace(0, last, min(_MOST_ROWS, run.time.size)).round().astype(np.int64)
-    edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])
-    extra = np.array([int(np.argmax(run.amplitude)), last], dtype=np.int64)
-    return np.unique(np.concatenate([even, np.minimum(edges, last), extra]))
-
-
-def _targets(run: EccentricRun) -> dict[str, Any]:
-    found = {} if run.targets is None else run.targets._asdict()
-    return {
-        "angle_rad": [found["first"], found["second"]],
-        "half_angle_rad": found["half_angle"],
-        "residual_kg_m": found["residual"],
-        "saturated": bool(found["saturated"]),
-    }
 
 
 def eccentric_rows(run: EccentricRun) -> Rows:

@@ -84,7 +84,7 @@ class LiquidRingBalancer(Balancer):
     modelled: Collection[str] | None = None
     to_time_limit: bool = False
     rotors: Rotors | None = None
-    """Of drawn devices; None: their own, drawn."""
+    """Rotors of drawn devices; None: their own, drawn."""
 
     def __post_init__(self) -> None:
         """Refuse what is no algorithm."""
@@ -110,7 +110,7 @@ class LiquidRingBalancer(Balancer):
         return run_models(scene=self.scene, model=self.model)
 
     def inputs(self) -> tuple[Input, ...]:
-        """Those of the scene, with what it assumes where it states no uncertainty."""
+        """Inputs of the scene, with assumed uncertainties where it states none."""
         widths = half_widths(self.scene).items()
         by_path = {f"{UNCERTAIN_QUANTITIES[name]}.{name}": each for name, each in widths}
         return inputs_of(self.scene, lambda path, _: by_path.get(path, by_path.get(path.split("[")[0], 0.0)))

@@ -1,4 +1,4 @@
-"""What a machine moves beyond the fills at which runs end: there capacity is a wall, in a machine a slope."""
+"""Liquid that a machine moves beyond the fills at which runs end: a slope where runs have a wall."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NOTICEABLE: Final = 1e-3
 def beyond_capacity(
     scene: Scene, model: BalancerModel, ended: Sequence[str], *, settings: str = "these settings"
 ) -> Iterator[Finding]:
-    """What is said where devices end for want of capacity.
+    """Findings where devices end for want of capacity.
 
     Args: `ended`: how each one's run did. `settings`: what to call those of the scene.
     """

@@ -41,16 +41,16 @@ PAPER_MOMENT_UNCERTAINTY: Final = 0.007
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """What differs between the devices of a scene under a law."""
+    """Differences between the devices of a scene under a law."""
 
     errors: tuple[Uncertainty, ...]
     """All that is drawn."""
     remade: bool
-    """Whether a device has a law of its own, and not the scene's with another velocity."""
+    """True if a device has a law of its own, and not the scene's with another velocity."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all that is drawn, inputs of the scene by their keys."""
+        """Names of all that is drawn, inputs of the scene by their keys."""
         return tuple(each.name for each in self.errors)
 
     def half_width(self, name: str) -> float:
@@ -58,11 +58,11 @@ class Spread:
         return next(each.half_width or 0.0 for each in self.errors if each.name == name)
 
     def factor(self, name: str, z: Mapping[str, float]) -> float:
-        """By which it acts, at its deviation."""
+        """Factor by which a drawn error acts at its deviation."""
         return math.exp(math.log1p(self.half_width(name)) * z[name] / NORMAL_95)
 
     def document(self) -> list[dict[str, Any]]:
-        """What is drawn, for JSON."""
+        """Drawn errors, for JSON."""
         return [each.document() for each in self.errors]
 
     @classmethod
@@ -160,7 +160,7 @@ def devices(
 
 
 def _rows(columns: Mapping[str, FloatArray]) -> list[dict[str, float]]:
-    """What each device has of every column."""
+    """Values of each device by the names of the columns."""
     return [dict(zip(columns, row, strict=True)) for row in np.stack(list(columns.values()), axis=1).tolist()]
 
 

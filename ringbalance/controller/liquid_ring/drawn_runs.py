@@ -44,7 +44,7 @@ RELATIVE_ERROR: Final = 1e-4
 """Allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's, and
 within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
-"""Of one run without a trace."""
+"""Samples of one run without a trace, at the most."""
 _GROUPS: Final = (0, 4, 16, 32, 64)
 """Between which numbers, of each 64 that follow each other, devices are made at once: each has the same bits
 whichever are asked for, and of a design that four devices refuse no more are made.
@@ -72,7 +72,7 @@ _ENDS: Final = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrawnRuns:
-    """What runs of a scene's devices under a law share."""
+    """Runs of a scene's devices under a law, and all that they share."""
 
     scene: Scene
     model: BalancerModel
@@ -80,9 +80,9 @@ class DrawnRuns:
     limit: float
     """Amplitude to come below, m, whatever the controller rests at."""
     rotors: Rotors | None = None
-    """Of the devices; None: their own, drawn."""
+    """Rotors of the devices; None: their own, drawn."""
     bare: bool = False
-    """Whether the model's law does not know what the scene's uncertain inputs do to it."""
+    """True if the model's law has no uncertainties of the scene's inputs."""
 
     @cached_property
     def informed(self) -> BalancerModel:
@@ -154,12 +154,12 @@ class DrawnRuns:
         return self._devices(block)[block.index(number)]
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is kept stays behind."""
+        """Fields without the caches."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def _devices(self) -> Callable[[range], tuple[Device, ...]]:
-        """Of some numbers; the last ones are kept, as a search runs the same again and again."""
+        """Devices of some numbers; the last ones are cached, as a search runs the same again and again."""
 
         def made(block: range) -> tuple[Device, ...]:
             seed, rotors = self.scene.run.seed, self.rotors
@@ -202,17 +202,17 @@ class _Group:
     """Devices that are made at once, and what no gas pressure changes in them."""
 
     devices: tuple[Device, ...]
-    """Those that differ in numbers alone stand beside each other."""
+    """Devices of the group; those that differ in numbers alone stand beside each other."""
     scenes: tuple[Scene, ...]
-    """What they run as."""
+    """Scenes as which the devices run."""
     kinds: tuple[tuple[slice, Scene], ...]
     """Places of those that differ in numbers alone, and these as one scene."""
     plants: Records
     """Type `PLANT`."""
     fields: Mapping[str, Any]
-    """Of their runs, shape (n,)."""
+    """Fields of their runs, shape (n,)."""
     held: bool
-    """Whether an empty tube fills up to its crest before liquid passes."""
+    """True if an empty tube fills up to its crest before liquid passes."""
     noise: Callable[[int], FloatArray]
 
     @classmethod
@@ -308,7 +308,7 @@ class _Under:
     unreachable: FloatArray
     """Vibration that remains with the liquid where the gas can bring it, m."""
     beyond_disc: FloatArray
-    """The same with gas that empties a chamber to its residual fill, m."""
+    """Vibration that remains with gas that empties a chamber to its residual fill, m."""
     usable_moment: FloatArray
     """Towards its own unbalance, kg m."""
     unbalance: FloatArray
@@ -319,7 +319,7 @@ class _Under:
     def ran(
         self, plan: LoopPlan, rows: IntArray, *, whole: bool, limit: float
     ) -> tuple[FloatArray, IntArray]:
-        """What runs of some devices come to, shape (`ARRAYS`, settings, rows), and places in `_ENDS`."""
+        """Results of runs of some devices, shape (`ARRAYS`, settings, rows), and indices into `_ENDS`."""
         shape, group = (plan.loops.size, rows.size), self.group
         numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
         # With the liquid at its best, of devices whose chambers cannot bring it to the limit.

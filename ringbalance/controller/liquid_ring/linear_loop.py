@@ -81,10 +81,10 @@ class LinearLoop:
     derivative: float
     """q = Td/dt."""
     findings: tuple[Finding, ...]
-    """That all that is said of it holds for a gain that the scene does not give."""
+    """Findings that all results hold for a gain that the scene does not give."""
 
     def __repr__(self) -> str:
-        """What it says of the loop, without its matrices."""
+        """Results on the loop without its matrices, for JSON."""
         plant = self.plant
         lines = [
             f"Linear loop, {'stable' if self.stable else 'unstable'}, sampled every {plant.dt:g} s",
@@ -110,7 +110,7 @@ class LinearLoop:
 
     @property
     def stable(self) -> bool:
-        """Whether a small residual decays."""
+        """True if a small residual decays."""
         return bool(np.max(np.abs(np.linalg.eigvals(self.closed))) < 1.0)
 
     @property
@@ -157,7 +157,7 @@ class LinearLoop:
 
     @property
     def proportional_alone(self) -> bool:
-        """Whether margins have a closed form."""
+        """True if the margins have a closed form."""
         return self.integral == 0.0 and self.derivative == 0.0
 
     def _open(self, z: ComplexArray) -> ComplexArray:

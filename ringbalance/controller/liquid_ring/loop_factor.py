@@ -59,7 +59,7 @@ class LoopFactor:
     value: float | None
     """h, part of a small residual that one injection removes; None for an algorithm without a gain."""
     fixed: bool
-    """Whether h keeps its value; an algorithm that learns comes to one."""
+    """True if h keeps its value; an algorithm that learns comes to one."""
     limit: float
     """2 cos d, from which a small residual grows."""
     deviation: float | None
@@ -67,7 +67,7 @@ class LoopFactor:
 
     @property
     def unstable(self) -> bool:
-        """Whether a small residual grows."""
+        """True if a small residual grows."""
         return self.fixed and self.value is not None and self.value >= self.limit
 
 
@@ -78,7 +78,9 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
     learns the true one: what noise leaves is taken at a loop factor of one.  A trial has no linear loop, and
     the same bound on the noise is used for it.
     """
-    rate, noise = loop_rate(scene, model), _noise_at_limit(scene)
+    rate, sensor = loop_rate(scene, model), scene.sensor
+    # Of the measured vibration where its amplitude is at the limit.
+    noise = math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
     error = 0.0
     value: float | None = None
     integral = derivative = 0.0
@@ -107,7 +109,7 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
 
 
 def default_gain(scene: Scene) -> Iterator[Finding]:
-    """That a loop is judged by a gain that its scene does not give."""
+    """Finding that a loop is judged by a gain that its scene does not give."""
     if scene.origin_of("controller.proportional") == "default":
         yield Finding(code="default_gain", values={"proportional": scene.controller.proportional})
 
@@ -121,26 +123,16 @@ def vibration_left(scene: Scene, loop: LoopFactor) -> float | None:
     return max(_DEVIATIONS * noise, step / math.sqrt(2.0)) if math.isfinite(noise) else None
 
 
-def _noise_at_limit(scene: Scene) -> float:
-    """Standard deviation of the measured vibration where its amplitude is at the limit, m."""
-    sensor = scene.sensor
-    return math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
-
-
-def _usable_fill(scene: Scene, model: BalancerModel) -> float:
-    """Smallest fill ratio to which a chamber is driven: its residual one, or that at which the gas stalls."""
-    start, law = scene.disc.initial_fill, model.flow
-    stalled = stalled_fill_ratio(law=law, total=2 * start, gas_pressure=scene.gas.pressure)
-    return min(max(residual_fill_ratio(scene, law=law), stalled), start)
-
-
 def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
-    total = 2.0 * scene.disc.initial_fill
+    start, law = scene.disc.initial_fill, model.flow
+    total = 2.0 * start
     least, most = _range(scene, model)
-    lowest = max(least, _usable_fill(scene, model))
+    # A chamber is driven to its residual fill, or to that at which the gas stalls.
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+    lowest = max(least, min(max(residual_fill_ratio(scene, law=law), stalled), start))
     highest = min(most, total - lowest)
-    ends = np.array([scene.disc.initial_fill, lowest, highest])
+    ends = np.array([start, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
     pairs = scene.disc.chambers // 2
     row = first_memory(chamber_directions(scene.disc.chambers)[:pairs]).tolist()
@@ -235,18 +227,18 @@ FREQUENCIES: Final = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """Of the linear loop about the balanced state."""
+    """Margins of the linear loop about the balanced state."""
 
     gain_factor: float
-    """By which the loop factor may grow, the lag angle being right."""
+    """Factor by which the loop factor may grow, the lag angle being right."""
     phase: float
     """Error of the lag angle that the loop bears, its loop factor being right, rad."""
     disk: float
     """Disk margin, 0 to 2: gain and phase may change together, at every frequency by other amounts."""
     disk_gain_factor: float
-    """By which the gain may then grow or fall, (2 + disk)/(2 - disk)."""
+    """Factor by which the gain may then grow or fall, (2 + disk)/(2 - disk)."""
     disk_phase: float
-    """By which the phase may then turn, 2 atan(disk/2), rad."""
+    """Angle by which the phase may then turn, 2 atan(disk/2), rad."""
 
 
 def loop_margins(

@@ -1,4 +1,4 @@
-"""What a liquid ring offers to try: settings, changes of its scene, and valves to choose.
+"""Trials that a liquid ring offers: settings, changes of its scene, and valves to choose.
 
 Settings are in units of what the loop and the valve do at a pressure.  What helps where too few devices meet
 what is asked follows from runs alone; here stands what can be built, and where a change has no meaning.  The
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -55,7 +55,7 @@ _PRESSURES: Final = tuple(
 _REACH: Final = 3.2
 """Times the scene's pressure, up and down, of the levels that may be tried."""
 _NEAR: Final = 1.8
-"""The same of those that are tried at first."""
+"""Times the scene's pressure, up and down, of the levels that are tried at first."""
 _OFFSET_STEP: Final = 1e-4
 """s, to which an offset is rounded."""
 _OWN: Final = {"target_vector": (_GAIN, _OFFSET, _INTEGRAL), "law_based": (_OFFSET,), "trial": ()}
@@ -79,60 +79,57 @@ class _Loop:
 
 
 def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials, ...]:
-    """Of the scene's kind of controller first. Args: `limit`: by which runs are judged, m."""
+    """Settings to try, those of the scene's kind of controller first.
+
+    Args: `limit`: amplitude by which runs are judged, m.
+    """
+
+    own, available, controller = scene.gas.pressure, scene.design.pressure, scene.controller
 
     @cache
     def loop(pressure: float) -> _Loop:
-        return _Loop.of(_at(scene, pressure), model)
+        return _Loop.of(replace(scene, gas=replace(scene.gas, pressure=pressure)), model)
 
-    def of(kind: str) -> Trials:
-        def settings(point: Point) -> Mapping[str, Any] | None:
-            pressure = point.get(PRESSURE, scene.gas.pressure)
-            return _settings(scene, kind, point, loop(pressure), limit=limit)
+    def settings(kind: str, point: Point) -> Mapping[str, Any] | None:
+        pressure = point.get(PRESSURE, own)
+        linear = loop(pressure)
+        if linear.rate <= 0.0:
+            return None
+        values: dict[str, Any] = {
+            PRESSURE: pressure,
+            "controller.kind": kind,
+            "controller.limit": min(limit, controller.limit),
+        }
+        if _GAIN.name in point:
+            values["controller.proportional"] = rounded(point[_GAIN.name] / linear.rate)
+            part = point[_INTEGRAL.name]
+            values["controller.integral_time"] = rounded(controller.period / part) if part else None
+        if _OFFSET.name in point:
+            offset = round(point[_OFFSET.name] * linear.dead_time / _OFFSET_STEP) * _OFFSET_STEP
+            values["controller.gas_time_offset"] = (round(offset, 6),) if offset else None
+        return {path: value for path, value in values.items() if value != raw_value_at(scene, path)}
 
-        return Trials(
-            kind=kind, axes=_OWN[kind], settings=settings, stated=stated, kept=kept, along=_pressures(scene)
-        )
-
-    gain = scene.origin_of("controller.proportional")
-    stated = gain != "default" or scene.controller.kind != "target_vector"
-    kind, kept = scene.controller.kind, scene.origin_of("controller.kind") == "given"
-    return tuple(of(each) for each in (kind, *_INSTEAD[kind]))
-
-
-def _settings(
-    scene: Scene, kind: str, point: Point, loop: _Loop, *, limit: float
-) -> Mapping[str, Any] | None:
-    if loop.rate <= 0.0:
-        return None
-    found: dict[str, Any] = {
-        PRESSURE: point.get(PRESSURE, scene.gas.pressure),
-        "controller.kind": kind,
-        "controller.limit": min(limit, scene.controller.limit),
-    }
-    if _GAIN.name in point:
-        found["controller.proportional"] = rounded(point[_GAIN.name] / loop.rate)
-        part = point[_INTEGRAL.name]
-        found["controller.integral_time"] = rounded(scene.controller.period / part) if part else None
-    if _OFFSET.name in point:
-        offset = round(point[_OFFSET.name] * loop.dead_time / _OFFSET_STEP) * _OFFSET_STEP
-        found["controller.gas_time_offset"] = (round(offset, 6),) if offset else None
-    return {path: value for path, value in found.items() if value != raw_value_at(scene, path)}
-
-
-def _pressures(scene: Scene) -> Axis:
-    """The scene's and levels around it, up to the highest that is available where [design] states one."""
-    own, available = scene.gas.pressure, scene.design.pressure
-    levels = {own, *(each for each in _PRESSURES if own / _REACH <= each <= own * _REACH)}
+    # The scene's pressure and levels around it, up to the highest that is available.
+    pressures = {own, *(each for each in _PRESSURES if own / _REACH <= each <= own * _REACH)}
     if available is not None:
-        levels = {available, *(each for each in levels if each < available)}
-    ascending = tuple(sorted(levels))
-    first = tuple(at for at, each in enumerate(ascending) if own / _NEAR <= each <= own * _NEAR)
-    return Axis(name=PRESSURE, levels=ascending, first=first or (len(ascending) - 1,), unit="Pa")
-
-
-def _at(scene: Scene, pressure: float) -> Scene:
-    return replace(scene, gas=replace(scene.gas, pressure=pressure))
+        pressures = {available, *(each for each in pressures if each < available)}
+    levels = tuple(sorted(pressures))
+    first = tuple(at for at, each in enumerate(levels) if own / _NEAR <= each <= own * _NEAR)
+    along = Axis(name=PRESSURE, levels=levels, first=first or (len(levels) - 1,), unit="Pa")
+    gain = scene.origin_of("controller.proportional")
+    stated = gain != "default" or controller.kind != "target_vector"
+    kept = scene.origin_of("controller.kind") == "given"
+    return tuple(
+        Trials(
+            kind=kind,
+            axes=_OWN[kind],
+            settings=partial(settings, kind),
+            stated=stated,
+            kept=kept,
+            along=along,
+        )
+        for kind in (controller.kind, *_INSTEAD[controller.kind])
+    )
 
 
 _NARROWER: Final = (0.7, 0.5, 0.35, 0.25)
@@ -161,7 +158,7 @@ _MEASURED: Mapping[str, str] = MappingProxyType(
     dict.fromkeys((LOSS, *MODEL_ERRORS), "measure_flow")
     | {MOMENT: "measure_moment", "draw_down_factor": "measure_residual"}
 )
-"""What to measure in place of an error of a model."""
+"""Codes of what to measure in place of an error of a model."""
 
 
 def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
@@ -195,7 +192,7 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
 
 
 def drawn_input(name: str) -> DrawnInput:
-    """What kind of thing an input of drawn devices is, by its name among them."""
+    """Kind of an input of drawn devices, by its name."""
     if name in UNCERTAIN_QUANTITIES:
         kind = of_input(name, 0.0)
         measure = _MEASURED.get(name, MEASURE_INPUT)
@@ -213,15 +210,12 @@ def drawn_input(name: str) -> DrawnInput:
 def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
     for factor in _NARROWER:
         yield Remedy(code="bore", changes={"tube.bore": factor * scene.tube.bore})
-    if _open_time(scene, model) > _SLOW * (scene.requirement.settling_time or scene.run.time_limit):
+    # Valve-open time in which the full tube would correct the initial vibration, s.
+    rate = loop_rate(scene, model)
+    open_time = scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
+    if open_time > _SLOW * (scene.requirement.settling_time or scene.run.time_limit):
         for factor in _WIDER:
             yield Remedy(code="wider_bore", changes={"tube.bore": factor * scene.tube.bore})
-
-
-def _open_time(scene: Scene, model: BalancerModel) -> float:
-    """Valve-open time in which the full tube would correct the initial vibration, s."""
-    rate = loop_rate(scene, model)
-    return scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
 
 
 def _of_valve(scene: Scene) -> Iterator[Remedy]:
@@ -245,7 +239,7 @@ def _of_limit(scene: Scene) -> Iterator[Remedy]:
 
 
 def _of_crest(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
-    """Where liquid runs back, or gas that could empty a chamber does not lift the liquid to the crest."""
+    """Higher crests where liquid runs back, or other ones where gas does not lift the liquid to the crest."""
     disc, tube, law = scene.disc, scene.tube, model.flow
     held, total = Holding.of(scene, fill_ratio=disc.max_fill_ratio), 2 * disc.initial_fill
     stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)

@@ -1,4 +1,4 @@
-"""What a disc's liquid can do at best, and what pressure starts a flow."""
+"""Largest moments of a disc's liquid, and the pressure that starts a flow."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class LiquidRing:
 
     @property
     def gas_pressure(self) -> float:
-        """Of the supply, gauge, Pa."""
+        """Gas pressure of the supply, gauge, Pa."""
         return self.dynamics.gas_pressure
 
     @property
@@ -120,7 +120,7 @@ def moment_towards(corners: ComplexArray, towards: ComplexArray) -> FloatArray:
 
 @cache
 def _corner_directions(chambers: int) -> ComplexArray:
-    """Of the moments that a disc can form, for a pair's moment of one."""
+    """Directions of the corners of the moments that a disc can form, for a pair's moment of one."""
     axes = chamber_directions(chambers)[: chambers // 2]
     seen_from = np.exp(1j * np.pi * (2 * np.arange(chambers) + 1) / chambers + 0.5j * np.pi)
     signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)

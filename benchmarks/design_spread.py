@@ -16,7 +16,7 @@ from typing import Final
 
 import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.judging.judge import FRESH, judged_all
+from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, judged_all
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import run_design
 from ringbalance.results.result import Presentation
@@ -59,7 +59,7 @@ def answer(start: int, seed: int) -> Answer:
     design = run_design(scene, presentation=presentation, workers=1, start=start)
     seconds = time.process_time() - begun
     balancer = balancer_of(design.recommended_scene)
-    first = FRESH + CHECKED
+    first = FIRST_VERDICT_DEVICE + CHECKED
     (judgement,) = judged_all(balancer, [{}], first=CHECKED, most=CHECKED, start=first, whole=False)
     return Answer(start=start, seed=seed, design=design, fraction=judgement.fraction.value, seconds=seconds)
 

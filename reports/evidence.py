@@ -21,7 +21,7 @@ from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccen
 from ringbalance.controller.eccentric_mass.run_rows import amplitude_band
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, loops_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
-from ringbalance.controller.judging.judge import FRESH
+from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -214,7 +214,7 @@ def _plain_study(scene: SceneFile) -> Record:
 def _eccentric_study(scene: EccentricScene) -> Record:
     """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
     run, balancer = simulate_eccentric(scene), balancer_of(scene)
-    several = balancer.run({}, Draws.block(FRESH, _TRACED), trace=True)
+    several = balancer.run({}, Draws.block(FIRST_VERDICT_DEVICE, _TRACED), trace=True)
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,

@@ -1,4 +1,4 @@
-"""What judgements over drawn devices come to, as plain numbers for the evidence."""
+"""Evidence of the report from judgements over drawn devices, as plain JSON records in SI."""
 
 from __future__ import annotations
 
@@ -9,17 +9,11 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, Settings
-from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
+from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all, plain_settings
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning import (
-    LONGER,
-    Tuning,
-    judgement_document,
-    plain_settings,
-    required_document,
-)
+from ringbalance.controller.judging.tuning import LONGER, Tuning
 from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
 from ringbalance.results.requirements import MET, Proportion
@@ -30,14 +24,14 @@ from ringbalance.scene.origins import SceneFile, raw_value_at, value_at
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
-_COARSE: Final = 16
-"""Devices on which settings for what can be bought are chosen."""
-_POINTS: Final = 50
-"""Most entries of a curve."""
+_COARSE_DEVICES: Final = 16
+"""Devices on which settings for things that can be bought are chosen."""
+_CURVE_POINTS: Final = 50
+"""Largest number of points of a curve."""
 
 
 def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
-    """The scene's own settings over drawn devices, and what mends it where some do not meet what is asked."""
+    """Judge the scene's own settings, with remedies and measurements where they do not suffice."""
     (own,) = judged_all(balancer, [{}], first=first, most=most)
     suffices = own.verdict == MET or bool(own.meets.all())
     measures = () if suffices else tuple(ranked(balancer, own).findings())
@@ -50,123 +44,115 @@ def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Rec
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
-    """The scene's own settings beside the recommended ones, both watched longer too, and what else to do."""
+    """The scene's own settings beside the recommended ones, both watched for `LONGER` too."""
+
+    def watched(judgement: Judgement) -> Record:
+        fraction = judgement.fraction.document()
+        return {"further_s": LONGER, "fraction": fraction, "verdict": judgement.verdict}
+
     best, own, document = tuning.recommended, tuning.own, tuning.to_dict()
-    recommended = judgement_record(best) | {"longer": tuning.longer and _watched(tuning.longer, LONGER)}
+    own_document, recommended, moved = None, None, None
+    if own is not None:
+        (own_longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER)
+        own_document = judgement_record(own) | {"longer": watched(own_longer)}
+    if own is None or best.settings:
+        recommended = judgement_record(best) | {"longer": tuning.longer and watched(tuning.longer)}
+    if (path := tuning.along_name) in best.settings:
+        # The recommended settings leave the scene's level of the scan axis.
+        before = value_at(tuning.given, path)
+        there = [each.judgement.fraction.document() for each in tuning.along if each.level == before]
+        moved = {
+            "name": key_words(path),
+            "unit": tuning.along_unit,
+            "before": before,
+            "after": best.settings[path],
+            "fraction": there[0] if there else None,
+        }
     measures: Iterable[Finding] = tuning.ranking.findings()
     if best.verdict == MET:
         measures = () if own is not None and own.verdict == MET else (Finding(code="settings_suffice"),)
     return {
-        "own": None if own is None else judgement_record(own) | {"longer": _longer(balancer)},
-        "recommended": recommended if own is None or best.settings else None,
-        "moved": _moved(tuning),
+        "own": own_document,
+        "recommended": recommended,
+        "moved": moved,
         "capacity": [each.document() for each in tuning.capacity],
         **{name: document[name] for name in ("along", "ranking", "remedies")},
         "measures": [each.document() for each in measures],
     }
 
 
-def _moved(tuning: Tuning) -> Record | None:
-    """Where the recommended settings leave the scene's level of the axis, and what serves how many there."""
-    path = tuning.along_name
-    if path not in tuning.recommended.settings:
-        return None
-    before = value_at(tuning.given, path)
-    at = [each.judgement.fraction.document() for each in tuning.along if each.level == before]
-    return {
-        "name": key_words(path),
-        "unit": tuning.along_unit,
-        "before": before,
-        "after": tuning.recommended.settings[path],
-        "fraction": at[0] if at else None,
-    }
-
-
-def _longer(balancer: Balancer) -> Record:
-    (longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER)
-    return _watched(longer, LONGER)
-
-
 def choice_records(balancer: Balancer, some: slice) -> list[Record]:
-    """Some of what can be bought for a scene that leaves it open, and what each makes of it."""
-    return [each.document() for each in tried_choices(balancer, search=_coarsely, some=some)]
+    """Judge some of the things that can be bought for what a scene leaves open."""
 
+    def coarse_search(changed: Balancer) -> Settings:
+        """The best grid point of the first kind of controller: enough to tell the things apart."""
+        space = changed.trials()[0]
+        grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
+        offered = (space.settings(dict(point)) for point in grid)
+        settings = [each for each in offered if each is not None]
+        outcomes = changed.run_all(settings, Draws.first(_COARSE_DEVICES))
+        settled = [np.count_nonzero(each.settled) for each in outcomes]
+        return settings[int(np.argmax(settled))] if settings else {}
 
-def _coarsely(balancer: Balancer) -> Settings:
-    """The best of the settings that a search begins with: enough to tell what can be bought apart."""
-    trials, *_ = balancer.trials()
-    names = [axis.name for axis in trials.axes]
-    levels = [[axis.levels[at] for at in axis.first] for axis in trials.axes]
-    points = [dict(zip(names, point, strict=True)) for point in product(*levels)]
-    settings = [found for each in points if (found := trials.settings(each)) is not None]
-    ran = zip(settings, balancer.run_all(settings, Draws.first(_COARSE)), strict=True)
-    return max(ran, key=lambda each: np.count_nonzero(each[1].settled), default=({}, None))[0]
+    return [each.document() for each in tried_choices(balancer, search=coarse_search, some=some)]
 
 
 def judgement_record(judgement: Judgement) -> Record:
-    """One setting over drawn devices; SI."""
-    pairs = zip(required_document(judgement), judgement.demands, strict=True)
+    """A judgement with the verdict on every demand and the curve of settled devices."""
+    required = judgement.demands_document()
+    for document, demand in zip(required, judgement.demands, strict=True):
+        document["verdict"] = judgement.fraction_of(demand).verdict(judgement.required_fraction)
     return {
-        **judgement_document(judgement),
+        **judgement.document(),
         "settings": plain_settings(judgement.settings),
-        "asked": judgement.asked,
-        "required": [
-            {**each, "verdict": judgement.fraction_of(demand).verdict(judgement.asked)}
-            for each, demand in pairs
-        ],
+        "asked": judgement.required_fraction,
+        "required": required,
         "further_s": FURTHER,
         "settled": settled_record(judgement.outcomes),
     }
 
 
-def _watched(judgement: Judgement, further: float) -> Record:
-    return {"further_s": further, "fraction": judgement.fraction.document(), "verdict": judgement.verdict}
-
-
 def settled_record(outcomes: Outcomes) -> Record:
-    """Fraction of the devices that has settled by a time, with its bounds."""
+    """Fraction of the devices that has settled by a time, with its 95 % bounds, as a curve."""
     times = np.sort(outcomes.settling_time[outcomes.settled])
-    counts = np.unique(np.linspace(1, times.size, _POINTS).round()) if times.size else np.zeros(0)
-    by = [Proportion(count=int(count), of=outcomes.settled.size) for count in counts]
+    counts = np.unique(np.linspace(1, times.size, _CURVE_POINTS).round()) if times.size else np.zeros(0)
+    fractions = [Proportion(count=int(count), of=outcomes.settled.size) for count in counts]
     return {
-        "time_s": [float(times[each.count - 1]) for each in by],
-        "value": [each.value for each in by],
-        "low": [each.low for each in by],
-        "high": [each.high for each in by],
+        "time_s": [float(times[each.count - 1]) for each in fractions],
+        "value": [each.value for each in fractions],
+        "low": [each.low for each in fractions],
+        "high": [each.high for each in fractions],
     }
 
 
-def advice_view(found: Record) -> Record:
-    """Remedies and measurements in words."""
-    return {
-        "remedies": [_remedy(each) for each in found.get("remedies", ())],
-        "measures": [each["text"] for each in found.get("measures", ())],
-    }
-
-
-def _remedy(row: Record) -> str:
-    """The change of the scene in words."""
-    changes = [f"{key_words(path)} {setting_text(path, value)}" for path, value in row["changes"].items()]
-    # What a sensor does, a filter may be told in a key of the same name.
-    return opening(", ".join(dict.fromkeys(changes)))
+def advice_view(record: Record) -> Record:
+    """Remedies and measurements as text."""
+    remedies = []
+    for remedy in record.get("remedies", ()):
+        changes = [
+            f"{key_words(path)} {setting_text(path, value)}" for path, value in remedy["changes"].items()
+        ]
+        # A filter may be told in a key of its own what a sensor does: the same words twice.
+        remedies.append(opening(", ".join(dict.fromkeys(changes))))
+    return {"remedies": remedies, "measures": [each["text"] for each in record.get("measures", ())]}
 
 
 def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
-    """Values of a scene as lines of its file, by table; what it leaves out is left out."""
+    """Values of a scene as lines of its file, by table, without those that it leaves out."""
+
+    def written(value: Any, path: str) -> Any:
+        if isinstance(value, tuple):
+            # One value for all chambers is written as a value, not as a list of one.
+            return written(value[0], path) if len(value) == 1 else [written(each, path) for each in value]
+        if isinstance(value, str | bool | int):
+            return value
+        unit = usual_unit(path)
+        return shortest_quantity(value, unit) if unit not in ("", "1") else float(shortest(value))
+
     tables: dict[str, list[str]] = {}
     for path in paths:
         table, _, key = path.partition(".")
         value = raw_value_at(scene, path)
         if value not in (None, ()):
-            tables.setdefault(table, []).append(f"{key} = {toml_text(_written(value, path))}")
+            tables.setdefault(table, []).append(f"{key} = {toml_text(written(value, path))}")
     return [{"table": table, "lines": lines} for table, lines in tables.items()]
-
-
-def _written(value: Any, path: str) -> Any:
-    if isinstance(value, tuple):
-        # One time for all chambers is written as it is read, and not as a list of one.
-        return _written(value[0], path) if len(value) == 1 else [_written(each, path) for each in value]
-    if isinstance(value, str | bool | int):
-        return value
-    unit = usual_unit(path)
-    return shortest_quantity(value, unit) if unit not in ("", "1") else float(shortest(value))

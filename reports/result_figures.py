@@ -77,7 +77,7 @@ def _tuning(result: Any) -> list[Drawing]:
     judged = {"own": result.own, "recommended": result.recommended}
     records = {name: judgement_record(each) for name, each in judged.items() if each is not None}
     curves = [(SETTINGS[name], each["settled"]) for name, each in records.items()]
-    return drawings_in([settling(curves, result.recommended.asked)])
+    return drawings_in([settling(curves, result.recommended.required_fraction)])
 
 
 def _comparison(result: Any) -> list[Drawing]:

@@ -159,7 +159,7 @@ def few_devices() -> Iterator[None]:
         patch.setattr(tune_module, "judged_all", partial(judged_all, first=8, most=8))
         patch.setattr(tune_module, "BLOCK", 8)
         patch.setattr(remedies_module, "judged", partial(judged, most=8))
-        patch.setattr(remedies_module, "_FIRST", 4)
+        patch.setattr(remedies_module, "_FIRST_DEVICES", 4)
         patch.setattr(tune_module, "searched", lambda *_, **__: {"controller.gas_time_offset": (1e-3,)})
         patch.setattr(search_module, "_HEATS", ((0, 4),))
         patch.setattr(search_module, "_ROUNDS", 1)

@@ -1,4 +1,4 @@
-"""What varies in a sweep: keys of a scene over a range or a list, several together, or whole tables of a CSV.
+"""Axes of a sweep: keys of a scene over a range or a list, several together, or whole tables of a CSV.
 
 An axis is written KEY=VALUES, where VALUES is a range `LOW:HIGH:COUNT`, even steps, or `LOW:HIGH:COUNT:log`;
 a list `A,B,C`; or, for the name of a table, a CSV file whose columns are keys of it and whose rows are things
@@ -50,9 +50,9 @@ class Range:
     low: float
     high: float
     count: int | None = None
-    """Of even steps; None: for a sample alone."""
+    """Number of even steps; None: for a sample alone."""
     log: bool = False
-    """Whether the steps are even in the logarithm."""
+    """True if the steps are even in the logarithm."""
 
     def at(self, share: FloatArray) -> FloatArray:
         """Values at fractions of the way from one end to the other; the ends exactly."""
@@ -60,6 +60,11 @@ class Range:
         value = low + share * (high - low)
         inner = np.exp(value) if self.log else value
         return np.where(share == 0, self.low, np.where(share == 1, self.high, inner))
+
+    def share(self, value: float) -> float:
+        """Fraction of the way from one end to the other at a value, or at the end next to it."""
+        low, high, at = (math.log(each) if self.log else each for each in (self.low, self.high, value))
+        return min(max((at - low) / (high - low), 0.0), 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,16 +76,16 @@ class Axis:
     choices: tuple[Point, ...] = ()
     """Of a list, one after the other."""
     names: tuple[str, ...] = ()
-    """Of the rows of a CSV file that names them."""
+    """Names of the rows of a CSV file that names them."""
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Of the keys."""
+        """Paths of the keys."""
         return tuple(self.ranges or dict.fromkeys(path for each in self.choices for path in each))
 
     @property
     def head(self) -> str:
-        """What stands for the axis: such as "gas.name" where its rows have names, else its first key."""
+        """Key that stands for the axis: such as "gas.name" where its rows have names, else its first key."""
         return f"{self.paths[0].partition('.')[0]}.{NAME}" if self.names else self.paths[0]
 
     def name_of(self, point: Point) -> str:
@@ -122,7 +127,7 @@ class Plan:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Of all keys that vary."""
+        """Paths of all keys that vary."""
         return tuple(path for axis in self.axes for path in axis.paths)
 
     @property
@@ -141,7 +146,13 @@ class Plan:
             twice = next(path for path in self.paths if self.paths.count(path) > 1)
             raise _fault(twice, "it varies twice", "each key in one axis")
         if self.sample:
-            shares = _shares(self.sample, len(self.axes))
+            kind, count = _sample_size(self.sample)
+            shares: FloatArray
+            if kind == "latin":
+                numbers = range(len(self.axes))
+                shares = np.stack([quantiles(f"axis {i}", range(count), seed=0) for i in numbers], axis=-1)
+            else:
+                shares = registered("function", "sobol")(len(self.axes), count)
             parts = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
             return tuple(_merged(row) for row in zip(*parts, strict=True))
         grids = [axis.grid() for axis in self.axes]
@@ -152,16 +163,6 @@ class Plan:
 
 def _merged(parts: Sequence[Point]) -> Point:
     return {path: value for part in parts for path, value in part.items()}
-
-
-def _shares(sample: str, axes: int) -> FloatArray:
-    """Points of a sample in the unit cube, shape (n, axes)."""
-    kind, count = _sample_size(sample)
-    if kind == "latin":
-        columns = [quantiles(f"axis {place}", range(count), seed=0) for place in range(axes)]
-        return np.stack(columns, axis=-1)
-    found: FloatArray = registered("function", "sobol")(axes, count)
-    return found
 
 
 def _sample_size(sample: str) -> tuple[str, int]:
@@ -248,7 +249,7 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
 
 
 def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
-    """Of KEY=VALUES, or of several with commas between."""
+    """Read KEY=VALUES, or several with commas between."""
     keys: list[tuple[str, list[str]]] = []
     for part in text.split(","):
         path, equals, value = part.partition("=")

@@ -46,9 +46,16 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
     Args: `table`: of the scene. `keys`: of that table.
     Raises: SceneError: every error of the file, with line and column.
     """
-    content = _parsed(file)
-    columns: dict[str, list[Any]] = {}
+    shown = file_name(file)
+    raw, problems = read_content(file, what="file of choices")
+    text, undecoded = ("", problems) if problems else decoded(raw, file=shown)
+    if undecoded:
+        raise SceneError(undecoded)
+    content, problems = parse_table(_REMARK.sub("", text), file=shown, most=MOST_ROWS)
+    if content is None or problems:
+        raise SceneError(in_order(problems))
     faults: list[Fault] = []
+    columns: dict[str, list[Any]] = {}
     for head in content.heads:
         name, unit = split_head(head) or (head, "")
         key = keys.get(name)
@@ -82,19 +89,6 @@ def as_toml(text: str, reader: ValueReader) -> Any:
             except ValueError:
                 continue
     return text
-
-
-def _parsed(file: Path) -> Table:
-    """Raises: SceneError: the file cannot be read, or is no table."""
-    shown = file_name(file)
-    content, faults = read_content(file, what="file of choices")
-    text, further = ("", faults) if faults else decoded(content, file=shown)
-    if further:
-        raise SceneError(further)
-    table, faults = parse_table(_REMARK.sub("", text), file=shown, most=MOST_ROWS)
-    if table is None or faults:
-        raise SceneError(in_order(faults))
-    return table
 
 
 def _column(table: Table, head: str, unit: str, reader: ValueReader) -> tuple[list[Any], list[Fault]]:

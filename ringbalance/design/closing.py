@@ -1,15 +1,13 @@
-"""The last step of a search: designs at the edge of what is asked are judged, all on the same devices, on
-which nothing was chosen before.
+"""Last step of a search: designs near the required fraction are judged, all on the same devices.
 
-The fraction of devices that a design serves is then one number for a design, whatever led to it; and what two
-designs differ by is known several times better than what each serves of all devices that may be drawn.
+Nothing was chosen on these devices, so the fraction that a design serves does not depend on the way that led
+to it, and the difference between two designs is known several times better than the fraction of all devices.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -17,81 +15,43 @@ import numpy as np
 from scipy.special import expit, logit, ndtr
 
 from ringbalance.controller.balancer import Settings
-from ringbalance.controller.judging.judge import Judgement
-from ringbalance.design.axes import Point
 from ringbalance.design.hunt import Hunt
-from ringbalance.design.races import Points, Races, deal
-from ringbalance.design.racing import Place, judged_design, judged_race, tuned_settings
-from ringbalance.results.requirements import MET
+from ringbalance.design.races import Candidate, Points, Races, deal
+from ringbalance.design.racing import Race, judged_design, tuned_settings
+from ringbalance.scene.arrays import FloatArray
 
 AS_SMALL: Final = 0.01
 """Relative difference in size up to which two designs count as equally small: the search's resolution."""
-_MOST: Final = 10
-"""Listed designs from which on no further pair is judged."""
-_TURNS: Final = 6
-"""In which two designs are judged."""
-_STEP: Final = 0.06
-"""Standard deviation of the points that may be judged about the best, in the unit cube."""
-_SIZES: Final = (-12, 21)
-"""Steps of `AS_SMALL`, from smaller ones than is expected to larger ones, of which designs may be judged."""
-_CLOUD: Final = 24
-"""Points of each such size of which the most promising is judged."""
-_LARGER: Final = 1.05
-"""Times the size that is expected: what a design is compared with where none is known yet."""
-_WIDER: Final = 1.5
-"""Times its own standard deviation, by which the surface errs near the edge, as measured."""
-_WORTH: Final = 0.002
-"""Expected relative decrease of the size from which on a design is judged."""
-_NEARLY: Final = 0.03
-"""Below the fraction of devices that is looked for, from which on the surface may be wrong."""
+_MAX_JUDGED: Final = 10
+"""Listed designs judged, after which no further pair is begun."""
+_MAX_ROUNDS: Final = 6
+"""Rounds in each of which two designs are judged."""
+_STEP_SIGMA: Final = 0.06
+"""Standard deviation of the points about the best, in the unit cube."""
+_SIZE_STEPS: Final = (-12, 21)
+"""Range of sizes to judge about the expected one, in steps of `AS_SMALL`."""
+_POINTS_PER_SIZE: Final = 24
+_FIRST_LIMIT: Final = 1.05
+"""Size to improve on where no design meets the requirement yet, relative to the expected size."""
+_SIGMA_FACTOR: Final = 1.5
+"""Ratio of the surface's error near the required fraction to its own standard deviation, as measured."""
+_MIN_GAIN: Final = 0.002
+"""Expected relative decrease of the size from which on a design is worth judging."""
+_NEAR: Final = 0.03
+"""Fraction below the required one from which on a listed design may meet it, for the surface may be wrong."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Judged:
-    """A design and its verdict."""
-
-    point: Point
-    size: float
-    """m^3."""
-    judgement: Judgement
-
-    @property
-    def met(self) -> bool:
-        """Whether enough devices meet what is required."""
-        return self.judgement.verdict == MET
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Option:
-    """A design that may be judged."""
-
-    points: Points
-    """Itself alone."""
-    size: float
-    logit: float
-    """Of the fraction of the devices, by the surface."""
-    spread: float
-    """Its standard deviation."""
-    place: Place | None = None
-    """Its settings, where it raced; None: the scene's own."""
-    gain: float = 0.0
-    """Expected decrease of the logarithm of the size, by judging it."""
-
-    @property
-    def point(self) -> Point:
-        """Changes of the scene."""
-        return self.points.points[0]
-
-
-def judged_designs(hunt: Hunt) -> list[Judged]:
-    """Those that were judged, in the order in which they were."""
+def judged_designs(hunt: Hunt) -> list[Candidate]:
+    """Judge the promising designs of a search, each then with the race of its judged settings alone."""
     if not hunt.races.candidates:
         return []
-    return _in_order(hunt) if hunt.whole or not hunt.races.space.sized else _closed_in(hunt.races, hunt.size)
+    if hunt.whole or not hunt.races.space.sized:
+        return _judge_listed(hunt)
+    return _judge_smaller_and_smaller(hunt.races, hunt.size)
 
 
-def growth(races: Races, best: Judged) -> float:
-    """Of the fraction of devices with the logarithm of the size, by the surface about a design."""
+def growth(races: Races, best: Candidate) -> float:
+    """Derivative of the fraction of devices by the logarithm of the size at a design, by the surface."""
     shares = next(each.shares for each in races.candidates if each.point == best.point)
     ends = best.size * np.array([1 - AS_SMALL, 1 + AS_SMALL])
     points = races.able(np.array([races.space.sized_at(shares, size) for size in ends]))
@@ -100,155 +60,123 @@ def growth(races: Races, best: Judged) -> float:
     return float(np.diff(fractions)[0]) / math.log(sizes[1] / sizes[0]) if len(set(sizes)) == 2 else 0.0
 
 
-def _closed_in(races: Races, size: float) -> list[Judged]:
-    """Smaller and smaller designs, two at a time; each verdict makes the surface better, until it promises
-    nothing that is smaller."""
-    judged: list[Judged] = []
+def _judge_smaller_and_smaller(races: Races, size: float) -> list[Candidate]:
+    """Judge two designs a round, by expected decrease of the size, until the surface promises none.
+
+    Every verdict improves the surface.
+    """
+    judged: list[Candidate] = []
     settings: Settings | None = None
-    for turn in range(_TURNS):
-        least = min((each.size for each in judged if each.met), default=math.inf)
-        options = _options(races, size, below=least / (1 + AS_SMALL))
-        chosen = _chosen(races, options, size, least)
-        if not any(each.gain > _WORTH for each in chosen):
+    for round_number in range(_MAX_ROUNDS):
+        smallest = min((each.size for each in judged if each.race.succeeded), default=math.inf)
+        points, sizes, logits, sigmas = _most_promising_by_size(races, size, below=smallest / (1 + AS_SMALL))
+        limit = min(smallest, _FIRST_LIMIT * size)
+        p_met = ndtr((logits - logit(races.threshold)) / (_SIGMA_FACTOR * sigmas))
+        gains = p_met * np.log(limit / sizes)
+        two = np.lexsort((-logits, -np.maximum(gains, _MIN_GAIN)))[:2]
+        chosen = points.some(two.tolist())
+        if not (gains[two] > _MIN_GAIN).any():
             if judged:
                 break
-            chosen = _nearest(races)
-        if turn == 0 and not races.space.sets_controller:
+            # No design promises to meet the requirement: judge the two that came nearest.
+            order = sorted(range(len(races.candidates)), key=lambda i: races.candidates[i].race.order)
+            chosen = races.points.some(order[:2])
+        if round_number == 0 and not races.space.sets_controller:
             races.told("settings of the designs that are judged")
-            (settings,) = deal(races.executor, [partial(tuned_settings, races.space.hasty, chosen[0].point)])
+            (settings,) = deal(races.executor, [partial(tuned_settings, races.space.hasty, chosen.points[0])])
         races.told(f"judging designs {len(judged) + 1} and on, about {1e6 * size:.4g} ml")
-        judged += _judged(races, chosen, settings)
-        size = min((each.size for each in judged if each.met), default=max(each.size for each in chosen))
-    return judged
-
-
-def _options(races: Races, size: float, *, below: float) -> list[_Option]:
-    """Of every size, in equal steps, the point that promises most to the judging devices."""
-    surface = races.surface()
-    steps = size * (1 + AS_SMALL) ** np.arange(*_SIZES)
-    steps = steps[steps <= below]
-    if not steps.size:
-        return []
-    parents = races.parents(lambda points: surface.logits(races.coordinates(points))[0], size)
-    points = races.cloud(parents, _STEP, np.repeat(steps, _CLOUD))
-    best: dict[float, _Option] = {}
-    logits, spreads = surface.logits(races.coordinates(points)) if points.points else (np.zeros(0),) * 2
-    for i, (point, value) in enumerate(zip(points.points, logits.tolist(), strict=True)):
-        at = races.space.size(point)
-        if at <= below and (at not in best or value > best[at].logit):
-            best[at] = _Option(points=points.some([i]), size=at, logit=value, spread=float(spreads[i]))
-    return [best[at] for at in sorted(best)]
-
-
-def _chosen(races: Races, options: Sequence[_Option], size: float, least: float) -> list[_Option]:
-    """The two by which most is gained; where nothing is, those that promise most.
-
-    Args: `size`: that is expected, m^3. `least`: of the smallest design that meets what is asked; infinite:
-        none is known.
-    """
-    enough, limit = float(logit(races.threshold)), min(least, _LARGER * size)
-    rated = [
-        replace(
-            each,
-            gain=float(ndtr((each.logit - enough) / (_WIDER * each.spread))) * math.log(limit / each.size),
-        )
-        for each in options
-    ]
-    return sorted(rated, key=lambda each: (-max(each.gain, _WORTH), -each.logit))[:2]
-
-
-def _nearest(races: Races) -> list[_Option]:
-    """The two whose devices come nearest to what is required, where none promises to meet it."""
-    points = races.points
-    order = sorted(range(len(points.points)), key=lambda at: races.candidates[at].race.order)[:2]
-    return [
-        _Option(points=points.some([at]), size=races.candidates[at].size, logit=-math.inf, spread=0.0)
-        for at in order
-    ]
-
-
-def _judged(races: Races, options: Sequence[_Option], settings: Settings | None) -> list[Judged]:
-    """Verdicts, which the surface learns."""
-    firsts = [races.nearest_places(each.points.shares)[0] for each in options]
-    judge = partial(judged_design, races.space.hasty, settings=settings)
-    calls = [partial(judge, each.point, place=place) for each, place in zip(options, firsts, strict=True)]
-    judged: list[Judged] = []
-    for option, place, judgement in zip(options, firsts, deal(races.executor, calls), strict=True):
-        if judgement is not None:
-            judged.append(Judged(point=option.point, size=option.size, judgement=judgement))
-            races.add(option.points, 0, judged_race(judgement, place))
-    return judged
-
-
-def _in_order(hunt: Hunt) -> list[Judged]:
-    """Of what raced: from the first that promises to meet what is asked on to better ones until two miss, or
-    to others until one meets it."""
-    races, options = hunt.races, _listed(hunt)
-    search = hunt.whole and not races.space.sets_controller
-    judged: dict[int, Judged | None] = {}
-
-    def judge(*places: int) -> None:
-        some = [at for at in places if 0 <= at < len(options) and at not in judged]
-        races.told(f"judging designs {len(judged) + 1} and on")
+        places = races.nearest_places(chosen.shares)
         calls = [
-            partial(
-                judged_design, races.space.hasty, options[at].point, place=options[at].place, search=search
-            )
-            for at in some
+            partial(judged_design, races.space.hasty, point, place=place, settings=settings)
+            for point, place in zip(chosen.points, places, strict=True)
         ]
-        for at, judgement in zip(some, deal(races.executor, calls), strict=True):
-            option = options[at]
-            judged[at] = judgement and Judged(point=option.point, size=option.size, judgement=judgement)
+        for i, judgement in enumerate(deal(races.executor, calls)):
+            if judgement is not None:
+                judged.append(races.add(chosen, i, Race(place=places[i], judgement=judgement)))
+        largest = max(races.space.size(point) for point in chosen.points)
+        size = min((each.size for each in judged if each.race.succeeded), default=largest)
+    return judged
 
-    def met() -> list[int]:
-        return [at for at, each in judged.items() if each is not None and each.met]
 
-    top = _start(options, float(logit(races.threshold)))
-    judge(top, top - 1)
-    while races.space.sized and met() and (least := min(met())) > 0 and len(judged) < _MOST:
-        judge(least - 1, least - 2)
-        if min(met()) == least:
+def _most_promising_by_size(
+    races: Races, size: float, *, below: float
+) -> tuple[Points, FloatArray, FloatArray, FloatArray]:
+    """Draw points of every size, in equal steps, and keep the one of each that promises most.
+
+    Returns: the points with their sizes, m^3, and the logits of their fractions with standard deviations, by
+        the surface.
+    """
+    surface = races.surface()
+    steps = size * (1 + AS_SMALL) ** np.arange(*_SIZE_STEPS)
+    steps = steps[steps <= below]
+    nothing = np.zeros(0)
+    if not steps.size:
+        return races.points.some([]), nothing, nothing, nothing
+    parents = races.parents(lambda points: surface.logits(races.coordinates(points))[0], size)
+    points = races.cloud(parents, _STEP_SIGMA, np.repeat(steps, _POINTS_PER_SIZE))
+    if not points.points:
+        return points, nothing, nothing, nothing
+    sizes = np.array([races.space.size(point) for point in points.points])
+    logits, sigmas = surface.logits(races.coordinates(points))
+    best = [
+        max(np.flatnonzero(sizes == each).tolist(), key=lambda i: logits[i])
+        for each in np.unique(sizes[sizes <= below])
+    ]
+    return points.some(best), sizes[best], logits[best], sigmas[best]
+
+
+def _judge_listed(hunt: Hunt) -> list[Candidate]:
+    """Judge designs that raced, two at a time, in the order of their size and gas.
+
+    From the first that promises to meet the requirement, go on to smaller ones until two miss it, or to
+    larger ones until one meets it.
+    """
+    races = hunt.races
+    sized, enough = races.space.sized, float(logit(races.threshold))
+    logits = races.surface().logits(races.coordinates(races.points))[0]
+    order = sorted(range(len(logits)), key=lambda i: (races.candidates[i].size, races.candidates[i].race.gas))
+    listed: list[int] = []
+    if sized:
+        # Of nearly equal sizes the most promising.
+        for i in order:
+            if not listed or races.candidates[i].size > (1 + AS_SMALL) * races.candidates[listed[-1]].size:
+                listed.append(i)
+            elif logits[i] > logits[listed[-1]]:
+                listed[-1] = i
+    else:
+        least = min(float(expit(logits.max())), races.threshold - _NEAR)
+        listed = [i for i in order if expit(logits[i]) >= least]
+    designs = [races.candidates[i] for i in listed]
+    promises = logits[listed]
+    search = hunt.whole and not races.space.sets_controller
+    judged: dict[int, Candidate | None] = {}
+
+    def judge(*numbers: int) -> list[int]:
+        """Judge designs by number. Returns: the numbers of all that meet the requirement."""
+        new = [i for i in numbers if 0 <= i < len(designs) and i not in judged]
+        races.told(f"judging designs {len(judged) + 1} and on")
+        judge_one = partial(judged_design, races.space.hasty, search=search)
+        calls = [partial(judge_one, designs[i].point, place=designs[i].race.place) for i in new]
+        for i, judgement in zip(new, deal(races.executor, calls), strict=True):
+            judged[i] = None
+            if judgement is not None:
+                race = Race(place=designs[i].race.place, judgement=judgement)
+                judged[i] = replace(designs[i], race=race)
+        return [i for i, each in judged.items() if each is not None and each.race.succeeded]
+
+    top = 0
+    if designs[0].size != designs[-1].size:
+        promising = np.flatnonzero(promises >= enough)
+        top = int(promising[0] if promising.size else np.argmax(promises))
+    met = judge(top, top - 1)
+    while sized and met and (least_met := min(met)) > 0 and len(judged) < _MAX_JUDGED:
+        met = judge(least_met - 1, least_met - 2)
+        if min(met) == least_met:
             break
-    while not met() and top + 1 < len(options) and len(judged) < _MOST:
-        judge(top + 1, top + 2)
+    while not met and top + 1 < len(designs) and len(judged) < _MAX_JUDGED:
+        met = judge(top + 1, top + 2)
         top += 2
-    if not races.space.sized:
+    if not sized:
         # The search knows the gas of few devices alone.
         judge(top + 1, top + 2)
     return [each for each in judged.values() if each is not None]
-
-
-def _start(options: Sequence[_Option], enough: float) -> int:
-    """Place of the first that promises to meet what is asked; else of the one that comes nearest; where their
-    sizes are alike that of the first."""
-    if options[0].size == options[-1].size:
-        return 0
-    nearest = max(range(len(options)), key=lambda at: options[at].logit)
-    return next((at for at, each in enumerate(options) if each.logit >= enough), nearest)
-
-
-def _listed(hunt: Hunt) -> list[_Option]:
-    """What raced: of sizes that are nearly alike the one that promises most; of one size those that may serve
-    enough devices, by their gas."""
-    races = hunt.races
-    logits, spreads = races.surface().logits(races.coordinates(races.points))
-    options = [
-        _Option(
-            points=races.points.some([i]),
-            size=each.size,
-            logit=float(logits[i]),
-            spread=float(spreads[i]),
-            place=each.race.place,
-        )
-        for i, each in sorted(enumerate(races.candidates), key=lambda row: (row[1].size, row[1].race.gas))
-    ]
-    if not races.space.sized:
-        best = max(float(expit(each.logit)) for each in options)
-        return [each for each in options if expit(each.logit) >= min(best, races.threshold - _NEARLY)]
-    kept: list[_Option] = []
-    for each in options:
-        if not kept or each.size > (1 + AS_SMALL) * kept[-1].size:
-            kept.append(each)
-        elif each.logit > kept[-1].logit:
-            kept[-1] = each
-    return kept

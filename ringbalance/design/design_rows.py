@@ -11,21 +11,11 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
-from ringbalance.controller.judging.judge import Judgement
-from ringbalance.controller.judging.tuning import (
-    causes_of,
-    if_exact,
-    judgement_document,
-    plain_settings,
-    required_document,
-    required_table,
-    share_values,
-    times_of,
-)
-from ringbalance.design.designing import VALVE, Design, Effect
-from ringbalance.design.races import Candidate
+from ringbalance.controller.judging.judge import Judgement, plain_settings
+from ringbalance.controller.judging.tuning import if_exact, required_table
+from ringbalance.design.designing import VALVE, Design
 from ringbalance.results.numbers import MISSING, given, percent
-from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN, Paired
+from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
@@ -77,50 +67,40 @@ def design_document(design: Design) -> dict[str, Any]:
         else {"size_m3": design.smaller[0], "fraction": design.smaller[1].document()},
         "changes": plain_settings(design.point) if judgement else {},
         "settings": plain_settings(judgement.settings) if judgement else {},
-        "asked": judgement.asked if judgement else None,
-        **(judgement_document(judgement) if judgement else {"verdict": MISSED, "fraction": None}),
-        "required": required_document(judgement) if judgement else [],
-        "effects": [_effect_document(each) for each in design.effects],
-        "front": [_candidate_document(each) for each in design.front],
+        "asked": judgement.required_fraction if judgement else None,
+        **(judgement.document() if judgement else {"verdict": MISSED, "fraction": None}),
+        "required": judgement.demands_document() if judgement else [],
+        "effects": [
+            {
+                "path": each.path,
+                "changes": plain_settings(each.changes),
+                "fraction": each.met and each.met.document(),
+                "change": each.compared and list(each.compared.difference),
+            }
+            for each in design.effects
+        ],
+        "front": [
+            {
+                "changes": plain_settings(each.point),
+                "settings": plain_settings(each.race.settings),
+                "size_m3": each.size,
+                "fraction": each.race.fraction,
+                "devices": int(each.race.meets.size),
+                "settling_time_s": {"p50": finite(each.race.time(0.5)), "p90": finite(each.race.time(0.9))},
+                "energy_J": finite(each.race.gas),
+            }
+            for each in design.front
+        ],
         "ranking": design.ranking.document(),
         **design.rows().document(),
-    }
-
-
-def _effect_document(effect: Effect) -> dict[str, Any]:
-    return {
-        "path": effect.path,
-        "changes": plain_settings(effect.changes),
-        "fraction": None if effect.met is None else effect.met.document(),
-        "change": None if effect.compared is None else list(effect.compared.difference),
-    }
-
-
-def _candidate_document(candidate: Candidate) -> dict[str, Any]:
-    race = candidate.race
-    return {
-        "changes": plain_settings(candidate.point),
-        "settings": plain_settings(race.settings),
-        "size_m3": candidate.size,
-        "fraction": race.fraction,
-        "devices": int(race.meets.size),
-        "settling_time_s": {"p50": finite(race.time(0.5)), "p90": finite(race.time(0.9))},
-        "energy_J": finite(race.gas),
     }
 
 
 def _quantities(design: Design) -> Iterator[Quantity]:
     judgement = design.judgement
     if judgement is not None:
-        share = judgement.fraction
-        yield Quantity(
-            key="fraction_met",
-            name="devices that meet what is required",
-            value=share.value,
-            lower=share.low,
-            upper=share.high,
-            origin="simulated",
-        )
+        name = "devices that meet what is required"
+        yield Quantity.of_fraction(judgement.fraction, key="fraction_met", name=name)
         yield Quantity(
             key="size", name="cylinder around the chambers", value=design.size, unit="m^3", digits=4
         )
@@ -145,8 +125,8 @@ def _findings(design: Design) -> Iterator[Finding]:
         return
     changes = {path: value for path, value in design.point.items() if isinstance(value, float | int | str)}
     code = _CODES[judgement.verdict] + if_exact(design.given, judgement)
-    yield Finding(code=code, values=share_values(judgement), change=changes)
-    times = times_of(judgement)
+    yield Finding(code=code, values=judgement.sentence_values, change=changes)
+    times = judgement.settling_times
     if times["p50"] is not None:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
         yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
@@ -165,7 +145,7 @@ def _findings(design: Design) -> Iterator[Finding]:
 
 
 def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
-    """How many designs the checks of a scene refuse, and the most frequent reason."""
+    """Number of designs that the checks of a scene refuse, and the most frequent reason."""
     # Sentences of one reason differ in numbers and units, which are shorter words.
     reasons = [tuple(re.findall("[a-z_]{4,}", text)) for text in texts]
     for reason, most in Counter(reasons).most_common(1):
@@ -175,7 +155,7 @@ def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
 
 
 def _sharpness(design: Design) -> Iterator[Finding]:
-    """How far the smallest size is known."""
+    """Findings on how well the smallest size is known."""
     if design.smaller is not None:
         size, share = design.smaller
         values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
@@ -185,9 +165,9 @@ def _sharpness(design: Design) -> Iterator[Finding]:
 
 
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
-    """What stands against it, and by how much."""
+    """Findings on the demand that most devices miss, and by how much."""
     worst = min(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
-    parts = (judgement.asked, 0.5)
+    parts = (judgement.required_fraction, 0.5)
     part = next((each for each in parts if math.isfinite(_reached(judgement, worst, each))), parts[0])
     reached = _reached(judgement, worst, part)
     values: dict[str, Value] = {
@@ -198,13 +178,13 @@ def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
         "reached": given(reached, worst.unit, digits=3) if math.isfinite(reached) else MISSING,
     }
     yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
-    if causes := causes_of(judgement):
+    if causes := judgement.causes:
         yield Finding(code="tuned_causes", values={"causes": causes})
     yield from design.ranking.findings()
 
 
 def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:
-    """What a fraction of the devices comes to."""
+    """Value of a demand's outcome that a fraction of the devices reaches."""
     values = np.sort(getattr(judgement.outcomes, demand.outcome))
     count = max(math.ceil(fraction * values.size), 1)
     return float(values[-count] if demand.sense == AT_LEAST else values[count - 1])
@@ -243,35 +223,28 @@ def _keys_table(design: Design, judgement: Judgement) -> Table:
 
 
 def _effects_table(design: Design) -> Table:
-    rows = [
-        (
-            each.path,
-            _effect_text(design, each),
-            "no such design" if each.met is None else percent(each.met.value, digits=3),
-            "" if each.compared is None else _change_text(each.compared),
+    rows = []
+    for each in design.effects:
+        instead = (
+            design.space.valve({**design.point, **each.changes})
+            if each.path == VALVE
+            else setting_text(each.path, each.changes[each.path])
         )
-        for each in design.effects
-    ]
+        met = "no such design" if each.met is None else percent(each.met.value, digits=3)
+        change = ""
+        if each.compared is not None:
+            mean, half = each.compared.difference
+            low, high = 100 * (mean - half), 100 * (mean + half)
+            change = f"{percent(mean, signed=True)} ({low:+.1f} to {high:+.1f})"
+        rows.append((each.path, instead, met, change))
     heads = ("key", "instead", "devices that meet all", "change, 95 %")
     return Table(
         caption="One key changed, the settings as they are, on the same devices", heads=heads, rows=rows
     )
 
 
-def _change_text(compared: Paired) -> str:
-    """Of the fraction of devices."""
-    change, half = compared.difference
-    return f"{percent(change, signed=True)} ({100 * (change - half):+.1f} to {100 * (change + half):+.1f})"
-
-
-def _effect_text(design: Design, effect: Effect) -> str:
-    if effect.path == VALVE:
-        return design.space.valve({**design.point, **effect.changes})
-    return setting_text(effect.path, effect.changes[effect.path])
-
-
 def _front_table(design: Design) -> Table:
-    asked = REQUIRED_FRACTION if design.judgement is None else design.judgement.asked
+    asked = REQUIRED_FRACTION if design.judgement is None else design.judgement.required_fraction
     paths = [path for path in design.space.paths if path not in design.space.valve_paths]
     rows = [
         (

@@ -7,7 +7,7 @@ What the search finds is judged as `tune` judges: on devices on which nothing wa
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -17,10 +17,10 @@ import numpy as np
 from scipy.special import logit
 
 from ringbalance.controller.balancer import Draws, Settings, balancer_of
-from ringbalance.controller.judging.judge import FRESH, Judgement
+from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, Judgement
 from ringbalance.controller.judging.ranking import Ranking, ranked
-from ringbalance.design.axes import Axis, Point
-from ringbalance.design.closing import Judged, growth, judged_designs
+from ringbalance.design.axes import Point
+from ringbalance.design.closing import growth, judged_designs
 from ringbalance.design.hunt import Static, hunt
 from ringbalance.design.races import Candidate, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
@@ -36,10 +36,10 @@ from ringbalance.scene.platform.processes import beside
 VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
 _MOVED: Final = 0.05
-"""By which a key is moved to either side, relative."""
-_DEVICES: Final = 256
-"""On which a moved key is answered."""
-_TAKEN: Final = 3
+"""Relative change of a key to either side."""
+_EFFECT_DEVICES: Final = 256
+"""Devices on which a moved key is answered."""
+_MAX_VERDICTS: Final = 3
 """Designs at most, each the next larger, of which the verdict is asked on devices that have chosen none."""
 _FRONT: Final = 6
 _APART: Final = 0.05
@@ -48,15 +48,15 @@ _APART: Final = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """What a change of one key, with everything else as it is, makes of a design."""
+    """Effect of a change of one key, with everything else as it is, on a design."""
 
     path: str
     changes: Point
     """SI; with what follows from it."""
     met: Proportion | None
-    """Of the devices; None: no such design."""
+    """Fraction of the devices that meet every demand; None: no such design."""
     compared: Paired | None = None
-    """With the design as it is, on the same devices."""
+    """Comparison with the design as it is, on the same devices."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -73,17 +73,17 @@ class Design(PresentedResult):
     given: SceneFile
     space: Space
     static: Static
-    """Of the points that were answered without a run."""
+    """Counts of the points that were answered without a run."""
     raced: int
     """Designs that ran as few devices."""
     needed: float
     """Unbalance that is to be cancelled, kg m."""
     reach: float | None
-    """What the design cancels in any direction, kg m."""
+    """Unbalance that the design cancels in any direction, kg m."""
     point: Point
     """Changes of the scene; of the design that comes nearest where none meets what is required."""
     judgement: Judgement | None
-    """Of it under its best settings; None: no design can work."""
+    """Judgement of its best settings; None: no design can work."""
     smaller: tuple[float, Proportion] | None
     """Size, m^3, of the next smaller design that was judged, with the fraction of devices that it served;
     None: none was, or the size does not vary."""
@@ -97,7 +97,7 @@ class Design(PresentedResult):
 
     @property
     def succeeded(self) -> bool:
-        """Whether the design meets what is required."""
+        """True if the design meets what is required."""
         return self.judgement is not None and self.judgement.verdict == MET
 
     @property
@@ -136,146 +136,126 @@ def run_design(
         problem = "the rotor has no unbalance that a disc could cancel"
         raise SceneError.of_file(scene.file, problem, "an amplitude above 0 of rotor.initial_vibration")
     workers = workers or os.cpu_count() or 1
+    best: Candidate | None = None
+    judgement: Judgement | None = None
+    effects: tuple[Effect, ...] = ()
+    doubt: float | None = None
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         crew = executor or pool
         asked = balancer.asked_fraction()
-        found = hunt(space, asked=asked, needed=needed, executor=crew, told=told, seed=start)
-        races, raced = found.races, len(found.races.candidates)
-        judged = judged_designs(found)
-        best: Judged | None = None
-        judgement: Judgement | None = None
-        effects: tuple[Effect, ...] = ()
-        for best in _taken(judged, sized=space.sized):
+        search = hunt(space, asked=asked, needed=needed, executor=crew, told=told, seed=start)
+        races, raced = search.races, len(search.races.candidates)
+        judged = judged_designs(search)
+
+        def order(each: Candidate) -> float:
+            """Size or, of designs of one size, gas."""
+            return each.size if space.sized else float(np.nanmedian(each.race.judgement.outcomes.energy))
+
+        promising = sorted((each for each in judged if each.race.succeeded), key=order)[:_MAX_VERDICTS]
+        # Where none meets what is required, the one that serves most devices.
+        for best in promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]:
             told("the verdict, and what changes of it would do")
-            settings = best.judgement.settings
+            settings = best.race.judgement.settings
             whole = partial(judged_design, scene, best.point, settings=settings, whole=True)
             effects, judgement = _effects(space, best, settings, crew, whole)
             if judgement is not None and judgement.verdict == MET:
                 break
-        sized = best if space.sized else None
-        doubt = _doubt(races, sized) if sized else None
+        if best is not None and space.sized:
+            # Half-width of the fraction over its growth with the logarithm of the size.
+            share, rise = best.race.judgement.fraction, growth(races, best)
+            doubt = (share.high - share.low) / 2 / rise if rise > 0 else None
+    reach, smaller, ranking = None, None, Ranking()
+    if best is not None:
+        reach = reach_of(static_rows(space.scene, [best.point], intervals=False)[0])
+        below = [each for each in judged if each.size < best.size]
+        if space.sized and below:
+            next_smaller = max(below, key=lambda each: each.size)
+            smaller = next_smaller.size, next_smaller.race.judgement.fraction
+        if judgement is not None:
+            ranking = ranked(balancer_of(point_scene(scene, best.point)), judgement)
     return Design(
         presentation=presentation,
         given=scene,
         space=space,
-        static=found.static,
+        static=search.static,
         raced=raced,
         needed=needed,
-        reach=None if best is None else _reach(space, best.point),
-        point=found.static.reach_point if best is None else best.point,
+        reach=reach,
+        point=search.static.reach_point if best is None else best.point,
         judgement=judgement,
-        smaller=_smaller(judged, sized) if sized else None,
+        smaller=smaller,
         doubt=doubt,
-        front=_front(races, asked, best),
+        front=() if best is None else _front(races, asked, best),
         effects=effects,
-        ranking=_ranked(scene, best, judgement),
+        ranking=ranking,
     )
-
-
-def _ranked(scene: SceneFile, best: Judged | None, judgement: Judgement | None) -> Ranking:
-    if best is None or judgement is None:
-        return Ranking()
-    return ranked(balancer_of(point_scene(scene, best.point)), judgement)
-
-
-def _reach(space: Space, point: Point) -> float | None:
-    (row,) = static_rows(space.scene, [point], intervals=False)
-    return reach_of(row)
-
-
-def _taken(judged: Sequence[Judged], *, sized: bool) -> list[Judged]:
-    """The first that meet what is required, the smallest first, of one size that with the least gas; else the
-    one that serves most devices."""
-
-    def order(each: Judged) -> float:
-        return each.size if sized else float(np.nanmedian(each.judgement.outcomes.energy))
-
-    met = sorted((each for each in judged if each.met), key=order)[:_TAKEN]
-    return met or sorted(judged, key=lambda each: -each.judgement.fraction.value)[:1]
-
-
-def _smaller(judged: Sequence[Judged], best: Judged) -> tuple[float, Proportion] | None:
-    below = [each for each in judged if each.size < best.size]
-    next_one = max(below, key=lambda each: each.size, default=None)
-    return None if next_one is None else (next_one.size, next_one.judgement.fraction)
-
-
-def _doubt(races: Races, best: Judged) -> float | None:
-    """Half-width of the fraction over its growth with the logarithm of the size."""
-    share, rise = best.judgement.fraction, growth(races, best)
-    return (share.high - share.low) / 2 / rise if rise > 0 else None
 
 
 def _effects(
     space: Space,
-    best: Judged,
+    best: Candidate,
     settings: Settings,
     executor: Executor | None,
     whole: Callable[[], Judgement | None],
 ) -> tuple[tuple[Effect, ...], Judgement | None]:
-    """Of every key moved alone; and beside them the verdict on the design itself, which takes longest."""
-    moves = [(path, change) for axis in space.axes for path, change in _moves(axis, best.point)]
-    base = {path: value for path, value in best.point.items() if path in space.paths}
-    points = [best.point, *(space.followed({**base, **change}) for _, change in moves)]
-    draws = Draws.block(FRESH, _DEVICES, whole=False)
-    calls = [partial(devices_row, space.hasty, point, settings=settings, draws=draws) for point in points]
-    judgement, now, *moved = deal(executor, [whole, *calls])
+    """Effects of every key changed alone, and the verdict on the design itself, which takes longest."""
+    point = best.point
+    moves: list[tuple[str, dict[str, Any]]] = []
+    for axis in space.axes:
+        # A number moves to both sides; an entry of a list is replaced by each other one.
+        for path in axis.ranges:
+            by = (1 - _MOVED, 1 + _MOVED)
+            moves += [(path, {path: float(f"{factor * float(point[path]):.4g}")}) for factor in by]
+        now = {path: point.get(path) for path in axis.paths}
+        name = VALVE if any(axis.names) else axis.paths[0]
+        for choice in () if axis.ranges else axis.choices:
+            if any(now[path] != value for path, value in choice.items()):
+                moves.append((name, dict(choice)))
+    base = {path: value for path, value in point.items() if path in space.paths}
+    points = [point, *(space.followed({**base, **changes}) for _, changes in moves)]
+    draws = Draws.block(FIRST_VERDICT_DEVICE, _EFFECT_DEVICES, whole=False)
+    calls = [partial(devices_row, space.hasty, each, settings=settings, draws=draws) for each in points]
+    judgement, now_met, *then_met = deal(executor, [whole, *calls])
     effects = [
         Effect(
             path=path,
-            changes=change,
-            met=None if then is None else Proportion(count=int(np.count_nonzero(then)), of=then.size),
-            compared=None if then is None or now is None else Paired.of(then, now),
+            changes=changes,
+            met=None if met is None else Proportion.where(met),
+            compared=None if met is None or now_met is None else Paired.of(met, now_met),
         )
-        for (path, change), then in zip(moves, moved, strict=True)
+        for (path, changes), met in zip(moves, then_met, strict=True)
     ]
     return tuple(effects), judgement
 
 
-def _moves(axis: Axis, point: Point) -> Sequence[tuple[str, dict[str, Any]]]:
-    """A number to both sides, another entry of a list instead."""
-    if axis.ranges:
-        return [
-            (path, {path: float(f"{(1 + by) * float(point[path]):.4g}")})
-            for path in axis.ranges
-            for by in (-_MOVED, _MOVED)
-        ]
-    now = {path: point.get(path) for path in axis.paths}
-    return [
-        (VALVE if any(axis.names) else axis.paths[0], dict(each))
-        for each in axis.choices
-        if any(now[path] != value for path, value in each.items())
-    ]
-
-
-def _front(races: Races, asked: float, best: Judged | None) -> tuple[Candidate, ...]:
-    """The smallest first; of those that are nearly alike the first.
+def _front(races: Races, asked: float, best: Candidate) -> tuple[Candidate, ...]:
+    """Designs that should meet what is required, the smallest first; of those nearly alike the first.
 
     Args: `best`: the design itself: smaller ones met what is required on few devices alone.
     """
-    if best is None:
-        return ()
     promises = races.surface().logits(races.coordinates(races.points))[0]
+    pairs = sorted(zip(races.candidates, promises, strict=True), key=lambda row: row[0].size)
     passing = [
         each
-        for each, promise in sorted(zip(races.candidates, promises, strict=True), key=lambda row: row[0].size)
+        for each, promise in pairs
         if each.size >= best.size and each.race.meets.size >= DEVICES and promise >= logit(races.threshold)
     ]
 
-    def of(each: Candidate) -> tuple[float, float, float]:
+    def costs(each: Candidate) -> tuple[float, float, float]:
         return each.size, each.race.time(asked), each.race.gas
 
-    kept: list[Candidate] = []
+    front: list[Candidate] = []
     for each in passing:
+        cost = costs(each)
         beaten = any(
-            all(b <= a for a, b in zip(of(each), of(other), strict=True)) and of(other) != of(each)
+            costs(other) != cost and all(b <= a for a, b in zip(cost, costs(other), strict=True))
             for other in passing
         )
         alike = any(
-            all(abs(a - b) <= _APART * b for a, b in zip(of(each), of(other), strict=True)) for other in kept
+            all(abs(a - b) <= _APART * b for a, b in zip(cost, costs(other), strict=True)) for other in front
         )
         if not beaten and not alike:
-            kept.append(each)
-    kept = [each for each in kept if each.point != best.point]
-    places = {round(i * (len(kept) - 1) / max(_FRONT - 1, 1)) for i in range(_FRONT)} if kept else set()
-    return tuple(each for i, each in enumerate(kept) if i in places)
+            front.append(each)
+    front = [each for each in front if each.point != best.point]
+    numbers = {round(i * (len(front) - 1) / (_FRONT - 1)) for i in range(_FRONT)} if front else set()
+    return tuple(each for i, each in enumerate(front) if i in numbers)

@@ -1,15 +1,16 @@
-"""The search for a design: points of a Sobol sequence, those that can work without a run, races of a few
-drawn devices, then points about the best, closer and closer, led by a surface through the counts of all.
+"""Search for a design: a Sobol sequence, races of a few drawn devices, then rounds about the best.
+
+The points that can work without a run race first.  In every round points about the best designs race, closer
+and closer, chosen by a surface through the counts of devices of all designs that raced.
 
 Smallest is the volume of the cylinder around the chambers; where the disc's size does not vary, the gas that
-is used decides, and among listed designs within `closing.AS_SMALL` the promise.  Everything is counted and
+is used decides, and among listed designs within `closing.AS_SMALL` the surface.  Everything is counted and
 nothing timed, so that the same scene gives the same design on every machine.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -24,191 +25,191 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.design.axes import Point
 from ringbalance.design.races import Candidate, Points, Races, Told, threshold
 from ringbalance.design.space import Space
-from ringbalance.design.static import Record, reach_of
+from ringbalance.design.static import reach_of
 from ringbalance.design.surface import Surface
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.registry import registered
 
 POINTS: Final = 2048
-"""Of the Sobol sequence."""
-_WHOLE: Final = 256
-"""Points up to which a space of lists is tried whole."""
-_SMALLEST, _SPREAD = 12, 14
-"""Of the points that can work: the smallest, and as many over all sizes, that race at first."""
-_STEPS: Final = (0.15, 0.15, 0.12, 0.1, 0.08, 0.06)
-"""Standard deviations of the steps in the unit cube, round by round."""
-_FEWEST: Final = 2
-"""Rounds, and one more for every axis, up to all."""
-_SIZES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.1), (0.85, 1.1), (0.88, 1.08), (0.9, 1.06))
-"""Times the size that is looked for: between which points are tried."""
-_ANYWHERE: Final = (0.5, 0.5, 0.3, 0.3, 0.3, 0.3)
-"""Part of the points that lie anywhere in the unit cube, round by round."""
-_CHILDREN: Final = 16
-"""Points that race in a round."""
-_TRIED: Final = 32
-"""Drawn for each of them: of those that can work the one races that promises most."""
-_BOLD: Final = 0.7
-"""Standard deviations of the surface that are added where a point is chosen to race."""
-_SURE: Final = 0.5
-"""The same, that are taken away where a design that raced is taken for one that meets what is required."""
-_SMOOTHING: Final = 0.01
-"""Of the surface through the logarithms of the gas."""
-_NO_GAS: Final = 1e-6
-"""J, which counts as none."""
-_FIRST: Final = 1e3
-"""Above every logit and logarithm."""
+"""Points of the Sobol sequence."""
+_MAX_LISTED: Final = 256
+"""Points up to which a space of lists is tried in full."""
+_FIRST_SMALLEST, _FIRST_SPREAD = 12, 14
+"""Points that race first: the smallest that can work, and as many spread over all sizes."""
+_STEP_SIGMAS: Final = (0.15, 0.15, 0.12, 0.1, 0.08, 0.06)
+"""Standard deviation of the steps in the unit cube, by round."""
+_MIN_ROUNDS: Final = 2
+"""Rounds for a space without axes; every axis adds one, up to all."""
+_SIZE_RANGES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.1), (0.85, 1.1), (0.88, 1.08), (0.9, 1.06))
+"""Range of sizes relative to the expected one, by round."""
+_ANYWHERE_SHARES: Final = (0.5, 0.5, 0.3, 0.3, 0.3, 0.3)
+"""Share of the points that start anywhere in the unit cube, by round."""
+_RACES_PER_ROUND: Final = 16
+_POINTS_PER_RACE: Final = 32
+"""Points drawn for each race of a round, of which the most promising races."""
+_HOPE_SIGMA: Final = 0.7
+"""Standard deviations of the surface added to the promise of a point that may race."""
+_DOUBT_SIGMA: Final = 0.5
+"""Standard deviations subtracted where a design that raced is taken for one that meets the requirement."""
+_GAS_SMOOTHING: Final = 0.01
+_MIN_GAS_J: Final = 1e-6
+"""Energy of the gas that counts as none, J."""
+_ABOVE_LOGITS: Final = 1e3
+"""Offset above every logit and every logarithm of an energy."""
 _REACH: Final = 0.9
-"""Of the initial unbalance, that a design must be able to cancel before it runs: its devices differ."""
+"""Share of the initial unbalance that a design must cancel before it runs, for its devices differ."""
 _REACH_ONE_WAY: Final = 0.6
-"""The same where the unbalance lies in one direction: pairs of chambers at right angles cancel up to
-1.41 times as much there as in every direction."""
-_EVERY_WAY: Final = 3.0
-"""rad to both sides, from which on it lies in any direction."""
+"""The required share where the unbalance lies in one direction: pairs of chambers at right angles cancel up
+to 1.41 times as much there as in every direction."""
+_EVERY_WAY_RAD: Final = 3.0
+"""Range of the phase to both sides from which on the unbalance lies in any direction, rad."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Static:
-    """What the points of the first sample come to without a run."""
+    """Counts of the first sample without a run."""
 
     points: int
     refusals: tuple[str, ...]
-    """Of each point that the checks of a scene refuse, the reason."""
+    """Reasons for which the checks of a scene refuse points, one for each of these."""
     blocked: int
-    """In which nothing flows."""
+    """Without any flow."""
     able: int
-    """That can work."""
+    """Able to cancel the unbalance."""
     reach: float
-    """Largest unbalance that one of them cancels in any direction, kg m; NaN: none flows."""
+    """Largest unbalance that a point cancels in any direction, kg m; NaN: none flows."""
     reach_point: Point
-    """That one."""
+    """The point with this reach."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hunt:
-    """All that raced."""
+    """Result of a search."""
 
     static: Static
     races: Races
     whole: bool
-    """Whether every design that can work did."""
+    """True if every design that can work raced."""
     size: float
-    """About which the smallest design that meets what is required is expected, m^3."""
+    """Expected size of the smallest design that meets the requirement, m^3."""
 
 
 def hunt(
     space: Space, *, asked: float, needed: float, executor: Executor | None, told: Told, seed: int = 0
 ) -> Hunt:
-    """Search a space.
+    """Search a space for the smallest design.
 
-    Args: `asked`: fraction of devices. `needed`: initial unbalance, kg m. `executor`: who computes; None:
-        this process. `seed`: of the points that are tried.
+    Args: `asked`: required fraction of devices. `needed`: initial unbalance, kg m. `executor`: who computes;
+        default this process. `told`: called with the progress. `seed`: of the points.
     """
-    one_way = space.scene.requirement.phase_range < _EVERY_WAY
-    share = _REACH_ONE_WAY if one_way else _REACH
+    one_way = space.scene.requirement.phase_range < _EVERY_WAY_RAD
     races = Races(
         space=space,
         needed=needed,
-        least=share,
+        least=_REACH_ONE_WAY if one_way else _REACH,
         threshold=threshold(asked),
         executor=executor,
         told=told,
         trials=balancer_of(space.scene).trials(),
         random=np.random.default_rng(seed),
     )
-    static, whole = _first(races)
-    size = _size_at_first(races) if races.candidates else math.nan
-    rounds = [] if whole or not races.candidates else _rounds(len(space.axes))
-    for place, number in enumerate(rounds):
+    static, whole = _race_first_sample(races)
+    if not races.candidates:
+        return Hunt(static=static, races=races, whole=whole, size=math.nan)
+
+    def served(candidate: Candidate) -> float:
+        """Fraction of the devices less one: 4 of 4 are worth less than 60 of 64."""
+        return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
+
+    enough = [each.size for each in races.candidates if served(each) >= races.threshold]
+    size = min(enough) if enough else max(races.candidates, key=served).size
+    last = len(_STEP_SIGMAS) - 1
+    count = 0 if whole else min(_MIN_ROUNDS + len(space.axes), len(_STEP_SIGMAS))
+    for number, at in enumerate(np.linspace(0, last, count), start=1):
         about = f", about {1e6 * size:.4g} ml" if space.sized else ""
-        told(f"round {place + 1} of {len(rounds)}{about}")
-        size = _round(races, size, number)
+        told(f"round {number} of {count}{about}")
+        size = _race_round(races, size, round(at))
     return Hunt(static=static, races=races, whole=whole, size=size)
 
 
-def _rounds(axes: int) -> list[int]:
-    """Places of the rounds among `_STEPS`: fewer where little varies."""
-    return [round(at) for at in np.linspace(0, len(_STEPS) - 1, min(_FEWEST + axes, len(_STEPS)))]
+def _race_first_sample(races: Races) -> tuple[Static, bool]:
+    """Answer the whole space without a run, and race some of the points that can work.
 
-
-def _first(races: Races) -> tuple[Static, bool]:
-    """The whole space: static answers of every point, and races of some that can work; whether of all."""
+    Returns: counts, and whether every point of the space was tried.
+    """
     space = races.space
-    shares, whole = _sample(space)
+    counts = [len(axis.choices) for axis in space.axes]
+    whole = all(counts) and math.prod(counts) <= _MAX_LISTED
+    shares: FloatArray
+    if whole:
+        shares = np.array(list(product(*((np.arange(count) + 0.5) / count for count in counts))))
+    else:
+        shares = registered("function", "sobol")(len(space.axes), POINTS)
     races.told(f"{len(shares)} designs without a run")
     points = space.points(shares)
     rows = races.answered(points)
     able = races.able(shares, rows)
     races.wide = able.shares
     order = sorted(range(len(able.points)), key=lambda i: space.size(able.points[i]))
-    rest = order[_SMALLEST:]
-    spread = [rest[at] for at in np.linspace(0, len(rest) - 1, min(_SPREAD, len(rest))).astype(int)]
-    chosen = able.some(order if whole else order[:_SMALLEST] + spread)
+    if whole:
+        chosen = able.some(order)
+    else:
+        rest = order[_FIRST_SMALLEST:]
+        spread = np.linspace(0, len(rest) - 1, min(_FIRST_SPREAD, len(rest))).astype(int)
+        chosen = able.some(order[:_FIRST_SMALLEST] + [rest[at] for at in spread])
     races.told(f"{len(chosen.points)} of {len(order)} designs that can work, few devices each")
     races.race(chosen, [None] * len(chosen.points))
-    return _static(points, rows, len(order)), whole
-
-
-def _size_at_first(races: Races) -> float:
-    """Of the smallest that serves enough devices; else of the one that serves most."""
-    enough = [each.size for each in races.candidates if _served(each) >= races.threshold]
-    return min(enough) if enough else max(races.candidates, key=_served).size
-
-
-def _served(candidate: Candidate) -> float:
-    """Fraction of the devices; one of them is taken for failed: 4 of 4 are worth less than 60 of 64."""
-    return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
-
-
-def _round(races: Races, size: float, number: int) -> float:
-    """Race points about the best. Returns: the size from which on they serve enough devices."""
-    low, high = _SIZES[number]
-    worth = partial(_worth, races, races.surface())
-    sizes = size * np.exp(np.linspace(math.log(low), math.log(high), _CHILDREN * _TRIED))
-    points = races.cloud(races.parents(worth, size), _STEPS[number], sizes, anywhere=_ANYWHERE[number])
-    if points.points:
-        value = worth(points)
-        slices = np.array_split(np.arange(value.size), min(_CHILDREN, value.size))
-        chosen = points.some([int(each[np.argmax(value[each])]) for each in slices])
-        races.race(chosen, races.places(chosen.shares))
-    logits, spread = races.surface().logits(races.coordinates(races.points))
-    enough = logits - _SURE * spread >= logit(races.threshold)
-    able = [each.size for each, serves in zip(races.candidates, enough, strict=True) if serves]
-    return min(max(min(able, default=math.inf), low * size), high * size)
-
-
-def _worth(races: Races, surface: Surface, points: Points) -> FloatArray:
-    """What decides which points race: the fraction of devices, with some of its doubt; of one size, among
-    those that may serve enough, the gas."""
-    places = races.coordinates(points)
-    logits, spread = surface.logits(places)
-    hoped = np.asarray(logits + _BOLD * spread)
-    if races.space.sized:
-        return hoped
-    used = np.array([each.race.gas for each in races.candidates])
-    measured = np.isfinite(used)
-    known, energy = races.coordinates(races.points)[measured], np.log(np.maximum(used[measured], _NO_GAS))
-    gas = RBFInterpolator(known, energy, kernel="linear", smoothing=_SMOOTHING)(places)
-    return np.where(hoped >= logit(races.threshold), _FIRST - gas, hoped)
-
-
-def _sample(space: Space) -> tuple[FloatArray, bool]:
-    """Places of the first points; and whether these are all that there are."""
-    counts = [len(axis.choices) for axis in space.axes]
-    if all(counts) and math.prod(counts) <= _WHOLE:
-        levels = [(np.arange(count) + 0.5) / count for count in counts]
-        return np.array(list(product(*levels))), True
-    shares: FloatArray = registered("function", "sobol")(len(space.axes), POINTS)
-    return shares, False
-
-
-def _static(points: Sequence[Point], rows: Sequence[Record], able: int) -> Static:
     reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") for row in rows]
     best = int(np.argmax(reach))
-    return Static(
+    static = Static(
         points=len(points),
         refusals=tuple(row["finding"]["values"]["text"] for row in rows if not row["sha256"]),
         blocked=sum(row["status"] == "blocked" for row in rows),
-        able=able,
+        able=len(order),
         reach=reach[best] or math.nan,
         reach_point=points[best],
     )
+    return static, whole
+
+
+def _race_round(races: Races, size: float, at: int) -> float:
+    """Race points about the best designs, the most promising of every range of sizes.
+
+    Args: `size`: expected, m^3. `at`: index into the settings of the rounds.
+    Returns: the size from which on designs meet the requirement, by the surface, m^3.
+    """
+    low, high = _SIZE_RANGES[at]
+    promise = partial(_promise, races, races.surface())
+    count = _RACES_PER_ROUND * _POINTS_PER_RACE
+    sizes = size * np.exp(np.linspace(math.log(low), math.log(high), count))
+    parents = races.parents(promise, size)
+    points = races.cloud(parents, _STEP_SIGMAS[at], sizes, anywhere=_ANYWHERE_SHARES[at])
+    if points.points:
+        values = promise(points)
+        slices = np.array_split(np.arange(values.size), min(_RACES_PER_ROUND, values.size))
+        chosen = points.some([int(each[np.argmax(values[each])]) for each in slices])
+        races.race(chosen, races.places(chosen.shares))
+    logits, sigmas = races.surface().logits(races.coordinates(races.points))
+    enough = logits - _DOUBT_SIGMA * sigmas >= logit(races.threshold)
+    smallest = min((races.candidates[i].size for i in np.flatnonzero(enough)), default=math.inf)
+    return min(max(smallest, low * size), high * size)
+
+
+def _promise(races: Races, surface: Surface, points: Points) -> FloatArray:
+    """Logit of the fraction of devices, with some of its doubt; for discs of one size, the gas.
+
+    The gas ranks only the points that may serve enough devices, above all others.
+    """
+    places = races.coordinates(points)
+    logits, sigmas = surface.logits(places)
+    hoped = np.asarray(logits + _HOPE_SIGMA * sigmas)
+    if races.space.sized:
+        return hoped
+    energy = np.array([each.race.gas for each in races.candidates])
+    measured = np.isfinite(energy)
+    known, log_energy = (
+        races.coordinates(races.points)[measured],
+        np.log(np.maximum(energy[measured], _MIN_GAS_J)),
+    )
+    gas = RBFInterpolator(known, log_energy, kernel="linear", smoothing=_GAS_SMOOTHING)(places)
+    return np.where(hoped >= logit(races.threshold), _ABOVE_LOGITS - gas, hoped)

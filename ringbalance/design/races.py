@@ -26,7 +26,7 @@ Told = Callable[[str], None]
 
 _TOGETHER: Final = 256
 _BLOCKS: Final = 8
-"""Of devices, over which designs are spread: what one block has by chance does not lead the search."""
+"""Blocks of devices over which designs are spread: what one block has by chance does not lead the search."""
 _PARENTS: Final = 6
 _BESIDE: Final = 2
 """Settings that race beside those of the parent."""
@@ -59,7 +59,7 @@ class Points:
     """Unbalance that each cancels in any direction, of what is needed, shape (n,)."""
 
     def some(self, places: Sequence[int]) -> Points:
-        """Of them."""
+        """Choose some of them by number."""
         chosen = np.asarray(places, dtype=np.intp)
         points = [self.points[i] for i in chosen.tolist()]
         return Points(shares=self.shares[chosen], points=points, reach=self.reach[chosen])
@@ -83,7 +83,7 @@ def deal(executor: Executor | None, calls: Sequence[Callable[[], Any]]) -> list[
 
 @dataclass(kw_only=True)
 class Races:
-    """What the steps of a search share."""
+    """State that the steps of a search share."""
 
     space: Space
     needed: float
@@ -104,13 +104,13 @@ class Races:
     """The surface through the counts of all candidates; None: one came since, or none is fitted."""
 
     def answered(self, points: Sequence[Point]) -> list[Record]:
-        """What points come to without a run."""
+        """Answer points without a run."""
         batches = [points[start : start + _TOGETHER] for start in range(0, len(points), _TOGETHER)]
         calls = [partial(static_rows, self.space.scene, each, intervals=False) for each in batches]
         return [row for part in deal(self.executor, calls) for row in part or ()]
 
     def able(self, shares: FloatArray, rows: Sequence[Record] | None = None) -> Points:
-        """Of places in the unit cube those that can work. Args: `rows`: what they come to, where known."""
+        """Keep the places in the unit cube that can work. Args: `rows`: their answers without a run."""
         points = self.space.points(shares)
         rows = self.answered(points) if rows is None else rows
         reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
@@ -140,22 +140,23 @@ class Races:
             if raced is not None:
                 self.add(points, i, raced)
 
-    def add(self, points: Points, at: int, raced: Race) -> None:
-        """One of some points, that raced."""
-        point, self.fitted = points.points[at], None
+    def add(self, points: Points, number: int, race: Race) -> Candidate:
+        """Add one of some points with its race to the candidates."""
+        self.fitted = None
         self.candidates.append(
             Candidate(
-                shares=points.shares[at],
-                reach=float(points.reach[at]),
-                point=point,
-                size=self.space.size(point),
-                race=raced,
+                shares=points.shares[number],
+                reach=float(points.reach[number]),
+                point=points.points[number],
+                size=self.space.size(points.points[number]),
+                race=race,
             )
         )
+        return self.candidates[-1]
 
     @property
     def points(self) -> Points:
-        """That raced."""
+        """Points that raced."""
         return Points(
             shares=np.array([each.shares for each in self.candidates]),
             points=[each.point for each in self.candidates],
@@ -163,8 +164,8 @@ class Races:
         )
 
     def coordinates(self, points: Points) -> FloatArray:
-        """By which the surface is smooth: places in the unit cube, and what a design cancels, on which the
-        fraction depends more simply than on all that it follows from."""
+        """Coordinates of the surface: places in the unit cube, and the unbalance that a design cancels, on
+        which the fraction depends more simply than on all that it follows from."""
         return np.column_stack([self.space.coordinates(points.shares), np.log(points.reach)])
 
     def surface(self) -> Surface:
@@ -190,15 +191,16 @@ class Races:
         return [whole[at].race.place for at in np.argmin(apart, axis=1).tolist()]
 
     def places(self, shares: FloatArray) -> list[list[Place] | None]:
-        """By point these settings, and others beside them."""
-        return [self._beside(each) for each in self.nearest_places(shares)]
-
-    def _beside(self, place: Place | None) -> list[Place] | None:
-        if place is None:
-            return None
-        beside = near(self.trials, place)
-        chosen = self.random.permutation(len(beside))[:_BESIDE].tolist()
-        return [place, *(beside[at] for at in chosen)]
+        """Settings to race for each point: those of the nearest design and a few beside them."""
+        fields: list[list[Place] | None] = []
+        for place in self.nearest_places(shares):
+            if place is None:
+                fields.append(None)
+                continue
+            neighbours = near(self.trials, place)
+            chosen = self.random.permutation(len(neighbours))[:_BESIDE].tolist()
+            fields.append([place, *(neighbours[at] for at in chosen)])
+        return fields
 
     def parents(self, value: Callable[[Points], FloatArray], size: float) -> FloatArray:
         """Places of those that would be best if they had a size, m^3."""
@@ -220,17 +222,15 @@ class Races:
         drawn = parents[self.random.integers(0, len(parents), sizes.size)]
         free = self.random.random(sizes.size) < anywhere
         drawn[free] = self.wide[self.random.integers(0, len(self.wide), int(np.count_nonzero(free)))]
-        shares = np.array([self._stepped(each, step) for each in drawn])
+        fixed = [number for number, axis in enumerate(self.space.axes) if not axis.ranges]
+        shares = np.empty_like(drawn)
+        for row, start in zip(shares, drawn, strict=True):
+            moved = start + step * self.random.standard_normal(start.size)
+            fresh = self.random.random(start.size)
+            switch = self.random.random(start.size) < _SWITCH
+            moved[fixed] = np.where(switch, fresh, start)[fixed]
+            row[:] = np.clip(moved, 0.0, 1.0)
         if self.space.sized:
             pairs = zip(shares, sizes, strict=True)
             shares = np.array([self.space.sized_at(each, size) for each, size in pairs])
         return self.able(shares)
-
-    def _stepped(self, shares: FloatArray, step: float) -> FloatArray:
-        moved = shares + step * self.random.standard_normal(shares.size)
-        fresh = self.random.random(shares.size)
-        switch = self.random.random(shares.size) < _SWITCH
-        for place, axis in enumerate(self.space.axes):
-            if not axis.ranges:
-                moved[place] = fresh[place] if switch[place] else shares[place]
-        return np.clip(moved, 0.0, 1.0)

@@ -24,7 +24,7 @@ _FIRST: Final = 16
 
 
 def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
-    """What drawn devices of a point come to under the settings of its scene, plain data.
+    """Run drawn devices of a point under the settings of its scene; plain data.
 
     Args: `runs`: devices at most; they are doubled from 16 until the verdict is known, and only 4 run where
         none of these meets what is required.
@@ -41,7 +41,7 @@ def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
             (judgement,) = judge(first=min(_FIRST, runs), most=runs)
     except (SceneError, *FAULTS) as error:
         return {**EMPTY, "verdict": REFUSED, "finding": refusal(error)}
-    time, high = judgement.settling_time(judgement.asked) or (None, None)
+    time, high = judgement.settling_time(judgement.required_fraction) or (None, None)
     return {
         "devices": judgement.fraction.of,
         "fraction": judgement.fraction.value,

@@ -1,9 +1,8 @@
-"""What a design may be: axes from the scene's table [design], and what follows where they move the disc."""
+"""Space of the designs: axes from the scene's table [design], and what follows where they move the disc."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +22,7 @@ from ringbalance.scene.toml import toml_text
 BORES: Final = (0.3e-3, 3e-3)
 """m, where the scene gives no range of its own: tubes that can be bought drawn, and cleaned."""
 _LEAST: Final = 0.1
-"""Of the width or the pressure that there is, where the scene gives no range; of R2 - R1 twice as much."""
+"""Lower end over the largest width or pressure, where the scene gives no range; of R2 - R1 twice as much."""
 _DIGITS: Final = 3
 """Of a value that is tried, so that it can stand in a drawing."""
 _HASTY: Final = 2.0
@@ -65,23 +64,34 @@ class Space:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Of the keys that vary."""
+        """Paths of the keys that vary."""
         return tuple(path for axis in self.axes for path in axis.paths)
 
     @property
     def sized(self) -> bool:
-        """Whether the disc's size varies."""
+        """True if the disc's size varies."""
         return any(path in ("disc.outer_radius", "disc.axial_width") for path in self.paths)
 
     @property
     def sets_controller(self) -> bool:
-        """Whether keys of the controller vary, which are not searched besides then."""
+        """True if keys of the controller vary, which are then not searched besides."""
         return any(path.startswith("controller.") for path in self.paths)
 
     def points(self, shares: FloatArray) -> list[Point]:
         """Changes of the scene at places in the unit cube, shape (n, axes), with what follows from them."""
         columns = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
-        return [self.followed(_rounded(row)) for row in zip(*columns, strict=True)]
+        points = []
+        for row in zip(*columns, strict=True):
+            # Numbers of ranges as they can stand in a drawing; a valve's as they are.
+            point = {
+                path: float(f"{value:.{_DIGITS}g}")
+                if isinstance(value, float) and path not in _VALVE
+                else value
+                for part in row
+                for path, value in part.items()
+            }
+            points.append(self.followed(point))
+        return points
 
     def followed(self, point: Point) -> Point:
         """A point with the tube on its disc.
@@ -121,17 +131,18 @@ class Space:
                 if path in axis.ranges and (power == 1.0 or "disc.axial_width" not in self.paths):
                     (point,) = self.points(moved[np.newaxis])
                     value = float(point[path]) * (size / self.size(point)) ** power
-                    moved[place] = _share_of(axis.ranges[path], value)
+                    moved[place] = axis.ranges[path].share(value)
         return moved
 
     def coordinates(self, shares: FloatArray) -> FloatArray:
-        """Of places in the unit cube, shape (n, axes): entries of a list are equally far from each other."""
+        """Coordinates of places in the unit cube, shape (n, axes); entries of lists are equally far apart."""
         return np.concatenate(
             [
                 column[:, np.newaxis]
                 if axis.ranges
-                else 0.5 * np.eye(len(axis.choices))[[_entry(axis, share) for share in column]]
+                else 0.5 * np.eye(count)[np.minimum((column * count).astype(int), count - 1)]
                 for axis, column in zip(self.axes, shares.T, strict=True)
+                for count in (len(axis.choices),)
             ],
             axis=1,
         )
@@ -165,21 +176,12 @@ class Space:
         return "[{}]".format(", ".join(f'"{each}"' for each in (*self.scene.design.vary, text)))
 
     def range_text(self, path: str) -> str:
-        """What a key may be, in its usual unit."""
+        """Range or choices of a key, in its usual unit."""
         (axis,) = (each for each in self.axes if path in each.paths)
         if path in axis.ranges:
             ends = axis.ranges[path]
             return f"{setting_text(path, ends.low)} to {setting_text(path, ends.high)}"
         return ", ".join(dict.fromkeys(setting_text(path, each.get(path)) for each in axis.choices))
-
-
-def _entry(axis: Axis, share: float) -> int:
-    return min(int(share * len(axis.choices)), len(axis.choices) - 1)
-
-
-def _share_of(ends: Range, value: float) -> float:
-    low, high, value = (math.log(each) if ends.log else each for each in (ends.low, ends.high, value))
-    return min(max((value - low) / (high - low), 0.0), 1.0)
 
 
 def _path(port: float, crest: float | None) -> float:
@@ -191,15 +193,6 @@ def _path(port: float, crest: float | None) -> float:
 def _up(length: float) -> float:
     """To a hundredth of a millimetre, upwards: no tube is shorter than its path."""
     return math.ceil(length * 1e5 - 1e-6) / 1e5
-
-
-def _rounded(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """One point, numbers of ranges as they can stand in a drawing; a valve's as they are."""
-    return {
-        path: float(f"{value:.{_DIGITS}g}") if isinstance(value, float) and path not in _VALVE else value
-        for part in parts
-        for path, value in part.items()
-    }
 
 
 def _listed(scene: Scene) -> tuple[Axis, ...]:

@@ -21,7 +21,7 @@ from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.results.numbers import believed
-from ringbalance.results.rows import Finding, Quantity
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of, nameless
 from ringbalance.scene.designs import Designs, changes_of, in_batches
@@ -64,7 +64,7 @@ EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
         "finding": None,
     }
 )
-"""What `run_row` gives, of a point without runs."""
+"""Result of `run_row` for a point without runs."""
 _CEILING: Final = ", at most"
 """End of a name of a quantity that only limits what is set."""
 FAULTS: Final = (ValueError, ArithmeticError, RuntimeError)
@@ -101,7 +101,7 @@ def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = 
     for point in points:
         try:
             if not by_core:
-                rows.append(_of_balancer(point_scene(scene, point)))
+                rows.append(_row_without_core(point_scene(scene, point)))
                 continue
             made, digest = nameless(liquid_ring_scene(scene), point)
             check_ring(made)
@@ -118,7 +118,7 @@ def _failed(error: Exception) -> Record:
 
 
 def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
-    """Of liquid rings; where the whole breaks down, one by one."""
+    """Answer liquid rings together; one by one where that breaks down."""
     if not scenes:
         return []
     try:
@@ -167,26 +167,20 @@ def _values(designs: Designs, *, near: TubeFlow | None = None) -> FloatArray:
     return np.array([answers.regime, *(getattr(answers, _FIELDS.get(name, name)) for name in UNITS)])
 
 
-def _of_balancer(scene: SceneFile) -> Record:
-    """What a balancer without the array core knows of itself without a run."""
-    known = {_column(each): each for each in balancer_of(scene).quantities() if each.value is not None}
-    return {
-        "sha256": scene.sha256,
-        "values": {name: [_plain(each.value or 0.0), _half_width(each)] for name, each in known.items()},
-        "units": {name: each.unit for name, each in known.items()},
-        "status": "ok",
-        "finding": None,
-    }
-
-
-def _column(quantity: Quantity) -> str:
-    """Name that cannot be taken for a setting where the quantity is the most that a setting may be."""
-    return quantity.key + _CEILING * quantity.name.endswith(_CEILING)
-
-
-def _half_width(quantity: Quantity) -> float | None:
-    ends = [end for end in (quantity.lower, quantity.upper) if end is not None and quantity.value is not None]
-    return max(abs(end - quantity.value) for end in ends) if len(ends) == 2 and quantity.value else None
+def _row_without_core(scene: SceneFile) -> Record:
+    """Answer a point of a balancer without the array core by what that knows of itself without a run."""
+    values: dict[str, list[float | None]] = {}
+    units: dict[str, str] = {}
+    for each in balancer_of(scene).quantities():
+        if each.value is None:
+            continue
+        # A name that cannot be taken for a setting where the quantity is the most that a setting may be.
+        name = each.key + _CEILING * each.name.endswith(_CEILING)
+        width = None
+        if each.lower is not None and each.upper is not None and each.value:
+            width = max(abs(each.lower - each.value), abs(each.upper - each.value))
+        values[name], units[name] = [_plain(each.value), width], each.unit
+    return {"sha256": scene.sha256, "values": values, "units": units, "status": "ok", "finding": None}
 
 
 def content_of(scene: SceneFile) -> Record:

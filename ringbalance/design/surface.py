@@ -40,14 +40,14 @@ class Surface:
     """The process, given the counts."""
 
     places: FloatArray
-    """Of the designs, shape (n, k)."""
+    """Coordinates of the designs, shape (n, k)."""
     mean: float
     scale: float
     """Standard deviation, in logits."""
     lengths: FloatArray
     """Shape (k,)."""
     factor: tuple[FloatArray, bool]
-    """Of the covariance of what was counted, as `scipy.linalg.cho_factor` has it."""
+    """Cholesky factor of the covariance of the logits, as `scipy.linalg.cho_factor` has it."""
     weights: FloatArray
     """Inverse of that covariance times what was counted, shape (n,)."""
 

@@ -35,7 +35,7 @@ _TOGETHER: Final = {True: 256, False: 1024}
 bits may depend on it.
 """
 _EDGE: Final = 0.02
-"""Of what was varied: nearer to its end, a value stands at it."""
+"""Fraction of the varied range: nearer to its end, a value stands at it."""
 STORE: Final = "store"
 """Folder of kept answers in that of a sweep."""
 _OF_RUNS: Final = {
@@ -80,32 +80,32 @@ class Sweep(Result):
     points: tuple[Point, ...]
     """Changed values, SI or text, by path."""
     static: tuple[Record, ...]
-    """See `static_rows`."""
+    """Rows without runs, as `static_rows` returns them."""
     driven: tuple[Mapping[str, Any], ...]
-    """See `run_row`."""
+    """Rows of runs, as `run_row` returns them."""
     runs: int
     """Drawn devices a point at most; 0: static alone."""
     errors: tuple[Record, ...]
     """By quantity, of what the array core leaves out, see `trade.errors`; empty where nothing was checked."""
     designs_per_second: Mapping[str, float]
-    """Of what this run computed, "static" and "runs"; wall time."""
+    """Rates of the points that this run computed, "static" and "runs"; wall time."""
     resumed: Mapping[str, int]
     """Points whose answers an earlier run had kept, likewise."""
 
     @cached_property
     def verdicts(self) -> tuple[str, ...]:
-        """Of each point: what its runs say, else the status of its static row."""
+        """Verdict of each point by its runs, else the status of its static row."""
         pairs = zip(self.static, self.driven, strict=True)
         return tuple(run["verdict"] if self.runs and row["sha256"] else row["status"] for row, run in pairs)
 
     @cached_property
     def feasible(self) -> tuple[bool, ...]:
-        """Whether each point meets what the scene requires or, without runs, has a flow."""
+        """True for each point that meets what the scene requires or, without runs, has a flow."""
         return tuple(verdict == (MET if self.runs else "ok") for verdict in self.verdicts)
 
     @property
     def _flows(self) -> bool:
-        """Whether a static row tells if liquid flows."""
+        """True if a static row shows whether liquid flows."""
         return scene_kind(self.scene.balancer).arrays
 
     @cached_property
@@ -126,7 +126,7 @@ class Sweep(Result):
 
     @cached_property
     def nearest(self) -> int | None:
-        """Where runs show no feasible point, the one that serves most devices; None where none serves any."""
+        """Point that serves most devices where runs show no feasible one; None: none serves any."""
         ranked = [(run["fraction"] or 0.0, -i) for i, run in enumerate(self.driven)]
         fraction, place = max(ranked, default=(0.0, 0))
         return -place if self.runs and self.best is None and fraction > 0 else None
@@ -178,7 +178,7 @@ class Sweep(Result):
 
     @property
     def failures(self) -> list[str]:
-        """Of each point: why it has no answer; empty where it has."""
+        """Reason for which each point has no answer; empty where it has one."""
         pairs = zip(self.static, self.driven, strict=True)
         return [
             finding["values"]["text"] if (finding := row["finding"] or run["finding"]) else ""
@@ -228,7 +228,7 @@ class Sweep(Result):
 
     @cached_property
     def _main_shares(self) -> Shares:
-        """Of the result by which the best point is chosen."""
+        """Sensitivity of the result by which the best point is chosen."""
         return self._shares(["fraction" if self.runs else "reach"])
 
     def _shares(self, names: Sequence[str], *, total: bool = False) -> Shares:
@@ -276,7 +276,7 @@ class Sweep(Result):
         return registered("function", "sweep_figures")(self, Path(path))
 
     def to_dict(self) -> Record:
-        """What `ringbalance sweep --json` prints: the summary; the table is `columns`."""
+        """Summary as `ringbalance sweep --json` prints it; the table is `columns`."""
         scene, best, nearest = self.scene, self.best, self.nearest
         return {
             "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
@@ -296,7 +296,7 @@ class Sweep(Result):
         }
 
     def rows(self) -> Rows:
-        """How many points meet what is required, the best of them, and what the core leaves out."""
+        """Number of points that meet what is required, the best of them, and errors of the array core."""
         quantities = [
             Quantity(
                 key=f"{name}_designs_per_second",
@@ -355,7 +355,7 @@ class Sweep(Result):
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)
 
     def axis_text(self, axis: Axis, row: int) -> str:
-        """What a row has of an axis: the name where it was chosen by name, else keys with values."""
+        """Value of an axis at a row: its name where it was chosen by name, else keys with values."""
         point = self.points[row]
         if axis.names:
             return f"{axis.head} = {axis.name_of(point)}"
@@ -375,7 +375,7 @@ class Sweep(Result):
         yield from self._left_out_table()
 
     def _best_table(self) -> Iterator[Table]:
-        """What the best or the nearest point comes to."""
+        """Table of the answers of the best or the nearest point."""
         place = self.best_or_nearest
         if place is None:
             return

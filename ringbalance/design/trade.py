@@ -1,4 +1,4 @@
-"""What the array core leaves out, measured: some rows are calibrated, the next finer level."""
+"""Errors of the array core, measured: some rows are calibrated, the next finer level."""
 
 from __future__ import annotations
 
@@ -39,38 +39,25 @@ def left_out(
     count: int,
     deal: Callable[[str, Sequence[Task]], list[Record]],
 ) -> list[Record]:
-    """Calibrate some rows; see `_errors`. Args: `deal`: answers tasks, see `work.answers`."""
-    places = _chosen(static, count)
-    calls = [partial(calibrated_row, scene, points[i]) for i in places]
-    finer = deal("calibrate", tasks_of(content_of(scene), calls)) if places else []
-    return _errors([static[i] for i in places], finer)
+    """Calibrate some rows, evenly over those that have an answer.
 
-
-def _chosen(rows: Sequence[Record], count: int) -> list[int]:
-    """Rows to calibrate, evenly over those that have an answer."""
-    answered = [
-        place for place, row in enumerate(rows) if row["status"] == "ok" and "lambda" in row["values"]
-    ]
-    if not answered or count < 1:
-        return []
-    places = np.linspace(0, len(answered) - 1, min(count, len(answered))).round().astype(int)
-    return [answered[place] for place in dict.fromkeys(places.tolist())]
-
-
-def _errors(rows: Sequence[Record], calibrated: Sequence[Record]) -> list[Record]:
-    """By quantity the largest error of the rows and the largest uncertainty beside it, both as fractions of
-    the largest value.
-
-    Args: `rows`: static ones; `calibrated`: the same points by `calibrated_row`.
+    Args: `static`: rows of `points`. `count`: number of rows to calibrate. `deal`: see `work.answers`.
+    Returns: By quantity the largest error of the rows and the largest uncertainty beside it, both as
+        fractions of the largest value.
     """
-    found = []
+    answered = [i for i, row in enumerate(static) if row["status"] == "ok" and "lambda" in row["values"]]
+    spread = np.linspace(0, len(answered) - 1, max(min(count, len(answered)), 0)).round().astype(int)
+    rows = [answered[at] for at in dict.fromkeys(spread.tolist())]
+    calls = [partial(calibrated_row, scene, points[i]) for i in rows]
+    calibrated = deal("calibrate", tasks_of(content_of(scene), calls)) if rows else []
+    errors = []
     for name in QUANTITIES:
-        known = [
+        compared = [
             (abs(value - finer[name][0]), finer[name][1], abs(finer[name][0]))
-            for row, finer in zip(rows, calibrated, strict=True)
-            if (value := row["values"][name][0]) is not None and name in finer
+            for i, finer in zip(rows, calibrated, strict=True)
+            if (value := static[i]["values"][name][0]) is not None and name in finer
         ]
-        error, uncertainty, largest = map(max, zip(*known, strict=True)) if known else (0.0, 0.0, 0.0)
+        error, uncertainty, largest = map(max, zip(*compared, strict=True)) if compared else (0.0, 0.0, 0.0)
         if largest > 0:
-            found.append({"quantity": name, "error": error / largest, "uncertainty": uncertainty / largest})
-    return found
+            errors.append({"quantity": name, "error": error / largest, "uncertainty": uncertainty / largest})
+    return errors

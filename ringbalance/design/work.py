@@ -58,7 +58,7 @@ def tasks_of(content: Mapping[str, Any], calls: Sequence[partial[Any]]) -> list[
 
 @dataclass(frozen=True, kw_only=True)
 class Done:
-    """How far the work is."""
+    """Progress of the work."""
 
     what: str
     points: int

@@ -31,6 +31,11 @@ class Proportion:
     count: int
     of: int
 
+    @classmethod
+    def where(cls, met: BoolArray) -> Proportion:
+        """Of the devices for which `met`, shape (n,), is true."""
+        return cls(count=int(met.sum()), of=met.size)
+
     @property
     def value(self) -> float:
         """Fraction; not a number where none was drawn."""

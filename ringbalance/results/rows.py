@@ -17,6 +17,7 @@ from string import Formatter
 from typing import Any, Literal, TypeVar
 
 from ringbalance.results.numbers import MISSING, Width, believed, given, percent, plain, shown
+from ringbalance.results.requirements import Proportion
 from ringbalance.scene.uncertain import NORMAL_95
 
 Made = TypeVar("Made")
@@ -62,6 +63,12 @@ class Quantity:
     """ "ok" or the code of the finding that limits it."""
     digits: int = 4
     """Of the value as text, where no uncertainty is known."""
+
+    @classmethod
+    def of_fraction(cls, fraction: Proportion, *, key: str, name: str) -> Quantity:
+        """Fraction of simulated devices with its 95 % interval."""
+        low, high = fraction.low, fraction.high
+        return cls(key=key, name=name, value=fraction.value, lower=low, upper=high, origin="simulated")
 
     @property
     def width(self) -> Width:

@@ -22,7 +22,7 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import MOST_DRAWS, judged
 from ringbalance.controller.judging.search import searched
 from ringbalance.design.races import deal, threshold
-from ringbalance.design.racing import _settings, near
+from ringbalance.design.racing import near, settings_at
 from ringbalance.design.space import Space
 from ringbalance.results.requirements import MET, OPEN, Proportion
 from ringbalance.scene.models import Scene
@@ -176,7 +176,7 @@ def test_settings_lie_between_levels_too() -> None:
     below, between, above = (
         settings["controller.gas_time_offset"][0]
         for level in (4.0, 4.5, 5.0)
-        if (settings := _settings(trials[kind], (level,))) is not None
+        if (settings := settings_at(trials, (kind, (level,)))) is not None
     )
     assert between == pytest.approx((below + above) / 2, abs=1e-4)
     assert below < between < above

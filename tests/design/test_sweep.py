@@ -24,7 +24,7 @@ from sweep import on_paper
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
-from ringbalance.controller.judging.judge import FRESH, judged_all
+from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, judged_all
 from ringbalance.design.static import UNITS, _row
 from ringbalance.design.store import Store
 from ringbalance.design.work import bundle_size
@@ -85,7 +85,7 @@ def test_runs_are_those_of_the_balancer(paper_scene: Scene) -> None:
     found = rb.sweep(paper_scene, {"gas.pressure": ["0.42 MPa", "0.7 MPa"]}, runs=8, intervals=False)
     for row, run in enumerate(found.driven):
         balancer = balancer_of(found.point_scene(row))
-        outcomes = balancer.run({}, Draws.block(FRESH, 8))
+        outcomes = balancer.run({}, Draws.block(FIRST_VERDICT_DEVICE, 8))
         met = np.all([each.met(outcomes) for each in balancer.demands()], axis=0)
         assert run["fraction"] == np.mean(met)
     assert found.driven[0]["fraction"] < found.driven[1]["fraction"]
@@ -104,7 +104,7 @@ def test_runs_that_end_early_meet_the_same() -> None:
         balancer = quick_balancer(drawn.point_scene(row))
         demands = balancer.demands()
         whole, early = (
-            balancer.run_all([{}], Draws.block(FRESH, 16, whole=False, until=until))[0]
+            balancer.run_all([{}], Draws.block(FIRST_VERDICT_DEVICE, 16, whole=False, until=until))[0]
             for until in (math.inf, 2 * demands[0].required)
         )
         for demand in demands:

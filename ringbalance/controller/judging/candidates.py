@@ -25,7 +25,7 @@ _MORE: Final = 2 / DEVICES
 _AS_FAST: Final = 1.3
 """Times the least settling time: as fast as the fastest."""
 _SETTLED: Final = 0.9
-"""Of the devices that the best settings serve: by when these have settled decides between equals."""
+"""Fraction of the devices that the best settings serve, whose settling time decides between equals."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,7 +34,7 @@ class Candidate:
 
     trials: Trials
     places: tuple[int, ...]
-    """Of its levels on the axes."""
+    """Indices of its levels on the axes."""
     along: float | None
     """Level on the axis along which the answer is drawn; None: the scene's."""
 
@@ -48,28 +48,24 @@ class Candidate:
 
     @property
     def key(self) -> tuple[str, tuple[int, ...], float | None]:
-        """Of this point."""
+        """Hashable name of this point."""
         return self.trials.kind, self.places, self.along
 
     def neighbours(self) -> list[Candidate]:
-        """One level away on one axis."""
+        """Candidates one level away on one axis."""
         return [
-            self._moved(axis, by) for axis in range(len(self.places)) for by in (-1, 1) if self._has(axis, by)
+            replace(self, places=(*self.places[:axis], at + by, *self.places[axis + 1 :]))
+            for axis, at in enumerate(self.places)
+            for by in (-1, 1)
+            if 0 <= at + by < len(self.trials.axes[axis].levels)
         ]
 
-    def _has(self, axis: int, by: int) -> bool:
-        return 0 <= self.places[axis] + by < len(self.trials.axes[axis].levels)
-
-    def _moved(self, axis: int, by: int) -> Candidate:
-        places = tuple(at + by * (axis == i) for i, at in enumerate(self.places))
-        return Candidate(trials=self.trials, places=places, along=self.along)
-
     def at(self, along: float) -> Candidate:
-        """The same at another level of that axis."""
-        return Candidate(trials=self.trials, places=self.places, along=along)
+        """Candidate with another level of the scan axis."""
+        return replace(self, along=along)
 
     def is_beside(self, other: Candidate) -> bool:
-        """Whether one step, on each axis at most, leads there."""
+        """True if both are at most one level apart on every axis."""
         alike = self.trials.kind == other.trials.kind and self.along == other.along
         return alike and all(abs(a - b) <= 1 for a, b in zip(self.places, other.places, strict=True))
 
@@ -83,26 +79,25 @@ class Tried:
 
     @property
     def count(self) -> int:
-        """Of devices that meet every demand."""
+        """Number of devices that meet every demand."""
         return self.judgement.fraction.count
 
     @property
     def fraction(self) -> float:
-        """Of devices that do."""
+        """Fraction of the devices that meet every demand."""
         return self.judgement.fraction.value
 
     def joined(self, outcomes: Outcomes) -> Tried:
-        """With the outcomes of further devices."""
-        whole = self.judgement.outcomes.joined(outcomes)
-        return replace(self, judgement=replace(self.judgement, outcomes=whole))
+        """Add the outcomes of further devices."""
+        return replace(self, judgement=self.judgement.extended(outcomes))
 
     def time(self, share: float) -> float:
-        """By which so large a share of the devices has settled, s."""
+        """Time by which a fraction of the devices has settled, s."""
         times = np.sort(self.judgement.outcomes.settling_time)
         return float(times[max(math.ceil(share * times.size * (1 - 1e-12)), 1) - 1])
 
     def replaces(self, scenes: Tried) -> bool:
-        """Whether it is taken in place of the best of the scene's kind of controller.
+        """True if it is taken in place of the best of the scene's kind of controller.
 
         It serves `_MORE` more of the devices, or no fewer, `_AS_FAST` times as fast, beside a kind that the
         scene does not give.
@@ -132,11 +127,11 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
 
 
 def is_worse(each: Tried, best: BoolArray) -> bool:
-    """Whether it surely serves fewer than the best does of the same devices."""
+    """True if it serves significantly fewer of the same devices than the best does."""
     return Paired.of(best, each.judgement.meets).better(_BEHIND) == 0
 
 
 def is_decided(tried: Iterable[Tried]) -> bool:
-    """Whether all but the best are surely worse than it."""
+    """True if all but the best are significantly worse than it."""
     best = sorted(tried, key=lambda each: -each.fraction)
     return all(is_worse(each, best[0].judgement.meets) for each in best[1:])

@@ -1,72 +1,140 @@
-"""What is asked of a machine as functions of one run's outcome, and the fraction of devices that meets it."""
+"""Judgements: the fraction of drawn devices that meets every demand under given controller settings."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.balancer import FURTHER, Balancer, Demand, Draws, Outcomes, Settings
 from ringbalance.results.requirements import OPEN, Proportion
-from ringbalance.scene.arrays import BoolArray
+from ringbalance.results.rows import Value
+from ringbalance.scene.arrays import BoolArray, finite
 
 MOST_DRAWS: Final = 1024
-"""Devices after which a verdict that is still open stays so, of a balancer whose runs are fast."""
-FRESH: Final = 1 << 20
-"""Number of the first device that judges: settings are chosen on the devices from 0 on."""
-CHOOSING: Final = 1 << 19
-"""Number of the first device that chooses between settings, remedies or designs that a search has found: the
-best of several on the devices that judge them would promise too much."""
+"""Devices after which an open verdict stays open, for a balancer whose runs are fast."""
+FIRST_VERDICT_DEVICE: Final = 1 << 20
+"""Number of the first device that judges; settings are chosen on the devices from 0 on."""
+FIRST_CHOOSING_DEVICE: Final = 1 << 19
+"""Number of the first device that chooses between the settings, remedies or designs that a search ends with:
+the best of several on the devices that judge them would promise too much."""
+_MAX_CAUSES: Final = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judgement:
-    """One setting over drawn devices."""
+    """Outcomes of drawn devices under one choice of settings, compared with what is demanded."""
 
     settings: Settings
-    """By path, where they differ from the scene's."""
-    asked: float
+    """Values that differ from the scene's, by path, SI."""
+    required_fraction: float
     """Fraction of the devices that must meet every demand."""
     demands: tuple[Demand, ...]
     outcomes: Outcomes
 
+    @classmethod
+    def of(cls, balancer: Balancer, settings: Settings, outcomes: Outcomes) -> Judgement:
+        """Judge outcomes by the demands of a balancer."""
+        return cls(
+            settings=settings,
+            required_fraction=balancer.asked_fraction(),
+            demands=balancer.demands(),
+            outcomes=outcomes,
+        )
+
+    def extended(self, outcomes: Outcomes) -> Judgement:
+        """Add the outcomes of further devices."""
+        return replace(self, outcomes=self.outcomes.joined(outcomes))
+
     @cached_property
     def meets(self) -> BoolArray:
-        """Whether each device meets every demand."""
-        return np.asarray(np.all([each.met(self.outcomes) for each in self.demands], axis=0))
-
-    def joined(self, more: Judgement) -> Judgement:
-        """On these devices and further ones."""
-        return replace(self, outcomes=self.outcomes.joined(more.outcomes))
+        """True for each device that meets every demand, shape (n,)."""
+        return np.asarray(np.all([demand.met(self.outcomes) for demand in self.demands], axis=0))
 
     @property
     def fraction(self) -> Proportion:
-        """Of the devices that meet every demand."""
-        return _proportion(self.meets)
+        """Fraction of the devices that meet every demand."""
+        return Proportion.where(self.meets)
 
     @property
     def verdict(self) -> str:
-        """Met, not met or undecided."""
-        return self.fraction.verdict(self.asked)
+        """`MET`, `MISSED` or `OPEN`, by the 95 % interval of the fraction."""
+        return self.fraction.verdict(self.required_fraction)
 
     def fraction_of(self, demand: Demand) -> Proportion:
-        """Of the devices that meet one."""
-        return _proportion(demand.met(self.outcomes))
+        """Fraction of the devices that meet one demand."""
+        return Proportion.where(demand.met(self.outcomes))
 
     def settling_time(self, fraction: float) -> tuple[float, float] | None:
         """Time within which a fraction of all devices has settled, and its upper 95 % bound, s.
 
-        None where that bound is open: too few devices settle for it.
+        None where the bound is open, because too few devices settle.
         """
-        times, n = np.sort(self.outcomes.settling_time), self.outcomes.settled.size
-        surely = [k for k in range(1, n + 1) if Proportion(count=k, of=n).low >= fraction]
-        if not surely or not math.isfinite(times[surely[0] - 1]):
+        times = np.sort(self.outcomes.settling_time)
+        count = _least_count_above(fraction, of=times.size)
+        if count is None or not math.isfinite(times[count - 1]):
             return None
-        return float(times[math.ceil(fraction * n) - 1]), float(times[surely[0] - 1])
+        return float(times[math.ceil(fraction * times.size) - 1]), float(times[count - 1])
+
+    @property
+    def settling_times(self) -> dict[str, float | None]:
+        """Times within which 50 % ("p50") and 90 % ("p90") of all devices have settled, s."""
+        times = {"p50": self.settling_time(0.5), "p90": self.settling_time(0.9)}
+        return {name: None if time is None else finite(time[0]) for name, time in times.items()}
+
+    @property
+    def amplitude_reached(self) -> float | None:
+        """Amplitude that the required fraction comes below (95 % bound), m; None: too few devices ran."""
+        amplitudes = np.sort(self.outcomes.final_amplitude)
+        count = _least_count_above(self.required_fraction, of=amplitudes.size)
+        return None if count is None else finite(float(amplitudes[count - 1]))
+
+    @property
+    def causes(self) -> list[str]:
+        """The most frequent ways in which devices missed a demand, each with its count."""
+        missed = {demand.code: ~demand.met(self.outcomes) for demand in self.demands}
+        causes: Counter[str] = Counter()
+        for device in np.flatnonzero(~self.meets).tolist():
+            cause = self.outcomes.ended[device]
+            if cause == "settled":
+                cause = " and ".join(f"{code} missed" for code, misses in missed.items() if misses[device])
+            causes[cause] += 1
+        return [f"{cause.replace('_', ' ')} {count}" for cause, count in causes.most_common(_MAX_CAUSES)]
+
+    @property
+    def sentence_values(self) -> dict[str, Value]:
+        """Values that a `Finding` about this judgement prints."""
+        fraction = self.fraction.document()
+        return {"share": fraction.pop("value"), **fraction, "asked": self.required_fraction}
+
+    def document(self) -> dict[str, Any]:
+        """Verdict, fraction, settling times and endings for JSON, SI."""
+        return {
+            "verdict": self.verdict,
+            "fraction": self.fraction.document(),
+            "settling_time_s": self.settling_times,
+            "ended": dict(Counter(self.outcomes.ended)),
+        }
+
+    def demands_document(self) -> list[dict[str, Any]]:
+        """Every demand with the fraction of devices that meets it, for JSON, SI."""
+        return [
+            {
+                "code": demand.code,
+                "sense": demand.sense,
+                "required": demand.required,
+                "unit": demand.unit,
+                "stated": demand.stated,
+                "amplitude_m": demand.amplitude,
+                "fraction": self.fraction_of(demand).document(),
+            }
+            for demand in self.demands
+        ]
 
 
 def judged(
@@ -74,22 +142,24 @@ def judged(
     settings: Settings,
     *,
     most: int | None = None,
-    start: int = FRESH,
+    start: int = FIRST_VERDICT_DEVICE,
     further: float = FURTHER,
     progress: Callable[[str], None] | None = None,
 ) -> Judgement:
-    """One setting; see `judged_all`."""
+    """Judge one choice of settings; see `judged_all`."""
     return judged_all(balancer, [settings], most=most, start=start, further=further, progress=progress)[0]
 
 
 def best_of(
     balancer: Balancer, settings: Sequence[Settings], *, progress: Callable[[str], None] | None = None
 ) -> Settings:
-    """Those that serve most of some devices that judge nothing; the earlier of equals."""
+    """Choose the settings that serve most devices, which judge nothing; the first of equals."""
     if len(settings) == 1:
         return settings[0]
     few = balancer.verdict_draws[0]
-    tried = judged_all(balancer, settings, first=few, most=few, start=CHOOSING, progress=progress)
+    tried = judged_all(
+        balancer, settings, first=few, most=few, start=FIRST_CHOOSING_DEVICE, progress=progress
+    )
     return max(tried, key=lambda each: each.fraction.value).settings
 
 
@@ -99,38 +169,42 @@ def judged_all(
     *,
     first: int | None = None,
     most: int | None = None,
-    start: int = FRESH,
+    start: int = FIRST_VERDICT_DEVICE,
     further: float = FURTHER,
     whole: bool = True,
     until: float = math.inf,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Judgement, ...]:
-    """Settings over the same devices, twice as many each time until the verdict on each is known.
+    """Judge settings on the same devices, whose number doubles until each verdict is known.
 
-    Args: `first`, `most`: numbers of devices; default the balancer's. `start`: number of the first one.
-    `further`: as `Balancer.run_all`. `whole`, `until`: as `Draws`. `progress`: told what is done.
+    Args: `first`, `most`: numbers of devices, default the balancer's `verdict_draws`. `start`: number of the
+        first device. `further`: as in `Balancer.run_all`. `whole`, `until`: as in `Draws`. `progress`: called
+        with a text.
     """
-    asked, demands = balancer.asked_fraction(), balancer.demands()
-
-    def judgement(place: int, outcomes: Outcomes) -> Judgement:
-        return Judgement(settings=settings[place], asked=asked, demands=demands, outcomes=outcomes)
-
-    done: dict[int, Judgement] = {}
-    fewest, most = first or balancer.verdict_draws[0], most or balancer.verdict_draws[1]
-    left, count, more = list(range(len(settings))), 0, min(fewest, most)
-    while left and count < most:
+    most = most or balancer.verdict_draws[1]
+    count, block = 0, min(first or balancer.verdict_draws[0], most)
+    judgements: dict[int, Judgement] = {}
+    undecided = list(range(len(settings)))
+    while undecided and count < most:
         if progress is not None:
             progress(f"{count} of at most {most} drawn devices")
-        draws = Draws.block(start + count, more, whole=whole, until=until)
-        ran = balancer.run_all([settings[i] for i in left], draws, further=further)
-        for place, outcomes in zip(left, ran, strict=True):
-            before = done.get(place)
-            ended = judgement(place, outcomes)
-            done[place] = before.joined(ended) if before else ended
-        left, count = [i for i in left if done[i].verdict == OPEN], count + more
-        more = min(count, most - count)
-    return tuple(done[i] for i in range(len(settings)))
+        draws = Draws.block(start + count, block, whole=whole, until=until)
+        outcomes = balancer.run_all([settings[i] for i in undecided], draws, further=further)
+        for i, new in zip(undecided, outcomes, strict=True):
+            before = judgements.get(i)
+            judgements[i] = before.extended(new) if before else Judgement.of(balancer, settings[i], new)
+        undecided = [i for i in undecided if judgements[i].verdict == OPEN]
+        count += block
+        block = min(count, most - count)
+    return tuple(judgements[i] for i in range(len(settings)))
 
 
-def _proportion(met: BoolArray) -> Proportion:
-    return Proportion(count=int(np.count_nonzero(met)), of=met.size)
+def plain_settings(settings: Settings) -> dict[str, Any]:
+    """Settings for JSON: tuples as lists."""
+    return {path: list(value) if isinstance(value, tuple) else value for path, value in settings.items()}
+
+
+def _least_count_above(fraction: float, *, of: int) -> int | None:
+    """Least number of `of` devices whose lower 95 % bound is at least `fraction`; None: not even all."""
+    counts = range(1, of + 1)
+    return next((count for count in counts if Proportion(count=count, of=of).low >= fraction), None)

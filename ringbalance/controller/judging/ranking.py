@@ -1,6 +1,7 @@
-"""Which drawn input decides whether a device meets what is asked, and what is worth measuring.
+"""Sensitivity of a judgement to the drawn inputs: which input decides, and what is worth measuring.
 
-Where all devices meet it, the input that decides how soon they settle, and where none does, what remains.
+The outcome is whether a device meets every demand; where all do, how soon it settles; where none does, the
+amplitude that remains.
 
 The first-order index of an input x is S = Var(E[y | x])/Var(y), here by eighths of its distribution: of n
 devices with m_i of mean y_i in each, S = (sum m_i (y_i - y)^2/n - 7 v/n)/Var(y), with the mean variance v
@@ -12,7 +13,7 @@ Source: Sobol', "Sensitivity estimates for nonlinear mathematical models", Math.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -23,142 +24,128 @@ from ringbalance.controller.balancer import Balancer
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.results.requirements import Proportion
 from ringbalance.results.rows import Finding, Value
-from ringbalance.scene.arrays import FloatArray
 
 MEETS: Final = "meets"
-"""Whether a device meets every demand."""
-SETTLING_TIME, FINAL_AMPLITUDE = "settling_time", "final_amplitude"
-"""Names of `Outcomes`."""
-_PARTS: Final = 8
-_NOTABLE: Final = 0.05
+"""Name of the outcome: whether a device meets every demand."""
+_BINS: Final = 8
+_NOTABLE_INDEX: Final = 0.05
 """Index from which an input is worth a measurement."""
-_ABOVE_NOISE: Final = 3.0
-"""Times its standard deviation without any effect."""
+_NOTABLE_SIGMA: Final = 3.0
+"""Standard deviations of the index of an input without effect, above which an index is no chance."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Deciding:
-    """One drawn input and how much of the outcome it decides."""
+    """A drawn input and its influence on the outcome."""
 
     name: str
-    """As in `Outcomes.inputs`."""
+    """Name as in `Outcomes.inputs`."""
     path: str
-    """Of its key in the scene; empty: an error of a model."""
+    """Path of its key in the scene; empty: a model error."""
     outcome: str
-    """That it is about: `MEETS`, or in the order of the devices `SETTLING_TIME` or `FINAL_AMPLITUDE`."""
+    """`MEETS`, or the rank of the device by "settling_time" or "final_amplitude"."""
     index: float
-    """First-order index of that outcome."""
+    """First-order index."""
     noise: float
-    """Standard deviation of the index of an input without any effect."""
+    """Standard deviation of the index of an input without effect."""
     common: bool
-    """Whether all devices have it alike, so that it is merely not known."""
+    """True if all devices have the same unknown value; False if it varies between devices."""
     measure: str
-    """Code of the finding that says what to measure; empty: nothing can be."""
+    """Code of the finding that says what to measure; empty: nothing can be measured."""
     middle: Proportion
-    """Of the devices in the middle half of its distribution: were it known twice as well."""
+    """Fraction that meets every demand if the input is known twice as well: in the middle half."""
 
     @property
     def decides(self) -> bool:
-        """Whether its index is notable, and above what chance gives."""
-        return self.index > max(_NOTABLE, _ABOVE_NOISE * self.noise)
-
-    @property
-    def finding(self) -> Finding:
-        """What measuring it would bring."""
-        values: dict[str, Value] = {"input": self.name, "index": self.index, "fraction": self.middle.value}
-        return Finding(code=self.measure, values=values)
-
-    @property
-    def shared(self) -> Finding:
-        """How much it decides, and whether it varies between devices."""
-        code = "input_not_known" if self.common else "input_varies"
-        return Finding(code=code, values={"input": self.path or self.name, "index": max(self.index, 0.0)})
+        """True if the index is notable and no chance."""
+        return self.index > max(_NOTABLE_INDEX, _NOTABLE_SIGMA * self.noise)
 
     def document(self) -> dict[str, Any]:
-        """For JSON."""
-        middle = self.middle.document()
-        return {**asdict(self), "decides": self.decides, "middle": middle, "text": self.shared.text}
+        """The input with a sentence about it for JSON."""
+        code = "input_not_known" if self.common else "input_varies"
+        sentence = Finding(code=code, values={"input": self.path or self.name, "index": max(self.index, 0.0)})
+        return {
+            **asdict(self),
+            "decides": self.decides,
+            "middle": self.middle.document(),
+            "text": sentence.text,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ranking:
-    """Drawn inputs by what they decide."""
+    """Drawn inputs by influence."""
 
     inputs: tuple[Deciding, ...] = ()
-    """The one that decides most first."""
+    """Sorted by index, the largest first."""
 
     @property
     def worth_measuring(self) -> tuple[Deciding, ...]:
-        """Those that decide whether a device meets what is asked, and can be measured."""
+        """Measurable inputs that decide whether a device meets every demand."""
         return tuple(each for each in self.inputs if each.decides and each.measure and each.outcome == MEETS)
 
     def findings(self) -> Iterator[Finding]:
-        """What to measure, or that nothing is."""
-        found = self.worth_measuring
-        yield from (each.finding for each in found)
-        if not found and any(each.outcome == MEETS for each in self.inputs):
+        """Findings on what to measure, or that nothing is worth a measurement."""
+        for each in self.worth_measuring:
+            values: dict[str, Value] = {"input": each.name, "index": each.index}
+            values["fraction"] = each.middle.value
+            yield Finding(code=each.measure, values=values)
+        if not self.worth_measuring and any(each.outcome == MEETS for each in self.inputs):
             yield Finding(code="nothing_to_measure")
 
     def document(self) -> list[dict[str, Any]]:
-        """For JSON."""
+        """All inputs for JSON."""
         return [each.document() for each in self.inputs]
 
 
 def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
-    """The inputs of judged devices."""
-    name, outcome = _outcome(judgement)
+    """Rank the drawn inputs of judged devices by their first-order index; those of one name add up."""
+    meets, outcomes = judgement.meets, judgement.outcomes
+    if meets.any() and not meets.all():
+        name, values = MEETS, meets.astype(np.float64)
+    else:
+        name = "settling_time" if meets.all() else "final_amplitude"
+        # Ranks, so that a few outlying devices do not decide alone.
+        values = np.argsort(np.argsort(getattr(outcomes, name))).astype(np.float64)
     groups: dict[str, list[tuple[float, str]]] = {}
-    for of, place in judgement.outcomes.inputs.items():
-        index = _first_order_index(outcome, place)
-        groups.setdefault(balancer.drawn_input(of).name or of, []).append((index, of))
-    rows = [_row(balancer, judgement, group, each, name) for group, each in groups.items()]
-    return Ranking(inputs=tuple(sorted(rows, key=lambda each: -each.index)))
+    for part, quantile in outcomes.inputs.items():
+        index = first_order_index(values, quantile)
+        groups.setdefault(balancer.drawn_input(part).name or part, []).append((index, part))
+    inputs = []
+    for group, parts in groups.items():
+        strongest = max(parts)[1]
+        drawn = balancer.drawn_input(strongest)
+        inputs.append(
+            Deciding(
+                name=group,
+                path=drawn.path,
+                outcome=name,
+                index=sum(index for index, _ in parts),
+                noise=math.sqrt(2 * (_BINS - 1) * len(parts)) / meets.size,
+                common=drawn.common,
+                measure=drawn.measure,
+                middle=Proportion.where(meets[np.abs(outcomes.inputs[strongest] - 0.5) < 0.25]),
+            )
+        )
+    return Ranking(inputs=tuple(sorted(inputs, key=lambda each: -each.index)))
 
 
-def _outcome(judgement: Judgement) -> tuple[str, FloatArray]:
-    """Name of what differs between the devices, and each one's."""
-    met, outcomes = judgement.meets, judgement.outcomes
-    if met.any() and not met.all():
-        return MEETS, met.astype(np.float64)
-    name = SETTLING_TIME if met.all() else FINAL_AMPLITUDE
-    # Ranks, so that a few devices far from all others do not decide alone.
-    return name, np.argsort(np.argsort(getattr(outcomes, name))).astype(np.float64)
+def first_order_index(outcome: npt.ArrayLike, quantile: npt.ArrayLike) -> float:
+    """First-order index of an input, by eighths of its distribution; 0 for a constant outcome.
 
-
-def _row(
-    balancer: Balancer, judgement: Judgement, name: str, inputs: Sequence[tuple[float, str]], outcome: str
-) -> Deciding:
-    """A row of inputs that are ranked as one, whose first-order indices add up."""
-    most = max(inputs)[1]
-    drawn, met = balancer.drawn_input(most), judgement.meets
-    half = np.abs(judgement.outcomes.inputs[most] - 0.5) < 0.25
-    return Deciding(
-        name=name,
-        path=drawn.path,
-        outcome=outcome,
-        index=sum(index for index, _ in inputs),
-        noise=math.sqrt(2 * (_PARTS - 1) * len(inputs)) / met.size,
-        common=drawn.common,
-        measure=drawn.measure,
-        middle=Proportion(count=int(np.count_nonzero(met[half])), of=int(np.count_nonzero(half))),
-    )
-
-
-def _first_order_index(outcome: Sequence[float] | FloatArray, place: npt.ArrayLike) -> float:
-    """S of an input by eighths of its distribution; 0 where the outcome is the same everywhere.
-
-    Args: `outcome`: y of every device, shape (n,). `place`: of the input in its distribution, in (0, 1).
+    Args: `outcome`: y of every device, shape (n,). `quantile`: of the input, in (0, 1), shape (n,).
     """
     y = np.asarray(outcome, dtype=np.float64)
-    part = np.minimum((np.asarray(place) * _PARTS).astype(np.int64), _PARTS - 1)
-    size = np.bincount(part, minlength=_PARTS)
-    there, parts = size > 1, int(np.count_nonzero(size > 1))
-    mean = np.bincount(part, weights=y, minlength=_PARTS)[there] / size[there]
-    square = np.bincount(part, weights=y**2, minlength=_PARTS)[there] / size[there]
-    within = np.maximum(square - mean**2, 0.0) * size[there] / (size[there] - 1)
-    whole = float(np.var(y))
-    if whole <= 0.0:
+    variance = float(np.var(y))
+    if variance <= 0.0:
         return 0.0
-    between = float(np.sum(size[there] * (mean - y.mean()) ** 2)) / y.size
-    chance = float(np.sum(within)) * (1.0 - 1.0 / max(parts, 1)) / y.size
-    return (between - chance) / whole
+    bins = np.minimum((np.asarray(quantile) * _BINS).astype(np.int64), _BINS - 1)
+    size = np.bincount(bins, minlength=_BINS)
+    used = size > 1
+    size = size[used]
+    mean = np.bincount(bins, weights=y, minlength=_BINS)[used] / size
+    mean_square = np.bincount(bins, weights=y**2, minlength=_BINS)[used] / size
+    within = np.maximum(mean_square - mean**2, 0.0) * size / (size - 1)
+    between = float(np.sum(size * (mean - y.mean()) ** 2)) / y.size
+    chance = float(np.sum(within)) * (1.0 - 1.0 / max(size.size, 1)) / y.size
+    return (between - chance) / variance

@@ -1,121 +1,156 @@
-"""Remedies tried by runs: each is the balancer of the changed scene under its own best settings.
+"""Remedies: changes of the scene, each judged with the best settings of the changed scene.
 
-Inputs are drawn by name and number, so that a device is the same under every remedy.
+Inputs are drawn by name and number, so a device is the same under every remedy.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 from typing import Any, Final
 
 from ringbalance.controller.balancer import Balancer, Remedy, Settings
-from ringbalance.controller.judging.judge import CHOOSING, FRESH, Judgement, judged, judged_all
-from ringbalance.results.requirements import MET, MISSED, Proportion
+from ringbalance.controller.judging.judge import (
+    FIRST_CHOOSING_DEVICE,
+    FIRST_VERDICT_DEVICE,
+    Judgement,
+    judged,
+    judged_all,
+    plain_settings,
+)
+from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import value_at
 
 Search = Callable[[Balancer], Settings]
-"""The best settings of a balancer."""
-Told = Callable[[str], None]
-_FIRST: Final = 16
-"""Devices after which a remedy with too few that meet is left."""
-_TOO_FEW: Final = 0.5
-"""Fraction of the devices, as a share of the one asked for, below which it is."""
-_MOST: Final = 256
-"""Devices that judge a remedy at the most."""
-_DIGITS: Final = 2
-"""Of a value between two alternatives."""
+"""Finds the best settings of a balancer."""
+Progress = Callable[[str], None]
+_FIRST_DEVICES: Final = 16
+"""Devices after which a remedy that serves far too few is given up."""
+_GIVE_UP_SHARE: Final = 0.5
+"""Share of the required fraction below which a remedy is given up."""
+_MAX_DEVICES: Final = 256
+_HALFWAY_DIGITS: Final = 2
+"""Significant digits of a value between two alternatives."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Remedied:
-    """Remedies that were made together, and what they come to."""
+    """Remedies applied together, with the judgement of the best settings of the changed scene."""
 
     remedies: tuple[Remedy, ...]
     judgement: Judgement
-    """Of the best settings of the changed scene."""
     size: float
-    """Sum of |ln| of every number's change."""
+    """Sum of |ln(new/old)| over all changed numbers; 1 for a value that the scene does not have."""
     along: str = ""
     """Path of the axis along which settings may move, such as the supply's pressure: what they set is changed
     by the remedy, too."""
 
     @property
     def code(self) -> str:
-        """Such as "bore" or "bore+limit"."""
-        return "+".join(each.code for each in self.remedies)
+        """Codes of the remedies, such as "bore" or "bore+limit"."""
+        return "+".join(remedy.code for remedy in self.remedies)
 
     @property
     def changes(self) -> Settings:
-        """Of the scene, by path, SI, without the settings of its controller."""
+        """Changes of the scene by path, SI, without the settings of its controller."""
         moved = {path: value for path, value in self.judgement.settings.items() if path == self.along}
         return {**_merged(self.remedies), **moved}
 
     @property
     def settings(self) -> Settings:
-        """The best ones under these changes."""
-        changed = self.changes
-        return {path: value for path, value in self.judgement.settings.items() if path not in changed}
+        """The best settings under these changes."""
+        changes = self.changes
+        return {path: value for path, value in self.judgement.settings.items() if path not in changes}
 
     @property
     def met(self) -> bool:
-        """Whether as many devices as asked for meet every demand."""
+        """True if the verdict is `MET`."""
         return self.judgement.verdict == MET
 
     @cached_property
     def order(self) -> tuple[object, ...]:
-        """First what meets, by fewest and smallest changes, then by fraction."""
+        """Sort key: remedies that meet the requirement come first, by number and size of changes."""
         fraction = self.judgement.fraction.value
         return (not self.met, *((len(self.remedies), self.size) if self.met else ()), -fraction)
 
     def document(self) -> dict[str, Any]:
-        """For JSON, SI."""
-        half, most = (self.judgement.settling_time(share) for share in (0.5, 0.9))
+        """The remedies with their judgement for JSON, SI."""
+        times = self.judgement.settling_times
         return {
             "code": self.code,
             "name": self.remedies[0].name,
             "changes": dict(self.changes),
-            "settings": {
-                path: list(value) if isinstance(value, tuple) else value
-                for path, value in self.settings.items()
-            },
+            "settings": plain_settings(self.settings),
             "fraction": self.judgement.fraction.document(),
             "verdict": self.judgement.verdict,
-            "half_settle_s": half[0] if half else None,
-            "ninety_percent_settle_s": most[0] if most else None,
+            "half_settle_s": times["p50"],
+            "ninety_percent_settle_s": times["p90"],
         }
 
 
 def tried_remedies(
-    balancer: Balancer, own: Judgement, *, search: Search, along: str = "", told: Told | None = None
+    balancer: Balancer, own: Judgement, *, search: Search, along: str = "", progress: Progress | None = None
 ) -> tuple[Remedied, ...]:
-    """What the remedies of a balancer come to, the best first.
+    """Judge the remedies that a balancer offers, and sort them, the best first.
 
-    Of one kind, alternatives are tried from the smallest change on until one meets, none meets at all, or
-    fewer devices meet than before; where no device of the scene as it is does, until one kind meets.  Where
-    none meets by itself, the best two together follow.  The best, and all that meet, are then judged on
-    devices on which nothing was chosen.
-    Args: `own`: judgement of the best settings of the scene as it is. `search`: best settings. `along`: as
-        `Remedied`.
+    The alternatives of one kind are tried in order of increasing change, until one meets the requirement, no
+    device meets it, or significantly fewer do than before; where no device of the scene as it is does, until
+    one kind meets.  Where no remedy is enough by itself, the best two are tried together.  The best, and all
+    that meet, are then judged on devices on which nothing was chosen.
+
+    Args: `own`: judgement of the best settings of the unchanged scene. `search`: finds settings. `along`: as
+        in `Remedied`.
     """
     kinds: dict[str, list[Remedy]] = {}
-    for each in balancer.remedies():
-        kinds.setdefault(each.code, []).append(each)
-    trial = _Trial(balancer=balancer, search=search, along=along, told=told or (lambda _: None))
+    for remedy in balancer.remedies():
+        kinds.setdefault(remedy.code, []).append(remedy)
+    judge = partial(_judge, balancer, search=search, along=along, progress=progress)
     rows: list[Remedied] = []
-    for some in kinds.values():
-        rows += trial.series(some, own.fraction)
+    for alternatives in kinds.values():
+        missed: Remedied | None = None
+        for remedy in alternatives:
+            row = judge([remedy])
+            if row is None:
+                continue
+            rows.append(row)
+            if row.met and missed is not None and remedy.continuous:
+                # The geometric mean of a change that misses and one that meets may be enough.
+                smaller = missed.remedies[0].changes
+                changes = {
+                    path: float(f"{math.sqrt(float(smaller[path]) * float(value)):.{_HALFWAY_DIGITS}g}")
+                    for path, value in remedy.changes.items()
+                }
+                halfway = Remedy(code=remedy.code, changes=changes, continuous=True)
+                rows += filter(None, [judge([halfway])])
+            fraction, before = row.judgement.fraction, (missed.judgement if missed else own).fraction
+            if row.met or fraction.count == 0 or fraction.high < before.low:
+                break
+            missed = row
         if own.fraction.count == 0 and any(row.met for row in rows):
             break
     if not any(row.met for row in rows):
-        rows += trial.pair(rows)
+        for first, second in combinations(sorted(rows, key=lambda row: row.order), 2):
+            shared = _merged(first.remedies).keys() & _merged(second.remedies).keys()
+            if first.code != second.code and not shared:
+                rows += filter(None, [judge([*first.remedies, *second.remedies])])
+                break
     rows.sort(key=lambda row: row.order)
-    return tuple(trial.afresh(row) if row.met or row is rows[0] else row for row in rows)
+    return tuple(
+        replace(
+            row,
+            judgement=_judgement(
+                _changed(balancer, _merged(row.remedies)), row.judgement.settings, FIRST_VERDICT_DEVICE
+            ),
+        )
+        if row.met or row is rows[0]
+        else row
+        for row in rows
+    )
 
 
 def tried_choices(
@@ -123,117 +158,59 @@ def tried_choices(
     *,
     search: Search,
     along: str = "",
-    told: Told | None = None,
+    progress: Progress | None = None,
     some: slice = slice(None),
 ) -> tuple[Remedied, ...]:
     """Judge a scene that leaves open what can be bought with each of these things. Args: `some`: which."""
-    trial = _Trial(balancer=balancer, search=search, along=along, told=told or (lambda _: None), start=FRESH)
-    return tuple(row for each in balancer.choices()[some] if (row := trial.of([each])) is not None)
+    judge = partial(_judge, balancer, search=search, along=along, progress=progress)
+    rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
+    return tuple(row for row in rows if row is not None)
 
 
-def amplitude_reached(judgement: Judgement) -> float | None:
-    """Amplitude that the fraction of devices asked for surely comes below, m; None: too few devices."""
-    last = sorted(judgement.outcomes.final_amplitude.tolist())
-    n = len(last)
-    surely = (k for k in range(1, n + 1) if Proportion(count=k, of=n).low >= judgement.asked)
-    return next((last[k - 1] for k in surely if math.isfinite(last[k - 1])), None)
+def _judge(
+    balancer: Balancer,
+    remedies: Sequence[Remedy],
+    *,
+    search: Search,
+    along: str,
+    progress: Progress | None,
+    start: int = FIRST_CHOOSING_DEVICE,
+) -> Remedied | None:
+    """Judge remedies applied together; None: the changed scene is refused.
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Trial:
-    """What trials share."""
-
-    balancer: Balancer
-    search: Search
-    along: str
-    told: Told
-    start: int = CHOOSING
-    """Number of the first device."""
-
-    def of(self, remedies: Sequence[Remedy]) -> Remedied | None:
-        """Remedies made together; None: the scene refuses them."""
-        changes = _merged(remedies)
-        try:
-            changed = self._changed(changes)
-            self.told(f"trying {', '.join(each.name or each.code for each in remedies)}")
-            settings = self.search(changed)
-            judgement = _judged(changed, settings, self.start)
-        except SceneError:
-            return None
-        size = _size(self.balancer, changes)
-        return Remedied(remedies=tuple(remedies), judgement=judgement, size=size, along=self.along)
-
-    def afresh(self, row: Remedied) -> Remedied:
-        """On devices on which nothing was chosen."""
-        return replace(
-            row, judgement=_judged(self._changed(_merged(row.remedies)), row.judgement.settings, FRESH)
-        )
-
-    def _changed(self, changes: Settings) -> Balancer:
-        scene = rechecked(self.balancer.scene).with_values(changes, origin="inferred")
-        return self.balancer.on_scene(scene)
-
-    def series(self, alternatives: Sequence[Remedy], own: Proportion) -> Iterator[Remedied]:
-        """Alternatives of one kind, from the smallest change on."""
-        before: Remedied | None = None
-        for each in alternatives:
-            row = self.of([each])
-            if row is None:
-                continue
-            yield row
-            if row.met:
-                if before is not None and each.continuous:
-                    yield from self._between(before, row)
-                return
-            fraction = row.judgement.fraction
-            if fraction.count == 0 or fraction.high < (before.judgement.fraction if before else own).low:
-                return
-            before = row
-
-    def _between(self, missed: Remedied, met: Remedied) -> Iterator[Remedied]:
-        """The change half-way, by ratios, from one that misses to one that meets."""
-        one, other = missed.remedies[0], met.remedies[0]
-        changes = {
-            path: _rounded(math.sqrt(float(one.changes[path]) * float(value)))
-            for path, value in other.changes.items()
-        }
-        row = self.of([Remedy(code=other.code, changes=changes, continuous=True)])
-        if row is not None:
-            yield row
-
-    def pair(self, rows: Sequence[Remedied]) -> Iterator[Remedied]:
-        """The best two of different kinds together."""
-        best = sorted(rows, key=lambda row: row.order)
-        for one, other in combinations(best, 2):
-            if one.code != other.code and not set(_merged(one.remedies)) & set(_merged(other.remedies)):
-                row = self.of([*one.remedies, *other.remedies])
-                if row is not None:
-                    yield row
-                return
-
-
-def _judged(changed: Balancer, settings: Settings, start: int) -> Judgement:
-    """On few devices where far too few of these meet what is asked."""
-    (first,) = judged_all(changed, [settings], first=_FIRST, most=_FIRST, start=start)
-    if first.verdict == MISSED and first.fraction.value < _TOO_FEW * first.asked:
-        return first
-    return judged(changed, settings, most=min(_MOST, changed.verdict_draws[1]), start=start)
-
-
-def _merged(remedies: Sequence[Remedy]) -> dict[str, Any]:
-    return {path: value for each in remedies for path, value in each.changes.items()}
-
-
-def _size(balancer: Balancer, changes: Mapping[str, Any]) -> float:
-    """Sum of |ln| of every number's change; 1 for what the scene does not have."""
+    Args: `start`: number of the first device.
+    """
+    changes = _merged(remedies)
+    try:
+        changed = _changed(balancer, changes)
+        if progress is not None:
+            progress(f"trying {', '.join(remedy.name or remedy.code for remedy in remedies)}")
+        judgement = _judgement(changed, search(changed), start)
+    except SceneError:
+        return None
     sizes = []
     for path, value in changes.items():
         try:
             sizes.append(abs(math.log(float(value) / value_at(balancer.scene, path))))
         except (TypeError, ValueError, ZeroDivisionError):
             sizes.append(1.0)
-    return round(math.fsum(sizes), 9)
+    size = round(math.fsum(sizes), 9)
+    return Remedied(remedies=tuple(remedies), judgement=judgement, size=size, along=along)
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+def _changed(balancer: Balancer, changes: Settings) -> Balancer:
+    """The balancer on its scene with changes. Raises: SceneError: these are refused."""
+    return balancer.on_scene(rechecked(balancer.scene).with_values(changes, origin="inferred"))
+
+
+def _judgement(changed: Balancer, settings: Settings, start: int) -> Judgement:
+    """Judge settings, on few devices where far too few of these meet the requirement."""
+    (first,) = judged_all(changed, [settings], first=_FIRST_DEVICES, most=_FIRST_DEVICES, start=start)
+    if first.verdict == MISSED and first.fraction.value < _GIVE_UP_SHARE * first.required_fraction:
+        return first
+    return judged(changed, settings, most=min(_MAX_DEVICES, changed.verdict_draws[1]), start=start)
+
+
+def _merged(remedies: Sequence[Remedy]) -> dict[str, Any]:
+    """Changes of remedies applied together, by path."""
+    return {path: value for remedy in remedies for path, value in remedy.changes.items()}

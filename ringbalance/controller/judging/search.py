@@ -9,7 +9,7 @@ devices choose between them.  What is chosen on these devices is judged on other
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise, product
 from typing import Final
@@ -30,20 +30,20 @@ _FINAL: Final = (DEVICES, 4 * DEVICES)
 """Devices that choose between the last few settings, by first and last number."""
 _FINALISTS: Final = 8
 _FEW: Final = 3
-"""Of these where the best serve enough of the first devices: to tell a plateau's middle from its edge."""
+"""Finalists where the best serve enough of the first devices: to tell a plateau's middle from its edge."""
 _ENOUGH: Final = 0.9
 """Fraction of the devices from which on the best settings need not be looked for more widely."""
 _ROUNDS: Final = 6
-"""In which neighbours are tried."""
+"""Rounds in which neighbours are tried."""
 _ALONG: Final = 3
-"""The same at a level of an axis, from the best of a level beside it."""
+"""Rounds at a level of the scan axis, from the best of a neighbouring level."""
 _CURVE: Final = tuple(Draws.block(256 + first, count, whole=False) for first, count in ((0, 16), (16, 48)))
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
 none of the first settle is answered by them."""
 
 
 _Ran = dict[object, Tried | None]
-"""What candidates came to, by key; None: not on every device."""
+"""Evaluated candidates by key; None: dropped before every device had run."""
 
 
 def search(
@@ -58,10 +58,24 @@ def search(
 
     Args: `along`: level on `Trials.along`; default the scene's. `ran`: by kind, what ran at that level.
     """
-    best = (
-        _best_of(balancer, each, along, dict((ran or {}).get(each.kind, {})), progress) for each in trials
-    )
-    return _ordered([each for each in best if each is not None], trials)
+    winners: list[Tried] = []
+    for space in trials:
+        evaluated = dict((ran or {}).get(space.kind, {}))
+        _climb(balancer, evaluated, _coarse(space, along), rounds=_ROUNDS, wide=True, progress=progress)
+        served = [each for each in evaluated.values() if each]
+        best = chosen(served)
+        if best is not None and best.count:
+            # 32 of 32 devices are no proof of 0.9: more devices choose between the finalists.
+            if best.fraction < _ENOUGH:
+                finalists = sorted(served, key=lambda each: (-each.count, each is not best))[:_FINALISTS]
+            else:
+                finalists, others = [best], [each for each in served if each is not best]
+                while len(finalists) < _FEW and (following := chosen(others)) and following.count:
+                    finalists.append(following)
+                    others.remove(following)
+            best = chosen(_on_more(balancer, finalists))
+        winners += filter(None, [best])
+    return _ordered(winners, trials)
 
 
 def _ordered(best: Iterable[Tried], trials: Sequence[Trials]) -> tuple[Tried, ...]:
@@ -73,13 +87,6 @@ def _ordered(best: Iterable[Tried], trials: Sequence[Trials]) -> tuple[Tried, ..
         return scenes is not None and not each.replaces(scenes), each is not scenes, -each.fraction
 
     return tuple(sorted(every, key=order))
-
-
-def _best_of(
-    balancer: Balancer, trials: Trials, along: float | None, tried: _Ran, progress: Progress
-) -> Tried | None:
-    _climb(balancer, tried, _coarse(trials, along), rounds=_ROUNDS, wide=True, progress=progress)
-    return _final(balancer, [each for each in tried.values() if each])
 
 
 def _coarse(trials: Trials, along: float | None) -> list[Candidate]:
@@ -101,8 +108,9 @@ def _climb(
 ) -> None:
     """Add what a field comes to, and the neighbours of the best again and again.
 
-    Args: `wide`: as `_starts`. `other`: the best of another kind of controller; what is surely worse than it
-    is dropped.
+    Args: `wide`: follow a best that serves no device, too, and beside one that serves too few the best of
+        those that are not next to it. `other`: the best of another kind of controller; what is surely worse
+        than it is dropped.
     """
     for _ in range(rounds):
         if not (fresh := [each for each in field if each.key not in tried]):
@@ -111,26 +119,13 @@ def _climb(
         known = [each for each in (*tried.values(), other) if each]
         ran = _raced(balancer, fresh, leading=max(known, key=lambda each: each.fraction, default=None))
         tried |= {each.key: None for each in fresh} | {each.candidate.key: each for each in ran}
-        starts = _starts([each for each in tried.values() if each], wide=wide)
+        served = [each for each in tried.values() if each]
+        best = chosen(served)
+        starts = [best] if best is not None and (best.count or wide) else []
+        if best is not None and wide and best.fraction < _ENOUGH:
+            apart = [each for each in served if not each.candidate.is_beside(best.candidate)]
+            starts += filter(None, [chosen(apart)])
         field = [near for each in starts for near in each.candidate.neighbours()]
-
-
-def _starts(tried: Sequence[Tried], *, wide: bool) -> list[Tried]:
-    """The best, where it serves any device. Args: `wide`: where it serves too few, the best of those that are
-    not beside it, too."""
-    if (best := chosen(tried)) is None or not wide:
-        return [best] if best is not None and best.count else []
-    apart = [each for each in tried if not each.candidate.is_beside(best.candidate)]
-    second = chosen(apart) if best.fraction < _ENOUGH else None
-    return [best] if second is None else [best, second]
-
-
-def _final(balancer: Balancer, tried: Sequence[Tried]) -> Tried | None:
-    """The best on more devices, of those that serve most on the first: 32 of 32 are no proof of 0.9."""
-    best = chosen(tried)
-    if best is None or best.count == 0:
-        return best
-    return chosen(_on_more(balancer, _finalists(tried, best)))
 
 
 def _on_more(balancer: Balancer, tried: Sequence[Tried]) -> list[Tried]:
@@ -141,20 +136,8 @@ def _on_more(balancer: Balancer, tried: Sequence[Tried]) -> list[Tried]:
     return [each.joined(outcomes) for each, outcomes in zip(tried, ran, strict=True)]
 
 
-def _finalists(tried: Sequence[Tried], best: Tried) -> list[Tried]:
-    """The best first; few where it serves enough, each the one to choose without those before."""
-    if best.fraction < _ENOUGH:
-        return sorted(tried, key=lambda each: (-each.count, each is not best))[:_FINALISTS]
-    last, others = [best], [each for each in tried if each is not best]
-    while len(last) < _FEW and (following := chosen(others)) is not None and following.count:
-        last.append(following)
-        others.remove(following)
-    return last
-
-
 def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | None = None) -> list[Tried]:
-    """Those that are not surely worse than the best after each heat. Args: `leading`: the best before."""
-    asked, demands = balancer.asked_fraction(), balancer.demands()
+    """Drop candidates that are significantly worse than the best. Args: `leading`: best of earlier ones."""
     running: dict[int, Tried | None] = {i: None for i, each in enumerate(field) if each.settings is not None}
     for first, last in _HEATS:
         if not running:
@@ -163,10 +146,8 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | N
         ran = balancer.run_all(settings, Draws.block(first, last - first, whole=False))
         for i, outcomes in zip(running, ran, strict=True):
             before = running[i]
-            judged = Judgement(
-                settings=field[i].settings or {}, asked=asked, demands=demands, outcomes=outcomes
-            )
-            running[i] = before.joined(outcomes) if before else Tried(candidate=field[i], judgement=judged)
+            judgement = Judgement.of(balancer, field[i].settings or {}, outcomes)
+            running[i] = before.joined(outcomes) if before else Tried(candidate=field[i], judgement=judgement)
         ranked = [each.judgement.meets for each in (*running.values(), leading) if each]
         best = max((meets[:last] for meets in ranked), key=np.count_nonzero)
         if not best.any():
@@ -193,7 +174,7 @@ class Along:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """What an axis comes to under the best settings at each level."""
+    """Best settings at every level of an axis."""
 
     levels: tuple[Along, ...]
     top: Along
@@ -242,7 +223,7 @@ def searched_along(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Levels:
-    """What serves at the levels of an axis."""
+    """Settings that serve devices at the levels of an axis."""
 
     balancer: Balancer
     trials: Sequence[Trials]
@@ -252,7 +233,7 @@ class _Levels:
     ran: dict[int, dict[str, _Ran]] = field(default_factory=dict)
     """By place of another level and kind of controller: what ran there."""
     serving: dict[int, dict[str, Tried]] = field(default_factory=dict)
-    """Likewise the best of it, where that serves any device."""
+    """By place of another level and kind of controller: the best of it, where that serves any device."""
     more: dict[object, Tried] = field(default_factory=dict)
     """By key: the best of kinds between which the devices of the search do not decide, on more devices."""
 
@@ -315,7 +296,7 @@ class _Levels:
         serving[kind] = chosen(each for each in ran.values() if each) or best
 
     def _needless(self, at: int, kind: str, near: int | None) -> bool:
-        """Whether a kind of controller beside the scene's is not tried: the scene's serves enough, or too few
+        """True if a kind of controller beside the scene's is not tried: the scene's serves enough, or too few
         at every level from one on at which the other serves no more."""
         asked, own = self.balancer.asked_fraction(), self.trials[0].kind
         known = self._known
@@ -336,33 +317,31 @@ class _Levels:
             asked = (best[0].candidate.at(level).settings if best else None) or {self.axis.name: level}
             if at not in before or before[at].judgement.settings != asked:
                 settings[at] = asked
-        return _answered(self.balancer, settings, self.axis)
+        judgements: dict[int, Judgement] = {}
+        asked_at = list(settings)
+        for draws in _CURVE:
+            if not asked_at:
+                break
+            ran = self.balancer.run_all([settings[at] for at in asked_at], draws)
+            for at, outcomes in zip(asked_at, ran, strict=True):
+                earlier = judgements.get(at)
+                judgements[at] = (
+                    earlier.extended(outcomes)
+                    if earlier
+                    else Judgement.of(self.balancer, settings[at], outcomes)
+                )
+            # The first devices are enough where none of them is served.
+            asked_at = [at for at in asked_at if judgements[at].fraction.count]
+        return {at: Along(level=self.axis.levels[at], judgement=each) for at, each in judgements.items()}
 
     def _compared(self, at: int) -> dict[str, Tried]:
-        """What serves at a level; on more devices where those of the search do not decide between kinds."""
+        """Best of every kind at a level, on more devices where those of the search leave the kind open."""
         serving = self._serving(at)
         if at not in self.searched and not is_decided(serving.values()):
             near = [each for each in serving.values() if each.candidate.key not in self.more]
             self.more.update((each.candidate.key, each) for each in _on_more(self.balancer, near))
             return {kind: self.more[each.candidate.key] for kind, each in serving.items()}
         return serving
-
-
-def _answered(balancer: Balancer, settings: Mapping[int, Settings], axis: Axis) -> dict[int, Along]:
-    asked, demands = balancer.asked_fraction(), balancer.demands()
-    few, more = _CURVE
-    judged = {
-        at: Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome)
-        for (at, setting), outcome in zip(
-            settings.items(), balancer.run_all(list(settings.values()), few), strict=True
-        )
-    }
-    serving = [at for at, each in judged.items() if each.fraction.count]
-    if serving:
-        ran = balancer.run_all([settings[at] for at in serving], more)
-        for at, outcome in zip(serving, ran, strict=True):
-            judged[at] = replace(judged[at], outcomes=judged[at].outcomes.joined(outcome))
-    return {at: Along(level=axis.levels[at], judgement=each) for at, each in judged.items()}
 
 
 def _top(count: Mapping[int, float]) -> int:

@@ -1,23 +1,23 @@
-"""What `tune` answers with: settings chosen by runs of few drawn devices, judged on others."""
+"""Result of `tune`: recommended settings, their judgement, and what would improve it."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any, Final
 
-from ringbalance.controller.balancer import FURTHER, Demand, Settings
-from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
-from ringbalance.controller.judging.remedies import Remedied, amplitude_reached
+from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import Along
 from ringbalance.controller.rotor import assumed_rotor
 from ringbalance.controller.trials import Information
 from ringbalance.results.numbers import given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.results.result import Cells, Result, Rows, Table
-from ringbalance.results.rows import Finding, Quantity, Value
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.describe import setting_text
@@ -25,20 +25,13 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import SceneFile, raw_value_at, with_values_at
 
 LONGER: Final = 300.0
-"""s, for which devices under the recommended settings are watched once more."""
-_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
+"""Time for which settled devices are watched once more under the recommended settings, s."""
+_VERDICT_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
 _EXACT: Final = "_exact"
-"""After the code of a verdict that is met by devices of which the scene states no uncertainty."""
-_SETTLED: Final = "settled"
-_MOST_CAUSES: Final = 3
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class BestOfKind:
-    """The best settings of one kind of controller, on the devices of the search."""
-
-    kind: str
-    judgement: Judgement
+"""End of the code of a verdict that is met by devices of which the scene states no uncertainty."""
+_CHOICES_CAPTION: Final = (
+    "Valves that can be bought, their lags assumed, each with the best settings of a coarse grid"
+)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
@@ -53,355 +46,246 @@ class Tuning(Result):
     """
 
     given: SceneFile
-    """The scene as it was."""
+    """The scene that was tuned."""
     recommended: Judgement
     own: Judgement | None
-    """Of the scene's own settings on the same devices; None: it gives none."""
+    """Judgement of the scene's own settings on the same devices; None: the scene states none."""
     longer: Judgement | None
-    """Of the recommended ones, devices watched for `LONGER`; None: all are watched to the end of the run."""
-    tried: tuple[BestOfKind, ...]
+    """Judgement of the recommended settings with devices watched for `LONGER`; None: runs go to their end."""
+    tried: Mapping[str, Judgement]
+    """Best settings of every kind of controller on the devices of the search."""
     along: tuple[Along, ...] = ()
-    """The best at every level of the axis that the balancer names, such as the gas pressure."""
+    """Best settings at every level of the scan axis, such as the gas pressure."""
     along_name: str = ""
-    """Path of its key."""
+    """Path of the scan axis."""
     along_unit: str = "1"
     information: Information = field(default_factory=Information)
     remedies: tuple[Remedied, ...] = ()
-    """What remedies come to, the best first; tried where what is required is not met."""
+    """Judged changes of the scene, the best first; tried where the requirement is not met."""
     capacity: tuple[Finding, ...] = ()
-    """What a machine moves beyond the capacity that decides a verdict."""
+    """Findings on liquid that a machine moves beyond the capacity that decides a verdict."""
     ranking: Ranking = field(default_factory=Ranking)
-    """Which input decides what the recommended settings come to."""
+    """Influence of the drawn inputs under the recommended settings."""
     choices: tuple[Remedied, ...] = ()
-    """What things that can be bought make of a scene that leaves them open."""
+    """Judged things that can be bought for what the scene leaves open."""
     open_choice: bool = False
-    """Whether it does."""
+    """True if the scene leaves such a choice open."""
 
     @property
     def scene(self) -> Any:
-        """The scene with what is recommended, of the type that it was."""
+        """The scene with the recommended settings, of the same type."""
         return with_values_at(self.given, self.recommended.settings)
 
     @property
     def recommended_scene(self) -> AnyScene:
-        """The same, checked, with a hash of its own."""
+        """The scene with the recommended settings, validated; its hash is new."""
         return rechecked(self.scene)
 
     @property
     def succeeded(self) -> bool:
-        """Whether what the scene requires is met with the recommended settings."""
+        """True if the recommended settings meet what the scene requires."""
         return self.recommended.verdict == MET
 
     @property
     def status(self) -> str:
-        """The first sentences."""
-        return " ".join(each.text for each in self.rows().findings[:2])
-
-    def rows(self) -> Rows:
-        """What is recommended, its verdict, and what it rests on."""
-        return _rows(self)
+        """The first two findings as text."""
+        return " ".join(finding.text for finding in islice(self._findings(), 2))
 
     def to_dict(self) -> dict[str, Any]:
-        """As a JSON document in SI."""
-        return _document(self)
-
-
-def _rows(tuning: Tuning) -> Rows:
-    scene = tuning.given
-    return Rows(
-        title=f"Tuning of {scene.name} ({scene.source})",
-        quantities=(*_fractions(tuning), *tuning.information.quantities),
-        findings=tuple(_findings(tuning)),
-        facts=tuning.information.facts,
-        tables=(
-            _settings_table(tuning),
-            required_table(tuning.recommended),
-            _along_table(tuning),
-            _tried_table(tuning),
-            _remedies_table("Remedies, each with its best settings", tuning.remedies),
-            _remedies_table(
-                "Valves that can be bought, their lags assumed, each with the best settings of a coarse grid",
-                tuning.choices,
-            ),
-        ),
-    )
-
-
-def _document(tuning: Tuning) -> dict[str, Any]:
-    scene = tuning.given
-    return {
-        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
-        "balancer": scene.balancer,
-        "status": tuning.status,
-        "asked": tuning.recommended.asked,
-        **judgement_document(tuning.recommended),
-        "settings": plain_settings(tuning.recommended.settings),
-        "own": None if tuning.own is None else judgement_document(tuning.own),
-        "further_s": FURTHER,
-        "longer": None
-        if tuning.longer is None
-        else {"further_s": LONGER, "fraction": tuning.longer.fraction.document()},
-        "required": required_document(tuning.recommended),
-        "along": {
-            "path": tuning.along_name,
-            "unit": tuning.along_unit,
-            "levels": [_level(each) for each in tuning.along],
-        },
-        "tried": [
-            {
-                "kind": each.kind,
-                "settings": plain_settings(each.judgement.settings),
-                "fraction": each.judgement.fraction.document(),
-            }
-            for each in tuning.tried
-        ],
-        "remedies": [each.document() for each in tuning.remedies],
-        "valves": [each.document() for each in tuning.choices],
-        "ranking": tuning.ranking.document(),
-        "clipped": dict(tuning.recommended.outcomes.clipped),
-        **tuning.information.document,
-        **tuning.rows().document(),
-    }
-
-
-def required_document(judgement: Judgement) -> list[dict[str, Any]]:
-    """What is asked of every device, and the fraction that meets it; SI."""
-    return [
-        {
-            "code": each.code,
-            "sense": each.sense,
-            "required": each.required,
-            "unit": each.unit,
-            "stated": each.stated,
-            "amplitude_m": each.amplitude,
-            "fraction": judgement.fraction_of(each).document(),
+        """The result as a JSON document, SI."""
+        scene, best = self.given, self.recommended
+        return {
+            "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+            "balancer": scene.balancer,
+            "status": self.status,
+            "asked": best.required_fraction,
+            **best.document(),
+            "settings": plain_settings(best.settings),
+            "own": self.own and self.own.document(),
+            "further_s": FURTHER,
+            "longer": self.longer and {"further_s": LONGER, "fraction": self.longer.fraction.document()},
+            "required": best.demands_document(),
+            "along": {
+                "path": self.along_name,
+                "unit": self.along_unit,
+                "levels": [
+                    {
+                        "value": each.level,
+                        "settings": plain_settings(each.judgement.settings),
+                        "fraction": each.judgement.fraction.document(),
+                        "verdict": each.judgement.verdict,
+                        "settling_time_s": each.judgement.settling_times,
+                        "usable_moment_kg_m": dict(
+                            zip(("p10", "p50", "p90"), map(finite, each.usable_moment), strict=True)
+                        ),
+                    }
+                    for each in self.along
+                ],
+            },
+            "tried": [
+                {
+                    "kind": kind,
+                    "settings": plain_settings(judgement.settings),
+                    "fraction": judgement.fraction.document(),
+                }
+                for kind, judgement in self.tried.items()
+            ],
+            "remedies": [each.document() for each in self.remedies],
+            "valves": [each.document() for each in self.choices],
+            "ranking": self.ranking.document(),
+            "clipped": dict(best.outcomes.clipped),
+            **self.information.document,
+            **self.rows().document(),
         }
-        for each in judgement.demands
-    ]
 
-
-def judgement_document(judgement: Judgement) -> dict[str, Any]:
-    """Verdict, fraction and times of settings; SI."""
-    return {
-        "verdict": judgement.verdict,
-        "fraction": judgement.fraction.document(),
-        "settling_time_s": times_of(judgement),
-        "ended": dict(Counter(judgement.outcomes.ended)),
-    }
-
-
-def _level(level: Along) -> dict[str, Any]:
-    low, middle, high = level.usable_moment
-    return {
-        "value": level.level,
-        "settings": plain_settings(level.judgement.settings),
-        "fraction": level.judgement.fraction.document(),
-        "verdict": level.judgement.verdict,
-        "settling_time_s": times_of(level.judgement),
-        "usable_moment_kg_m": {"p10": finite(low), "p50": finite(middle), "p90": finite(high)},
-    }
-
-
-def times_of(judgement: Judgement) -> dict[str, float | None]:
-    """When half and nine tenths of all devices have settled, s; None where the bound is open."""
-    times = {name: judgement.settling_time(part) for name, part in (("p50", 0.5), ("p90", 0.9))}
-    return {name: None if time is None else finite(time[0]) for name, time in times.items()}
-
-
-def plain_settings(settings: Settings) -> dict[str, Any]:
-    """For JSON."""
-    return {path: list(value) if isinstance(value, tuple) else value for path, value in settings.items()}
-
-
-def _fractions(tuning: Tuning) -> Iterator[Quantity]:
-    for key, name, judgement in (
-        ("fraction_met", "devices that meet what is required", tuning.recommended),
-        ("fraction_met_own", "the same with the scene's own settings", tuning.own),
-        ("fraction_met_longer", "the same, watched longer", tuning.longer),
-    ):
-        if judgement is not None:
-            share = judgement.fraction
-            yield Quantity(
-                key=key, name=name, value=share.value, lower=share.low, upper=share.high, origin="simulated"
+    def rows(self) -> Rows:
+        """The result as quantities, findings and tables."""
+        scene, best = self.given, self.recommended
+        settings = []
+        for path, value in best.settings.items():
+            before = setting_text(path, raw_value_at(scene, path))
+            before += " (default)" if scene.origin_of(path) == "default" else ""
+            settings.append((path, before, setting_text(path, value)))
+        levels = [
+            (
+                given(each.level, self.along_unit, digits=4),
+                *_fraction_and_times(each.judgement),
+                given(each.usable_moment[1], "kg m", digits=4),
             )
-    for key, time in times_of(tuning.recommended).items():
-        name = {"p50": "half of them settle within", "p90": "nine tenths settle within"}[key]
-        yield Quantity(
-            key=f"settling_time_{key}",
-            name=name,
-            unit="s",
-            value=time,
-            origin="simulated",
-            status="ok" if time is not None else "not_reached",
-            digits=3,
+            for each in self.along
+        ]
+        kinds = [
+            (kind.replace("_", " "), _changes_text(each.settings, ", "), _fraction_and_times(each)[0])
+            for kind, each in self.tried.items()
+        ]
+        return Rows(
+            title=f"Tuning of {scene.name} ({scene.source})",
+            quantities=(*self._quantities(), *self.information.quantities),
+            findings=tuple(self._findings()),
+            facts=self.information.facts,
+            tables=(
+                Table(caption="Settings", heads=("key", "the scene's", "recommended"), rows=settings),
+                required_table(best),
+                Table(
+                    caption=f"Over {self.along_name}",
+                    heads=(self.along_name, *_FRACTION_AND_TIMES, "usable moment"),
+                    rows=levels,
+                ),
+                Table(
+                    caption="The best of each kind, over the devices of the search",
+                    heads=("kind", "settings", "devices"),
+                    rows=kinds,
+                ),
+                _remedies_table("Remedies, each with its best settings", self.remedies),
+                _remedies_table(_CHOICES_CAPTION, self.choices),
+            ),
         )
 
+    def _quantities(self) -> Iterator[Quantity]:
+        for key, name, judgement in (
+            ("fraction_met", "devices that meet what is required", self.recommended),
+            ("fraction_met_own", "the same with the scene's own settings", self.own),
+            ("fraction_met_longer", "the same, watched longer", self.longer),
+        ):
+            if judgement is not None:
+                yield Quantity.of_fraction(judgement.fraction, key=key, name=name)
+        times = self.recommended.settling_times
+        for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
+            yield Quantity(
+                key=f"settling_time_{part}",
+                name=name,
+                unit="s",
+                value=times[part],
+                origin="simulated",
+                status="ok" if times[part] is not None else "not_reached",
+                digits=3,
+            )
 
-def _findings(tuning: Tuning) -> Iterator[Finding]:
-    best = tuning.recommended
-    changes = {
-        path: value[0] if isinstance(value, tuple) else value
-        for path, value in best.settings.items()
-        if value is not None
-    }
-    yield Finding(
-        code=_CODES[best.verdict] + if_exact(tuning.given, best), values=share_values(best), change=changes
-    )
-    times = times_of(best)
-    if times["p50"] is not None:
-        code = "tuned_half" if times["p90"] is None else "tuned_times"
-        yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
-    if tuning.own is None:
-        yield Finding(code="tuned_own_none")
-    elif not best.settings:
-        yield Finding(code="tuned_own_best")
-    else:
-        yield Finding(code="tuned_own", values={**share_values(tuning.own), "verdict": tuning.own.verdict})
-    if tuning.longer is not None:
-        values = {**share_values(tuning.longer), "time": LONGER, "first": FURTHER}
-        yield Finding(code="tuned_longer", values=values)
-    if best.verdict != MET and (causes := causes_of(best)):
-        yield Finding(code="tuned_causes", values={"causes": causes})
-    yield from tuning.capacity
-    if not tuning.remedies and tuning.along and best.verdict != MET:
-        yield Finding(code="tuned_no_level", values={"key": tuning.along_name})
-    yield from assumed_rotor(tuning.scene)
-    yield from _mending(tuning)
-
-
-def _mending(tuning: Tuning) -> Iterator[Finding]:
-    """The best remedy, what to measure, and what the answer leaves open."""
-    best, clipped = tuning.recommended, tuning.recommended.outcomes.clipped
-    meeting = [each for each in tuning.remedies if each.met]
-    for each in (meeting or tuning.remedies)[:1]:
-        code = "remedy_meets" if each.met else "remedy_best"
-        values = {**share_values(each.judgement), "what": _changes_text(each.changes, ", ")}
-        yield Finding(code=code, values=values, change=each.changes)
-    if best.verdict != MET:
-        yield from tuning.ranking.findings()
-    states = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
-    if best.verdict != MET and states and (reached := amplitude_reached(best)) is not None:
-        yield Finding(code="amplitude_reached", values={"amplitude": reached, "asked": best.asked})
-    if tuning.open_choice:
-        yield Finding(code="ideal_valve")
-    if clipped:
-        values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
-        yield Finding(code="inputs_clipped", values=values)
-
-
-def _changes_text(changes: Settings, between: str = "\n") -> str:
-    return between.join(f"{path} {setting_text(path, value)}" for path, value in changes.items())
-
-
-def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
-    rows: list[Cells] = [
-        (
-            each.remedies[0].name or each.code.replace("_", " "),
-            _changes_text(each.changes),
-            _share_text(each.judgement),
-            each.judgement.verdict,
-            *(given(time, "s", digits=3) for time in times_of(each.judgement).values()),
-            _changes_text(each.settings),
-        )
-        for each in tried
-    ]
-    heads = ["remedy", "change", "devices that meet all", "verdict", "half within", "90 % within", "settings"]
-    if not any(each.settings for each in tried):
-        heads, rows = heads[:-1], [row[:-1] for row in rows]
-    return Table(caption=caption, heads=heads, rows=rows)
+    def _findings(self) -> Iterator[Finding]:
+        """Sentences on the verdict, the settling times, the scene's own settings, causes and remedies."""
+        best, own, met = self.recommended, self.own, self.recommended.verdict == MET
+        changes = {
+            path: value[0] if isinstance(value, tuple) else value
+            for path, value in best.settings.items()
+            if value is not None
+        }
+        code = _VERDICT_CODES[best.verdict] + if_exact(self.given, best)
+        yield Finding(code=code, values=best.sentence_values, change=changes)
+        times = best.settling_times
+        if times["p50"] is not None:
+            code = "tuned_half" if times["p90"] is None else "tuned_times"
+            yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+        if own is None:
+            yield Finding(code="tuned_own_none")
+        elif not best.settings:
+            yield Finding(code="tuned_own_best")
+        else:
+            yield Finding(code="tuned_own", values={**own.sentence_values, "verdict": own.verdict})
+        if self.longer is not None:
+            values = {**self.longer.sentence_values, "time": LONGER, "first": FURTHER}
+            yield Finding(code="tuned_longer", values=values)
+        if not met and best.causes:
+            yield Finding(code="tuned_causes", values={"causes": best.causes})
+        yield from self.capacity
+        if not met and self.along and not self.remedies:
+            yield Finding(code="tuned_no_level", values={"key": self.along_name})
+        yield from assumed_rotor(self.scene)
+        meeting = tuple(each for each in self.remedies if each.met)
+        for remedy in (meeting or self.remedies)[:1]:
+            code = "remedy_meets" if remedy.met else "remedy_best"
+            values = {**remedy.judgement.sentence_values, "what": _changes_text(remedy.changes, ", ")}
+            yield Finding(code=code, values=values, change=remedy.changes)
+        if not met:
+            yield from self.ranking.findings()
+            states_amplitude = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
+            if states_amplitude and (amplitude := best.amplitude_reached) is not None:
+                values = {"amplitude": amplitude, "asked": best.required_fraction}
+                yield Finding(code="amplitude_reached", values=values)
+        if self.open_choice:
+            yield Finding(code="ideal_valve")
+        if clipped := best.outcomes.clipped:
+            values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
+            yield Finding(code="inputs_clipped", values=values)
 
 
 def if_exact(scene: SceneFile, judgement: Judgement) -> str:
-    """The ending of the code of a verdict that rests on exact parts."""
+    """End of the code of a verdict that rests on exact parts; empty for others."""
     return _EXACT if judgement.verdict == MET and not (scene.uncertainty or scene.fitted.quantities) else ""
 
 
-def share_values(judgement: Judgement) -> dict[str, Value]:
-    """What sentences say of a fraction."""
-    share = judgement.fraction
-    return {
-        "share": share.value,
-        "low": share.low,
-        "high": share.high,
-        "count": share.count,
-        "of": share.of,
-        "asked": judgement.asked,
-    }
-
-
-def causes_of(judgement: Judgement) -> list[str]:
-    """How many devices ended in which way without meeting what is required, most first."""
-    missed = [(demand.code, ~demand.met(judgement.outcomes)) for demand in judgement.demands]
-    counted = Counter(
-        " and ".join(f"{name} missed" for name, misses in missed if misses[place])
-        if code == _SETTLED
-        else code
-        for place, (code, met) in enumerate(zip(judgement.outcomes.ended, judgement.meets, strict=True))
-        if not met
-    )
-    return [f"{code.replace('_', ' ')} {count}" for code, count in counted.most_common(_MOST_CAUSES)]
-
-
-def _given_text(scene: SceneFile, path: str) -> str:
-    text = setting_text(path, raw_value_at(scene, path))
-    return f"{text} (default)" if scene.origin_of(path) == "default" else text
-
-
-def _settings_table(tuning: Tuning) -> Table:
-    rows = [
-        (path, _given_text(tuning.given, path), setting_text(path, value))
-        for path, value in tuning.recommended.settings.items()
-    ]
-    return Table(caption="Settings", heads=("key", "the scene's", "recommended"), rows=rows)
-
-
 def required_table(judgement: Judgement) -> Table:
-    """What is asked of every device, and how many meet it."""
-    rows = [
-        (
-            _demand_text(each),
-            f"{each.sense} {given(each.required, each.unit, digits=4)}",
-            percent(judgement.fraction_of(each).value),
-        )
-        for each in judgement.demands
-    ]
+    """Table of the demands, each with the fraction of devices that meets it."""
+    rows = []
+    for demand in judgement.demands:
+        what = demand.code.replace("_", " ")
+        what += "" if demand.amplitude is None else f" to {given(demand.amplitude, 'm', digits=4)}"
+        required = f"{demand.sense} {given(demand.required, demand.unit, digits=4)}"
+        rows.append((what, required, percent(judgement.fraction_of(demand).value)))
     return Table(caption="Required of every device", heads=("what", "required", "met by"), rows=rows)
 
 
-def _demand_text(demand: Demand) -> str:
-    what = demand.code.replace("_", " ")
-    return what if demand.amplitude is None else f"{what} to {given(demand.amplitude, 'm', digits=4)}"
+_FRACTION_AND_TIMES: Final = ("devices that meet all", "half within", "90 % within")
 
 
-def _along_table(tuning: Tuning) -> Table:
-    rows = [
-        (
-            given(each.level, tuning.along_unit, digits=4),
-            _share_text(each.judgement),
-            *(given(time, "s", digits=3) for time in times_of(each.judgement).values()),
-            given(each.usable_moment[1], "kg m", digits=4),
-        )
-        for each in tuning.along
-    ]
-    heads = (tuning.along_name, "devices that meet all", "half within", "90 % within", "usable moment")
-    return Table(caption=f"Over {tuning.along_name}", heads=heads, rows=rows)
-
-
-def _tried_table(tuning: Tuning) -> Table:
-    rows = [
-        (
-            each.kind.replace("_", " "),
-            ", ".join(
-                f"{path} {setting_text(path, value)}" for path, value in each.judgement.settings.items()
-            ),
-            _share_text(each.judgement),
-        )
-        for each in tuning.tried
-    ]
-    caption = "The best of each kind, over the devices of the search"
-    return Table(caption=caption, heads=("kind", "settings", "devices"), rows=rows)
-
-
-def _share_text(judgement: Judgement) -> str:
+def _fraction_and_times(judgement: Judgement) -> Cells:
+    """Cells below the heads `_FRACTION_AND_TIMES`."""
     share = judgement.fraction
-    return f"{percent(share.value)} ({percent(share.low)} to {percent(share.high)})"
+    fraction = f"{percent(share.value)} ({percent(share.low)} to {percent(share.high)})"
+    return (fraction, *(given(time, "s", digits=3) for time in judgement.settling_times.values()))
+
+
+def _changes_text(changes: Mapping[str, Any], separator: str = "\n") -> str:
+    return separator.join(f"{path} {setting_text(path, value)}" for path, value in changes.items())
+
+
+def _remedies_table(caption: str, remedies: tuple[Remedied, ...]) -> Table:
+    """Table of judged remedies; without a column of settings where none has any."""
+    with_settings = any(each.settings for each in remedies)
+    rows: list[Cells] = []
+    for each in remedies:
+        name = each.remedies[0].name or each.code.replace("_", " ")
+        fraction, *times = _fraction_and_times(each.judgement)
+        settings = [_changes_text(each.settings)] if with_settings else []
+        rows.append((name, _changes_text(each.changes), fraction, each.judgement.verdict, *times, *settings))
+    heads = ["remedy", "change", "devices that meet all", "verdict", "half within", "90 % within"]
+    return Table(caption=caption, heads=[*heads, *(["settings"] if with_settings else [])], rows=rows)

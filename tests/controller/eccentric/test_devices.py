@@ -104,7 +104,7 @@ def test_what_is_required_is_judged_over_the_devices(paper: EccentricScene) -> N
     settled, residual = (judgement.fraction_of(each) for each in judgement.demands)
     assert settled.value > 0.5
     assert judgement.fraction == residual == Proportion(count=0, of=8)
-    assert (judgement.verdict, judgement.asked) == ("not met", 0.8)
+    assert (judgement.verdict, judgement.required_fraction) == ("not met", 0.8)
 
 
 def test_a_device_is_run_as_it_is_with_every_setting(paper: EccentricScene) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
-from ringbalance.controller.judging.judge import FRESH
+from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
 from ringbalance.controller.judging.search import Along, search, searched_along
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.offers import trials
@@ -166,8 +166,8 @@ def test_what_is_chosen_is_judged_on_devices_that_chose_nothing(paper_scene: Sce
         assert each.outcomes.numbers
         assert not chose & set(each.outcomes.numbers)
     # Remedies that do not meet what is asked have not run on the devices that judge one that does.
-    assert min(found.recommended.outcomes.numbers) >= FRESH
-    assert min(best.judgement.outcomes.numbers) >= FRESH
+    assert min(found.recommended.outcomes.numbers) >= FIRST_VERDICT_DEVICE
+    assert min(best.judgement.outcomes.numbers) >= FIRST_VERDICT_DEVICE
     beside = {bore for number in best.judgement.outcomes.numbers for bore, *_ in machine.ran[number]}
     missed = {each.changes["tube.bore"] for each in others if not each.met}
     assert missed

@@ -36,9 +36,8 @@ def judgement(times: FloatArray) -> Judgement:
         unbalance=np.ones(n),
         ended=("",) * n,
     )
-    return Judgement(
-        settings={}, asked=0.9, demands=(settles_within(math.inf, stated=False),), outcomes=outcomes
-    )
+    demands = (settles_within(math.inf, stated=False),)
+    return Judgement(settings={}, required_fraction=0.9, demands=demands, outcomes=outcomes)
 
 
 @pytest.mark.parametrize(("fraction", "never"), [(0.5, 0.0), (0.5, 0.2), (0.8, 0.05)])

@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.controller.balancer import Outcomes, settles_within
 from ringbalance.controller.judging.judge import Judgement
-from ringbalance.controller.judging.ranking import _first_order_index, ranked
+from ringbalance.controller.judging.ranking import first_order_index, ranked
 from ringbalance.controller.liquid_ring.offers import drawn_input
 from ringbalance.controller.trials import DrawnInput
 from ringbalance.scene.arrays import FloatArray
@@ -36,7 +36,7 @@ def test_indices_of_the_ishigami_function() -> None:
     drawn = places(count)
     x = [2 * math.pi * drawn[name] - math.pi for name in NAMES]
     y = np.sin(x[0]) + 7 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
-    found = [_first_order_index(y, drawn[name]) for name in NAMES]
+    found = [first_order_index(y, drawn[name]) for name in NAMES]
     first = 0.3139 * (math.sin(math.pi / 8) / (math.pi / 8)) ** 2
     second = 0.4424 * (math.sin(math.pi / 4) / (math.pi / 4)) ** 2
     assert found == pytest.approx([first, second, 0.0], abs=0.01)
@@ -46,16 +46,16 @@ def test_indices_of_the_ishigami_function() -> None:
 def test_a_threshold_on_one_input_has_index_one_and_the_others_none(count: int) -> None:
     drawn = places(count)
     met = (drawn["a"] < 0.75).astype(float)
-    assert _first_order_index(met, drawn["a"]) == pytest.approx(1.0)
+    assert first_order_index(met, drawn["a"]) == pytest.approx(1.0)
     noise = math.sqrt(14) / count
-    assert all(abs(_first_order_index(met, drawn[name])) < 4 * noise for name in ("b", "c"))
-    assert _first_order_index(np.ones(count), drawn["a"]) == 0.0
+    assert all(abs(first_order_index(met, drawn[name])) < 4 * noise for name in ("b", "c"))
+    assert first_order_index(np.ones(count), drawn["a"]) == 0.0
 
 
 def test_the_noise_of_an_index_is_what_chance_gives() -> None:
     drawn = [quantiles(f"x{i}", range(256), seed=1) for i in range(200)]
     y = np.random.default_rng(3).random(256) < 0.8
-    found = [_first_order_index(y.astype(float), each) for each in drawn]
+    found = [first_order_index(y.astype(float), each) for each in drawn]
     assert np.mean(found) == pytest.approx(0.0, abs=2e-3)
     assert np.std(found) == pytest.approx(math.sqrt(14) / 256, rel=0.2)
 
@@ -79,7 +79,8 @@ def judgement(settled: Any, inputs: dict[str, FloatArray]) -> Judgement:
         ended=("settled",) * n,
         inputs=inputs,
     )
-    return Judgement(settings={}, asked=0.9, demands=(settles_within(2.0, stated=True),), outcomes=outcomes)
+    demands = (settles_within(2.0, stated=True),)
+    return Judgement(settings={}, required_fraction=0.9, demands=demands, outcomes=outcomes)
 
 
 def test_what_decides_is_measured_where_it_can_be() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
 from ringbalance.controller.judging.judge import Judgement, judged, judged_all
-from ringbalance.controller.judging.remedies import Remedied, amplitude_reached, tried_choices, tried_remedies
+from ringbalance.controller.judging.remedies import Remedied, tried_choices, tried_remedies
 from ringbalance.controller.liquid_ring.offers import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
@@ -136,10 +136,9 @@ def test_the_amplitude_that_is_surely_reached() -> None:
         unbalance=q,
         ended=("",) * 64,
     )
-    found = amplitude_reached(
-        Judgement(settings={}, asked=0.9, demands=(settles_within(1.0, stated=False),), outcomes=outcomes)
-    )
-    assert found == pytest.approx(q[62])
+    demands = (settles_within(1.0, stated=False),)
+    found = Judgement(settings={}, required_fraction=0.9, demands=demands, outcomes=outcomes)
+    assert found.amplitude_reached == pytest.approx(q[62])
 
 
 def test_a_device_keeps_its_inputs_under_a_remedy(paper_scene: Scene) -> None:

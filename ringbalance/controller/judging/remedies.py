@@ -161,7 +161,10 @@ def tried_choices(
     progress: Progress | None = None,
     some: slice = slice(None),
 ) -> tuple[Remedied, ...]:
-    """Judge a scene that leaves open what can be bought with each of these things. Args: `some`: which."""
+    """Judge the things that can be bought for what a scene leaves open.
+
+    Args: `some`: places of those to judge in the order of the balancer.
+    """
     judge = partial(_judge, balancer, search=search, along=along, progress=progress)
     rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
     return tuple(row for row in rows if row is not None)

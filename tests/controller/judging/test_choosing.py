@@ -69,8 +69,8 @@ class Machine:
         del scene
         return Information()
 
-    def beyond_capacity(self, *_: object) -> None:
-        pass
+    def beyond_capacity(self, *_: object) -> tuple[()]:
+        return ()
 
     def drawn_input(self, name: str) -> DrawnInput:
         return DrawnInput(common=False, measure="", path=name)

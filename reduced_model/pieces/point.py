@@ -60,8 +60,10 @@ RADIUS, MOMENT, PLACES_OF_QUERY = 30, 31, 32
 BLOCKED, SIPHONING, SEPARATED, REVERSE = 0.0, 1.0, 2.0, 3.0
 OK, EXTRAPOLATED, STANDS, INVALID = 0.0, 1.0, 2.0, 4.0
 
-# Parts of what a full siphon loses beyond which a tabulated share decides which velocity is the smaller one.
-GREATEST_PRESSURE, FILL_SLACK, SURELY, PERHAPS = 1e12, 1e-9, 0.997, 1.003
+# Pa: of a gas, and of what drives a flow; a velocity under less than that is zero by underflow, or loses its digits.
+GREATEST_PRESSURE, LEAST_DRIVING = 1e12, 1e-300
+# Of a fill; and parts of what a full siphon loses beyond which a tabulated share decides which velocity is smaller.
+FILL_SLACK, SURELY, PERHAPS = 1e-9, 0.997, 1.003
 # fmt: on
 
 

@@ -14,6 +14,7 @@ from ringbalance.reduced_model.pieces.point import (
     GREATEST_PRESSURE,
     INVALID,
     LARGEST_FILL,
+    LEAST_DRIVING,
     LEAST_PRESSURE,
     MARGIN,
     OK,
@@ -94,14 +95,14 @@ def set_answer(c: Law, k: Cells, p: Pieces, w: Query) -> bool:
     w[REGIME] = BLOCKED
     w[PRIMED_AFTER] = 0.0
     set_drive(c, w)
-    if w[DRIVING] > 0.0:
+    if w[DRIVING] > LEAST_DRIVING:
         set_flow(c, k, p, w, THERE)
         return False
     if stays_full(c, w):
         w[PRIMED_AFTER] = 1.0
     turn(w)
     set_drive(c, w)
-    if w[DRIVING] > 0.0:
+    if w[DRIVING] > LEAST_DRIVING:
         set_flow(c, k, p, w, int(c[WAY_BACK]))
         if w[REGIME] != BLOCKED:
             w[REGIME] = REVERSE

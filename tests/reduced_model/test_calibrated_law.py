@@ -176,7 +176,7 @@ def test_levels_that_leave_the_port(inner_port: CalibratedLaw) -> None:
 conditions = {
     "x": st.floats(0, 0.5),
     "y": st.floats(0, 0.5),
-    "p": st.one_of(st.floats(-AMBIENT, 5e6), st.sampled_from([0.0, 1e-300, -AMBIENT])),
+    "p": st.one_of(st.floats(-AMBIENT, 5e6), st.sampled_from([0.0, 5e-324, 1e-300, 1e-290, -AMBIENT])),
     "primed": st.booleans(),
 }
 

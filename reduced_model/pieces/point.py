@@ -60,9 +60,9 @@ RADIUS, MOMENT, PLACES_OF_QUERY = 30, 31, 32
 BLOCKED, SIPHONING, SEPARATED, REVERSE = 0.0, 1.0, 2.0, 3.0
 OK, EXTRAPOLATED, STANDS, INVALID = 0.0, 1.0, 2.0, 4.0
 
-# Pa: of a gas, and of what drives a flow; a velocity under less than that is zero by underflow, or loses its digits.
+# Pa: of a gas, and of what drives a flow; under less a velocity loses its digits, or is zero by underflow.
 GREATEST_PRESSURE, LEAST_DRIVING = 1e12, 1e-300
-# Of a fill; and parts of what a full siphon loses beyond which a tabulated share decides which velocity is smaller.
+# Of a fill; parts of what a full siphon loses beyond which a tabulated share decides which velocity counts.
 FILL_SLACK, SURELY, PERHAPS = 1e-9, 0.997, 1.003
 # fmt: on
 

@@ -240,23 +240,10 @@ def _asked(panel: Axes, level: float, text: str) -> None:
 
 def _question(evidence: Record) -> Record:
     """Verdicts on what the study of the paper's disc asks, by case; empty for any other disc."""
-    cases = {case["id"]: case for case in evidence["verification"]}
+    cases = {case["id"]: case for case in summary.claims(evidence)}
     if not summary.is_papers(evidence) or not cases.keys() >= set(_QUESTION):
         return {}
-    verdicts = {name: cases[name]["verdict"] for name in _QUESTION}
-    if library := cases.get("k_by_fluids", {}).get("numbers"):
-        printed = cases["claim_09_drag_coefficient"]["quantities"][0].get("reference_uncertainty") or 0.0
-        k, passed = evidence["paper"]["drag_coefficient"], cases["k_by_fluids"]["verdict"]
-        within = _within((library["k_low"], library["k_high"]), (k - printed, k + printed))
-        verdicts["k_by_fluids"] = within if passed == "passed" else passed
-    return verdicts
-
-
-def _within(found: tuple[float, float], printed: tuple[float, float]) -> str:
-    """Verdict on a printed number by a range of found ones."""
-    if found[1] < printed[0] or printed[1] < found[0]:
-        return "refuted"
-    return "confirmed" if printed[0] <= found[0] and found[1] <= printed[1] else "inconclusive"
+    return {name: cases[name]["verdict"] for name in _QUESTION}
 
 
 SECTION: Final = Section(

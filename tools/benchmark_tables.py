@@ -42,7 +42,7 @@ def models_table(record: Mapping[str, Any]) -> str:
 def levels_table(record: Mapping[str, Any]) -> str:
     """Rate and error of each level of a sweep."""
     rows_err, known = (
-        f"{record['velocity']['error']:.0e}",
+        f"{record['velocity']['error']:.0e}" if record["velocity"]["error"] else "0",
         percent(record["velocity"]["uncertainty"], digits=1),
     )
     levels = (

@@ -35,7 +35,7 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rot
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs, changes_of
-from ringbalance.scene.errors import FITTED, by_group, uncertainties
+from ringbalance.scene.errors import by_group, uncertainties
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
 
@@ -90,27 +90,18 @@ to +0.20, beyond what the same inlet costs at rest: a blunt one loses less where
 """
 
 
-def uncertainty_parts(
-    scene: Scene, *, velocity: FloatArray, state: TubeState, fitted: bool = True
-) -> Mapping[str, FloatArray]:
+def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -> Mapping[str, FloatArray]:
     """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
     of squares.
-    Args: `state`: the terms of k of the scene's tube at these velocities. `fitted`:
-        whether those of inputs and errors that were fitted together count.
+    Args: `state`: the terms of k of the scene's tube at these velocities.
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
     by_input = _input_parts(scene, k_of=lambda designs: corrected_state(designs.scene, velocity[..., None]).k)
-    together = f"{INPUT_PART}{FITTED}"
-    return unfitted_parts(scene, model_parts(tube=scene.tube, state=state)) | {
-        name: part for name, part in by_input.items() if fitted or name != together
-    }
-
-
-def unfitted_parts(scene: Scene, parts: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Parts of `model_parts` but for the causes whose errors the scene's joint distribution holds."""
+    by_model = model_parts(tube=scene.tube, state=state)
+    # The scene's joint distribution holds the errors of these causes.
     fitted = fitted_causes(scene)
-    return {cause: part for cause, part in parts.items() if cause not in fitted}
+    return {cause: part for cause, part in by_model.items() if cause not in fitted} | by_input
 
 
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -54,3 +55,10 @@ def modules() -> Mapping[str, Path]:
             name = ".".join(("ringbalance", *(part for part in parts if part != "__init__")))
             found[name] = path
     return found
+
+
+@pytest.fixture(scope="session")
+def trees(modules: Mapping[str, Path]) -> Mapping[str, ast.Module]:
+    """Dotted name to syntax tree, for every module of the rooms and of the package's face."""
+    face = {f"ringbalance.{path.stem}": path for path in sorted((ROOT / "ringbalance").glob("*.py"))}
+    return {name: ast.parse(path.read_text()) for name, path in (face | dict(modules)).items()}

@@ -10,8 +10,20 @@ from itertools import pairwise
 
 import pytest
 
-NAMES = "found told given made asked drawn place there here along aside beside one own whole kept known"
+NAMES = frozenset(
+    """found told given made asked drawn place there here along aside beside
+    one own whole kept known""".split()  # noqa: SIM905
+)
 """Acts, places and pronouns, which say nothing of the quantity or the type."""
+BINDING: Mapping[type[ast.AST], str] = {
+    ast.Name: "id",
+    ast.Attribute: "attr",
+    ast.arg: "arg",
+    ast.alias: "asname",
+    ast.FunctionDef: "name",
+}
+"""Node to its field that holds a name."""
+STORE = ast.Store()
 LEANING = re.compile(
     r"(?:As|See) `|(?:The same|Of|Also|As above|What|Whether|How|Where|With|That|Those|These|Such|Likewise"
     r"|(?:For|By|In) which)\b"
@@ -30,10 +42,9 @@ BARE = """
 def bound_names(tree: ast.Module) -> Iterator[str]:
     """Variables, arguments, attributes, functions and methods of a module with such a name."""
     for node in ast.walk(tree):
-        bound = isinstance(getattr(node, "ctx", None), ast.Store) or not hasattr(node, "ctx")
-        for field in ("id", "arg", "attr", "name", "asname"):
-            if bound and not isinstance(node, ast.keyword) and getattr(node, field, None) in NAMES.split():
-                yield getattr(node, field)
+        field = BINDING.get(type(node))
+        if field and getattr(node, field) in NAMES and isinstance(getattr(node, "ctx", STORE), ast.Store):
+            yield getattr(node, field)
 
 
 def leaning_texts(tree: ast.Module) -> Iterator[str]:
@@ -73,18 +84,18 @@ RULES: Mapping[str, Callable[[ast.Module], Iterator[str]]] = {
     "constants": unclear_constants,
 }
 CEILINGS = {
-    "ringbalance": {"names": 20, "texts": 9, "constants": 2},
-    "scene": {"names": 128, "texts": 73, "constants": 13},
-    "results": {"names": 10, "texts": 11, "constants": 1},
+    "ringbalance": {"names": 19, "texts": 9, "constants": 2},
+    "scene": {"names": 126, "texts": 73, "constants": 13},
+    "results": {"names": 9, "texts": 11, "constants": 1},
     "mesh": {"names": 37, "texts": 30, "constants": 2},
     "physics": {"names": 16, "texts": 32, "constants": 3},
-    "reduced_model": {"names": 123, "texts": 220, "constants": 20},
-    "controller": {"names": 201, "texts": 175, "constants": 28},
+    "reduced_model": {"names": 122, "texts": 220, "constants": 20},
+    "controller": {"names": 198, "texts": 175, "constants": 28},
     "identification": {"names": 1, "texts": 11, "constants": 17},
-    "export": {"names": 46, "texts": 44, "constants": 6},
-    "design": {"names": 74, "texts": 5, "constants": 6},
-    "verification": {"names": 197, "texts": 145, "constants": 32},
-    "reports": {"names": 139, "texts": 86, "constants": 11},
+    "export": {"names": 44, "texts": 44, "constants": 6},
+    "design": {"names": 69, "texts": 5, "constants": 6},
+    "verification": {"names": 194, "texts": 145, "constants": 32},
+    "reports": {"names": 133, "texts": 86, "constants": 11},
 }
 """What is left in each room: these numbers become smaller, never larger."""
 SHARED_CLASS_NAMES = """

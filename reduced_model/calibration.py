@@ -21,7 +21,6 @@ from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel
 from ringbalance.reduced_model.law.making import calibrated_law
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
-from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.terms import models_used
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.heads import TubeHeads
@@ -52,7 +51,6 @@ def calibrate(scene: AnyScene) -> Calibration:
         flow_law=law,
         paper_law=paper_law(scene),
         answers=_answers(scene, chamber),
-        tube_liquid=TubeLiquid.of(scene, law=law),
         instability=AsynchronousInstability.of(scene),
         models_used=models_used(scene),
         statistics={

@@ -21,7 +21,6 @@ from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.reduced_model.tube.flow import Waves
@@ -257,8 +256,6 @@ class Calibration(PresentedResult):
     """Eq. 19 of the liquid-ring paper, for comparison."""
     answers: Answers
     """Numbers: the flow at equal fills under the scene's gas pressure, what a pair can use, thresholds."""
-    tube_liquid: TubeLiquid
-    """In the tube of a pair around its first injection, and what it does to the vibration."""
     instability: AsynchronousInstability | None
     """Whirl that surface waves lock to; None where there is no such wave."""
     models_used: tuple[ModelUsed, ...]
@@ -269,7 +266,6 @@ class Calibration(PresentedResult):
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
         """Main numbers by key, with intervals, made when they are first asked for."""
-        tube = self.tube_liquid
         by_paper = paper.stall_pressure(
             disc=self.scene.disc,
             density=self.scene.liquid.density,
@@ -278,9 +274,6 @@ class Calibration(PresentedResult):
         rest = (
             ("lambda_variation", "variation of lambda over fills", "1", self.lambda_variation),
             ("stall_pressure_paper", "stall pressure by Eq. 19", "Pa", by_paper),
-            ("flowing_vibration", "vibration by tube liquid, flowing", "m", tube.flowing_vibration),
-            ("lasting_vibration", "vibration by tube liquid, lasting", "m", tube.lasting_vibration),
-            ("returned_volume", "liquid that falls back", "m^3", tube.returned_volume),
         )
         found = [
             *_budgets(self),

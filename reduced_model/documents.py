@@ -49,7 +49,6 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "tube": _tube(calibration),
         "law": _law(calibration),
         "regime": calibration.regime.label,
-        "tube_liquid": _tube_liquid(calibration),
         "asynchronous_instability": _instability(calibration),
         "tolerance": scene.tolerance,
         "holding": _holding(calibration),
@@ -177,20 +176,6 @@ def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[R
         fullest=np.maximum(fill_ratio, scene.disc.max_fill_ratio - fill_ratio),
         residual=float(calibration.answers.residual_fill_ratio),
     )
-
-
-def _tube_liquid(calibration: Calibration) -> dict[str, Any]:
-    found = calibration.tube_liquid
-    states = {"before": found.before, "flowing": found.flowing, "after": found.after}
-    return {
-        name: {
-            "state": held.state,
-            "mass_kg": held.mass,
-            "moment_along_kg_m": held.along,
-            "moment_across_kg_m": held.across,
-        }
-        for name, held in states.items()
-    }
 
 
 def _holding(calibration: Calibration) -> dict[str, Any]:

@@ -188,24 +188,6 @@ def path_radius(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:
     return np.asarray(np.sqrt(tube.hump_radius**2 + square * outward**2))
 
 
-def path_angle(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:
-    """Angle about the shaft at fractions s/L of the path, rad, from the driven chamber's port at zero.
-
-    A leg that touches the crest's circle at angle b = acos(r_m/r_p) is at b - acos(r_m/r) on the way; other
-    paths turn evenly.
-    """
-    s = np.asarray(share, dtype=np.float64)
-    if tube.hump_radius is None:
-        return np.asarray(np.pi * s)
-    start, end = crest_span(tube)
-    if tube.hump_shape == "point":
-        return np.asarray(np.interp(s, [0.0, start, 1.0], [0.0, np.pi / 2, np.pi]))
-    touch = math.acos(tube.hump_radius / tube.port_radius)
-    left = np.arccos(np.minimum(tube.hump_radius / path_radius(tube=tube, share=s), 1.0))
-    on_arc = np.interp(s, [start, end], [touch, np.pi - touch])
-    return np.asarray(on_arc + np.where(s < start, -left, np.where(s > end, left, 0.0)))
-
-
 def share_at_radius(*, tube: Tube, radius: float, far_leg: bool) -> float:
     """Fraction s/L of the path where a leg passes a radius, or its end when it does not reach there.
 

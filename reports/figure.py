@@ -1,4 +1,4 @@
-"""How every figure looks, and the frame that each fills: axes, units, bands and legend, from values in SI.
+"""Style of every figure, and its frame: axes, units, bands and legend, from values in SI.
 
 Figures are drawn in sentinel colours, which the SVG text then exchanges for CSS variables.  Nothing random,
 no date and no fixed colour remains, so the same data gives the same bytes.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, cast
 
@@ -30,7 +30,7 @@ GRID: Final = "#030303"
 PAPER: Final = "#040404"
 """The paper's formulas, in every figure."""
 FOUND: Final = "#050505"
-"""What this program found, in every figure."""
+"""Results of this program, in every figure."""
 THIRD: Final = "#060606"
 FOURTH: Final = "#070707"
 FIFTH: Final = "#080808"
@@ -54,7 +54,7 @@ MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 
 
 def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
-    """From one colour over another to a third; lines in the text's colour stand out on each."""
+    """Shades from one colour over another to a third; lines in the text's colour stand out on each."""
     ramp = LinearSegmentedColormap.from_list("ramp", [low, middle, high])
     return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
 
@@ -88,19 +88,18 @@ The lines tell apart for deuteranopes and protanopes, and as text.
 LIGHT: Final = {name: light for name, light, _ in _PALETTE.values()}
 DARK: Final = {name: dark for name, _, dark in _PALETTE.values()}
 
-_FONT: Final = "DejaVu Sans, Arial, sans-serif"
-"""Of figures that are files."""
-_TEXT: Final = 8.8
-"""Size of all text, pt: 8 pt where two narrow figures share the width of an A4 page, 13 px on a screen."""
+_FILE_FONT: Final = "DejaVu Sans, Arial, sans-serif"
+_TEXT_PT: Final = 8.8
+"""Size of all text: 8 pt where two narrow figures share the width of an A4 page, 13 px on a screen."""
 _RC: Final = {
     "svg.fonttype": "none",
     "svg.hashsalt": "ringbalance",
     "font.family": ["DejaVu Sans"],
-    "font.size": _TEXT,
+    "font.size": _TEXT_PT,
     "axes.edgecolor": MUTED,
     "axes.facecolor": "none",
     "axes.labelcolor": INK,
-    "axes.labelsize": _TEXT,
+    "axes.labelsize": _TEXT_PT,
     "axes.linewidth": 0.7,
     "axes.spines.right": False,
     "axes.spines.top": False,
@@ -112,7 +111,7 @@ _RC: Final = {
     "figure.facecolor": "none",
     "savefig.facecolor": "none",
     "legend.frameon": False,
-    "legend.fontsize": _TEXT,
+    "legend.fontsize": _TEXT_PT,
     "legend.labelcolor": INK,
     "legend.handlelength": 1.8,
     "lines.linewidth": 1.6,
@@ -122,8 +121,8 @@ _RC: Final = {
     "ytick.color": MUTED,
     "xtick.labelcolor": INK,
     "ytick.labelcolor": INK,
-    "xtick.labelsize": _TEXT,
-    "ytick.labelsize": _TEXT,
+    "xtick.labelsize": _TEXT_PT,
+    "ytick.labelsize": _TEXT_PT,
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
     "xtick.minor.visible": False,
@@ -131,17 +130,17 @@ _RC: Final = {
 }
 
 Paint = Callable[[Axes], object]
-"""What draws a part of a figure: on its axes, SI."""
-Axis = tuple[str, str]
-"""Name and SI unit of what an axis shows."""
+"""Function that draws a part of a figure on its axes, SI."""
+AxisLabel = tuple[str, str]
+"""Name and SI unit of an axis's quantity."""
 
 
 def line(index: int, *, size: float | None = None) -> dict[str, Any]:
     """Properties of one of several curves: a colour and dashes of its own, or markers of a size."""
-    place = index % len(_LINE_COLOURS)
+    index %= len(_LINE_COLOURS)
     if size is None:
-        return {"color": _LINE_COLOURS[place], "linestyle": _DASHES[place]}
-    return {"color": _LINE_COLOURS[place], "marker": _MARKERS[place], "markersize": size}
+        return {"color": _LINE_COLOURS[index], "linestyle": _DASHES[index]}
+    return {"color": _LINE_COLOURS[index], "marker": _MARKERS[index], "markersize": size}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,11 +148,11 @@ class Drawing:
     """A finished figure."""
 
     name: str
-    """Of the file, and the prefix of every id in it."""
+    """Stem of the file, and prefix of every id in it."""
     svg: str
-    """For an HTML page that defines the colour variables."""
+    """Element for an HTML page that defines the colour variables."""
     wide: bool = False
-    """Whether it takes the page's whole width."""
+    """True if it takes the page's whole width."""
 
     @property
     def size(self) -> tuple[float, float]:
@@ -173,7 +172,7 @@ def _as_file(body: str, width: float, height: float) -> str:
 
     Args: `width`, `height`: pt.
     """
-    body = body.replace("var(--fig-font)", _FONT)
+    body = body.replace("var(--fig-font)", _FILE_FONT)
     for variable, colour in LIGHT.items():
         body = body.replace(f"var({variable})", colour)
     size = f'width="{width:g}pt" height="{height:g}pt" viewBox="0 0 {width:g} {height:g}"'
@@ -184,20 +183,16 @@ def _as_file(body: str, width: float, height: float) -> str:
     )
 
 
-WIDE: Final = 7.5
-"""Width, in, of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
-NARROW: Final = 3.6
-_LEFT: Final = 0.66
-_RIGHT: Final = 0.14
-_BOTTOM: Final = 0.42
-_TOP: Final = 0.1
-_POINTS, _MARGIN = 72, 18.0
-_LEGEND_ROW: Final = 0.175
-_DECADE: Final = 8.0
-"""Range of a logarithmic axis up to which ticks at 1, 2 and 5 would be too few."""
-_MANY: Final = 1e4
-"""Range of a logarithmic axis from which on decades alone are labelled."""
-_TOP_AXIS: Final = 0.42
+WIDE_IN: Final = 7.5
+"""Width of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
+NARROW_IN: Final = 3.6
+_LEFT_IN, _RIGHT_IN, _BOTTOM_IN, _TOP_IN = 0.66, 0.14, 0.42, 0.1
+_LEGEND_ROW_IN, _TOP_AXIS_IN = 0.175, 0.42
+_PT_PER_IN, _SHEET_MARGIN_PT = 72, 18.0
+_FINE_TICKS_RANGE: Final = 8.0
+"""Ratio of a logarithmic axis's ends up to which ticks at 1, 2 and 5 would be too few."""
+_DECADES_RANGE: Final = 1e4
+"""Ratio of a logarithmic axis's ends from which on decades alone are labelled."""
 
 
 def plain_number(value: float, _position: object = None) -> str:
@@ -220,9 +215,9 @@ def decade(value: float, _position: object = None) -> str:
 def logarithmic(
     axis: Literal["x", "y"], *, ticks: list[float] | None = None, within: tuple[float, float] | None = None
 ) -> Paint:
-    """Makes one axis logarithmic, labels in plain text: at ticks, at 1, 2, 5 within limits, or decades."""
+    """Make one axis logarithmic, labels in plain text: at ticks, at 1, 2, 5 within limits, or decades."""
     if within is not None:
-        fine = (1, 2, 5) if within[1] > _DECADE * within[0] else (1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8)
+        fine = (1, 2, 5) if within[1] > _FINE_TICKS_RANGE * within[0] else (1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8)
         steps = (step * 10.0**exponent for exponent in range(-12, 10) for step in fine)
         ticks = [step for step in steps if within[0] <= step <= within[1]]
 
@@ -259,38 +254,38 @@ def curve(
 
 
 def level(value: float, label: str | None = None, **look: Any) -> Paint:
-    """A line across the whole figure."""
+    """A horizontal line across the figure."""
     return lambda axes: axes.axhline(value, label=label, **look)
 
 
 def upright(value: float, label: str | None = None, **look: Any) -> Paint:
-    """A line from the bottom to the top."""
+    """A vertical line across the figure."""
     return lambda axes: axes.axvline(value, label=label, **look)
 
 
-def note(text: str, place: tuple[float, float], shift: tuple[float, float], **look: Any) -> Paint:
-    """A text beside a place, shifted by so many points."""
-    shifted = {"xytext": shift, "textcoords": "offset points", "color": MUTED}
-    return lambda axes: axes.annotate(text, place, **{**shifted, **look})
+def note(text: str, point: tuple[float, float], shift_pt: tuple[float, float], **look: Any) -> Paint:
+    """A text beside a point."""
+    shifted = {"xytext": shift_pt, "textcoords": "offset points", "color": MUTED}
+    return lambda axes: axes.annotate(text, point, **{**shifted, **look})
 
 
-AMPLITUDE: Final[Axis] = ("amplitude, zero to peak,", "m")
-TIME: Final[Axis] = ("time", "s")
-Curve = tuple[ArrayLike, ArrayLike, dict[str, Any]]
-"""Time, s, or speed; amplitude, m; and the line's properties."""
+AMPLITUDE: Final[AxisLabel] = ("amplitude, zero to peak,", "m")
+TIME: Final[AxisLabel] = ("time", "s")
 
 
-def amplitudes(curves: Iterable[Curve], limit: float) -> Paint:
-    """Vibration amplitudes and the limit, m, on a logarithmic axis."""
-    drawn = list(curves)
-    every = np.append(np.concatenate([np.asarray(values) for _, values, _ in drawn]), limit)
+def amplitudes(curves: Sequence[tuple[ArrayLike, ArrayLike, dict[str, Any]]], limit: float) -> Paint:
+    """Vibration amplitudes and the limit, m, on a logarithmic axis.
+
+    Args: `curves`: time, s, or speed; amplitude, m; and the line's properties.
+    """
+    every = np.append(np.concatenate([np.asarray(values) for _, values, _ in curves]), limit)
     low, high = 0.7 * every[every > 0].min(), 1.4 * every.max()
 
     def paint(axes: Axes) -> None:
-        for time, values, look in drawn:
+        for time, values, look in curves:
             curve(time, values, **look)(axes)
         level(limit, "limit", color=MUTED, linewidth=1, linestyle=":")(axes)
-        logarithmic("y", within=(low, high) if high < _MANY * low else None)(axes)
+        logarithmic("y", within=(low, high) if high < _DECADES_RANGE * low else None)(axes)
         axes.set(xlim=(0, None), ylim=(low, high))
 
     return paint
@@ -314,39 +309,35 @@ def _to_page(text: str, name: str) -> str:
     body = body.replace("<svg ", '<svg aria-hidden="true" ', 1)
     # A tenth of a point is finer than the eye; what is small, as a marker, keeps another digit.
     parts = re.split(r'( (?:d|x|y|transform)="[^"]*")', body)
-    parts[1::2] = _rounded("\0".join(parts[1::2])).split("\0")
+    short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", "\0".join(parts[1::2])))
+    parts[1::2] = re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short)).split("\0")
     body = "".join(parts)
     return "\n".join(text.rstrip() for text in body.splitlines())
-
-
-def _rounded(attributes: str) -> str:
-    short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", attributes))
-    return re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short))
 
 
 def draw(
     name: str,
     *paints: Paint,
-    x: Axis = ("", "1"),
-    y: Axis = ("", "1"),
+    x: AxisLabel = ("", "1"),
+    y: AxisLabel = ("", "1"),
     xlim: tuple[float | None, float | None] | None = None,
     ylim: tuple[float | None, float | None] | None = None,
     columns: int = 2,
     wide: bool = False,
     height: float = 2.7,
 ) -> Drawing:
-    """Draws one figure: its paints one after the other, its axes in the units that suit, and above it the
+    """Draw one figure: its paints one after the other, its axes in the units that suit, and above it the
     legend of what is labelled.
 
-    Args: `name`: of the file. `columns`: of the legend; 0: none. `height`: inches of 72 units.
+    Args: `name`: stem of the file. `columns`: of the legend; 0: no legend. `height`: inches of 72 units.
     """
     settings: Any = dict(_RC)
     with matplotlib.rc_context(settings):
-        width = WIDE if wide else NARROW
+        width = WIDE_IN if wide else NARROW_IN
         figure = Figure(figsize=(width, height))
         # Margins in inches, the same in every figure, so that neighbours line up.
-        sizes = 1 - (_LEFT + _RIGHT) / width, 1 - (_BOTTOM + _TOP) / height
-        axes = figure.add_axes((_LEFT / width, _BOTTOM / height, *sizes))
+        sizes = 1 - (_LEFT_IN + _RIGHT_IN) / width, 1 - (_BOTTOM_IN + _TOP_IN) / height
+        axes = figure.add_axes((_LEFT_IN / width, _BOTTOM_IN / height, *sizes))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(plain_number))
         for paint in paints:
@@ -361,9 +352,9 @@ def draw(
     return Drawing(name=name, svg=_to_page(buffer.getvalue(), name), wide=wide)
 
 
-def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], shown: Axis) -> None:
-    """Labels an axis, with its ticks in the unit that suits its ends."""
-    name, unit = shown
+def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], label: AxisLabel) -> None:
+    """Label an axis, with its ticks in the unit that suits its ends."""
+    name, unit = label
     display = display_unit(unit, *limits)
     axis.set_label_text(f"{name} in {display.symbol}" if name and display.symbol else name or display.symbol)
     if display.factor == 1:
@@ -374,13 +365,13 @@ def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], shown: Axis) -> N
         ticks = AutoLocator().tick_values(low, high)
         axis.set_ticks([tick / display.factor for tick in ticks if low <= tick <= high])
     text = axis.get_major_formatter()
-    axis.set_major_formatter(FuncFormatter(lambda value, place: text(value * display.factor, place)))
+    axis.set_major_formatter(FuncFormatter(lambda value, position: text(value * display.factor, position)))
 
 
 def panels(axes: Axes, *boxes: tuple[float, float, float, float], **kind: Any) -> list[Axes]:
-    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's.
+    """Axes in place of a figure's, each by left, bottom, width and height over the figure's.
 
-    Args: `kind`: of the axes, such as their `projection`.
+    Args: `kind`: properties of the axes, such as their `projection`.
     """
     axes.set_axis_off()
     return [figure_of(axes).add_axes(box, **kind) for box in boxes]
@@ -395,7 +386,7 @@ def nice_span(span: float) -> list[float]:
         if span / (step * 10.0**exponent) < 3
     )
     count = int(span / step)
-    return [step * place for place in range(-count, count + 1)]
+    return [step * multiple for multiple in range(-count, count + 1)]
 
 
 def figure_of(axes: Axes) -> Figure:
@@ -404,7 +395,7 @@ def figure_of(axes: Axes) -> Figure:
 
 
 def _legend_above(axes: Axes, *, columns: int) -> None:
-    """Puts the legend above the axes, in columns that fit, and gives these the height left; call it last."""
+    """Put the legend above the axes, in columns that fit; the axes take the height left. Call it last."""
     figure = figure_of(axes)
     handles, labels = axes.get_legend_handles_labels()
     for fitting in range(max(columns, 1), 0, -1):
@@ -423,21 +414,27 @@ def _legend_above(axes: Axes, *, columns: int) -> None:
             break
         legend.remove()
     rows = -(-len(labels) // fitting)
-    top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
+    top = _TOP_IN + _LEGEND_ROW_IN * rows + (_TOP_AXIS_IN if axes.child_axes else 0.0)
     box, height = axes.get_position(), figure.get_figheight()
-    axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))
+    axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM_IN + top) / height))
 
 
 def sheet(drawings: Sequence[Drawing]) -> str:
     """All drawings below each other, narrow ones in pairs, in the colours of a light page."""
-    placed, x, y, row, edge = [], _MARGIN, _MARGIN, 0.0, _MARGIN + _POINTS * WIDE
+    elements, x, y, row, edge = (
+        [],
+        _SHEET_MARGIN_PT,
+        _SHEET_MARGIN_PT,
+        0.0,
+        _SHEET_MARGIN_PT + _PT_PER_IN * WIDE_IN,
+    )
     for drawing in drawings:
-        width = _POINTS * (WIDE if drawing.wide else NARROW)
-        if x > _MARGIN and x + width > edge:
-            x, y, row = _MARGIN, y + row + _MARGIN, 0.0
+        width = _PT_PER_IN * (WIDE_IN if drawing.wide else NARROW_IN)
+        if x > _SHEET_MARGIN_PT and x + width > edge:
+            x, y, row = _SHEET_MARGIN_PT, y + row + _SHEET_MARGIN_PT, 0.0
         height = drawing.size[1]
-        place = f'<svg x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" overflow="visible" '
-        told = f'role="img" aria-label="{drawing.name.replace("-", " ")}"'
-        placed.append(drawing.svg.replace("<svg ", place, 1).replace('aria-hidden="true"', told, 1))
-        x, row = x + width + _MARGIN, max(row, height)
-    return _as_file("\n".join(placed), edge + _MARGIN, y + row + _MARGIN)
+        tag = f'<svg x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" overflow="visible" '
+        aria = f'role="img" aria-label="{drawing.name.replace("-", " ")}"'
+        elements.append(drawing.svg.replace("<svg ", tag, 1).replace('aria-hidden="true"', aria, 1))
+        x, row = x + width + _SHEET_MARGIN_PT, max(row, height)
+    return _as_file("\n".join(elements), edge + _SHEET_MARGIN_PT, y + row + _SHEET_MARGIN_PT)

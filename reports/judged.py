@@ -26,51 +26,54 @@ from ringbalance.scene.units import shortest, shortest_quantity
 
 _COARSE_DEVICES: Final = 16
 """Devices on which settings for things that can be bought are chosen."""
-_CURVE_POINTS: Final = 50
-"""Largest number of points of a curve."""
+_MAX_CURVE_POINTS: Final = 50
 
 
 def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
     """Judge the scene's own settings, with remedies and measurements where they do not suffice."""
-    (own,) = judged_all(balancer, [{}], first=first, most=most)
-    suffices = own.verdict == MET or bool(own.meets.all())
-    measures = () if suffices else tuple(ranked(balancer, own).findings())
-    remedies = () if suffices else tried_remedies(balancer, own, search=searched)
+    (judgement,) = judged_all(balancer, [{}], first=first, most=most)
+    suffices = judgement.verdict == MET or bool(judgement.meets.all())
+    measures = () if suffices else tuple(ranked(balancer, judgement).findings())
+    remedies = () if suffices else tried_remedies(balancer, judgement, search=searched)
     return {
-        "own": judgement_record(own),
+        "own": judgement_record(judgement),
         "remedies": [each.document() for each in remedies],
         "measures": [each.document() for each in measures],
     }
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
-    """The scene's own settings beside the recommended ones, both watched for `LONGER` too."""
+    """Judge the scene's own and the recommended settings, both watched for `LONGER` too."""
 
     def watched(judgement: Judgement) -> Record:
         fraction = judgement.fraction.document()
         return {"further_s": LONGER, "fraction": fraction, "verdict": judgement.verdict}
 
-    best, own, document = tuning.recommended, tuning.own, tuning.to_dict()
+    best, scene_judgement, document = tuning.recommended, tuning.own, tuning.to_dict()
     own_document, recommended, moved = None, None, None
-    if own is not None:
+    if scene_judgement is not None:
         (own_longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER)
-        own_document = judgement_record(own) | {"longer": watched(own_longer)}
-    if own is None or best.settings:
+        own_document = judgement_record(scene_judgement) | {"longer": watched(own_longer)}
+    if scene_judgement is None or best.settings:
         recommended = judgement_record(best) | {"longer": tuning.longer and watched(tuning.longer)}
     if (path := tuning.along_name) in best.settings:
         # The recommended settings leave the scene's level of the scan axis.
         before = value_at(tuning.given, path)
-        there = [each.judgement.fraction.document() for each in tuning.along if each.level == before]
+        at_scene_level = [each.judgement.fraction.document() for each in tuning.along if each.level == before]
         moved = {
             "name": key_words(path),
             "unit": tuning.along_unit,
             "before": before,
             "after": best.settings[path],
-            "fraction": there[0] if there else None,
+            "fraction": at_scene_level[0] if at_scene_level else None,
         }
     measures: Iterable[Finding] = tuning.ranking.findings()
     if best.verdict == MET:
-        measures = () if own is not None and own.verdict == MET else (Finding(code="settings_suffice"),)
+        measures = (
+            ()
+            if scene_judgement is not None and scene_judgement.verdict == MET
+            else (Finding(code="settings_suffice"),)
+        )
     return {
         "own": own_document,
         "recommended": recommended,
@@ -115,7 +118,7 @@ def judgement_record(judgement: Judgement) -> Record:
 def settled_record(outcomes: Outcomes) -> Record:
     """Fraction of the devices that has settled by a time, with its 95 % bounds, as a curve."""
     times = np.sort(outcomes.settling_time[outcomes.settled])
-    counts = np.unique(np.linspace(1, times.size, _CURVE_POINTS).round()) if times.size else np.zeros(0)
+    counts = np.unique(np.linspace(1, times.size, _MAX_CURVE_POINTS).round()) if times.size else np.zeros(0)
     fractions = [Proportion(count=int(count), of=outcomes.settled.size) for count in counts]
     return {
         "time_s": [float(times[each.count - 1]) for each in fractions],

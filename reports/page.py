@@ -60,27 +60,25 @@ _ANNEX: Final = "annex.html"
 DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
     {
         _ANNEX: {
-            "place": "annex",
+            "name": "annex",
             "kind": "Annex",
             "other": {"file": "report.html", "title": "The report"},
         },
         "report.html": {
-            "place": "report",
+            "name": "report",
             "kind": "Design report",
             "other": {"file": _ANNEX, "title": "Annex: evidence and details"},
         },
     }
 )
-"""The documents by file name; the report last, for where it is, all else is."""
+"""The documents by file name; the report last: where it exists, all other files do."""
 _LEADING: Final = re.compile(r"\d+(?:\.\d+)?")
-_PICTURE_WIDTH: Final = 800
-_PICTURE_QUALITY: Final = 70
-_PICTURE_EFFORT: Final = 6
-"""Of 6; more saves a twentieth of the bytes in twice the time."""
+_WEBP_WIDTH_PIXELS: Final = 800
+_WEBP: Final[Record] = {"format": "WEBP", "quality": 70, "method": 6}
 
 
 def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
-    """Rows of the scene by group; values that the program supplied with no more digits than are certain."""
+    """Rows of the scene by group; defaults of the program with no more digits than are certain."""
     shown = []
     for row in rows:
         text: str = row["value"]
@@ -95,11 +93,10 @@ def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
 
 @dataclass(frozen=True, kw_only=True)
 class _PageContent:
-    """Everything that the templates need."""
+    """Context of the templates, and every figure on the pages, for files of their own."""
 
     context: Record
     drawings: tuple[Drawing, ...]
-    """Every figure on the page, for files of their own."""
 
 
 def page_content(
@@ -111,7 +108,7 @@ def page_content(
     """Turn the evidence into texts, tables and figures.
 
     Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
-    out. `views`: what `views_of` answers, perhaps made by another process.
+    out. `views`: result of `views_of`, perhaps from another process.
     Raises: KeyError: an evidence document that lacks a part.
     """
     views = views_of(evidence) if views is None else views
@@ -171,8 +168,8 @@ def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
             # A quarter of the bytes, and no difference to the eye.
             packed = io.BytesIO()
             with Image.open(io.BytesIO(contents[item[key]])) as picture:
-                picture.thumbnail((_PICTURE_WIDTH, _PICTURE_WIDTH))
-                picture.save(packed, format="WEBP", quality=_PICTURE_QUALITY, method=_PICTURE_EFFORT)
+                picture.thumbnail((_WEBP_WIDTH_PIXELS, _WEBP_WIDTH_PIXELS))
+                picture.save(packed, **_WEBP)
             variants[key] = "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
         pictures[item["name"]] = {**item, **variants}
     return pictures
@@ -184,12 +181,7 @@ _CLASSES: Final = "/* classes */"
 
 
 def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> dict[str, str]:
-    """The self-contained HTML documents by file name, the report last.
-
-    Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
-    out.
-    Raises: KeyError: an evidence document that lacks a part.
-    """
+    """The self-contained HTML documents by file name, the report last: `render_pages` of `page_content`."""
     return render_pages(page_content(evidence, pictures=pictures))
 
 
@@ -208,9 +200,9 @@ def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCU
         page = template.render(
             content.context,
             document=document,
-            numbered=_Numbers(PREFIXES[document["place"]]),
+            numbered=_Numbers(PREFIXES[document["name"]]),
             annex_file=_ANNEX,
-            sections=[s for s in content.context["sections"] if s["place"] == document["place"]],
+            sections=[s for s in content.context["sections"] if s["document"] == document["name"]],
             style=Markup(style),
             glyphs=Markup(GLYPHS),
         )
@@ -219,7 +211,7 @@ def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCU
 
 
 def terminal_lines(evidence: Record) -> list[str]:
-    """What to say of a report in a few sentences, for a terminal."""
+    """Summary of a report in a few sentences, for a terminal."""
     context = {"e": placed(evidence), "tallies": summary.tallies(evidence)}
     text = _environment().get_template("terminal.txt").render(context)
     return [str(Markup(line).striptags()) for line in text.splitlines() if line.strip()]
@@ -267,20 +259,20 @@ class _Numbers:
 
 
 def _share_styles(page: str) -> str:
-    """Each style that drawings repeat, once, as a class, and no id that nothing refers to."""
+    """Replace the styles that drawings repeat by classes, and drop ids that nothing refers to."""
     used = {*re.findall(r"[#(]#?([\w.-]+)[\")]", page)}
     page = _PART_ID.sub(lambda match: match[1] + (match[2] if match[3] in used else ""), page)
     names: dict[str, str] = {}
 
-    def named(match: re.Match[str]) -> str:
+    def with_class(match: re.Match[str]) -> str:
         tag, style = match.groups()
         if " class=" in tag:
             return match[0]
         return f'{tag} class="{names.setdefault(style, f"s{len(names)}")}"'
 
-    bare = _STYLED.sub(named, page)
+    page = _STYLED.sub(with_class, page)
     rules = "".join(f".{name}{{{style}}}" for style, name in names.items())
-    return bare.replace(_CLASSES, rules, 1)
+    return page.replace(_CLASSES, rules, 1)
 
 
 def _template(name: str) -> str:

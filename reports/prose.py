@@ -55,10 +55,10 @@ _UNITS: Final = {
     r"'": "’",
 }
 _PLAIN: Final = re.compile(r"[^A-Za-z^%'*]*")
-"""What nothing here changes, unless it has a " - ": most cells of tables."""
-_CERTAIN: Final = ("given", "measured")
+"""Text that stays as it is, unless it has a " - ": most cells of tables."""
+_KNOWN_ORIGINS: Final = ("given", "measured")
 _OWNERS: Final = {"lqr": "regulator", "masses": "eccentric masses"}
-"""What a table of the scene file stands for, where that is another word."""
+"""Names of tables of the scene file, where they differ from the key."""
 _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
 """Tables, and a key, whose keys need no owner."""
 _MESH: Final = "disc.mesh"
@@ -79,18 +79,19 @@ _PATH: Final = re.compile(
 
 
 def typeset(text: str) -> str:
-    """Sets plain prose such as "rho omega^2 R2^2 in um" with the signs that it means."""
+    """Set plain prose such as "rho omega^2 R2^2 in um" with Greek letters, superscripts and signs."""
     if _PLAIN.fullmatch(text) and "- " not in text:
         return text
-    greek = _GREEK_WORD.sub(lambda match: _GREEK[match[1]], text)
-    indexed = _INDEXED.sub(_index, greek)
-    raised = _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), indexed)
-    raised = _EXPONENT.sub(
-        lambda match: f"\u202f×\u202f10{str(int(match[1])).translate(_SUPERSCRIPTS)}", raised
+    text = _GREEK_WORD.sub(lambda match: _GREEK[match[1]], text)
+    text = _INDEXED.sub(
+        lambda match: f"{match[1] or match[2]}{match[3].translate(_SUBSCRIPTS)}{'′' if match[4] else ''}",
+        text,
     )
+    text = _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), text)
+    text = _EXPONENT.sub(lambda match: f"\u202f×\u202f10{str(int(match[1])).translate(_SUPERSCRIPTS)}", text)
     for pattern, sign in _UNITS.items():
-        raised = re.sub(pattern, sign, raised)
-    return raised
+        text = re.sub(pattern, sign, text)
+    return text
 
 
 def opening(text: str) -> str:
@@ -100,7 +101,7 @@ def opening(text: str) -> str:
 
 
 def key_words(path: str) -> str:
-    """The key of a path in the scene file as a reader knows it, such as "siphon crest radius"."""
+    """Words for the key of a path in the scene file, such as "siphon crest radius"."""
     if path == FITTED:
         return "fitted inputs"
     key = path.rpartition(".")[2]
@@ -108,12 +109,8 @@ def key_words(path: str) -> str:
 
 
 def paths_named(text: str) -> str:
-    """A sentence of the program, in which the scene file's keys have the names of what they stand for."""
+    """A sentence of the program with the names of inputs in place of the scene file's paths."""
     return _PATH.sub(lambda match: input_name(match[0]), text)
-
-
-def _index(match: re.Match[str]) -> str:
-    return (match[1] or match[2]) + match[3].translate(_SUBSCRIPTS) + ("′" if match[4] else "")
 
 
 def resting(evidence: Mapping[str, Any], *paths: str) -> str:
@@ -121,10 +118,10 @@ def resting(evidence: Mapping[str, Any], *paths: str) -> str:
     origins = evidence["scene"].get("origins") or {}
     values = {row.get("path"): row.get("value", "") for row in evidence["scene"].get("table") or ()}
     by_origin: dict[str, list[str]] = {}
-    for named in paths:
+    for input_path in paths:
         # What follows from the mesh of an imported chamber rests on that.
-        path = _MESH if origins.get(named) == "derived" else named
-        if (origin := origins.get(path, "given")) not in _CERTAIN:
+        path = _MESH if origins.get(input_path) == "derived" else input_path
+        if (origin := origins.get(path, "given")) not in _KNOWN_ORIGINS:
             text = f"{key_words(path)} {values.get(path, '')}".rstrip()
             by_origin.setdefault(origin, []).append(re.sub(r"\bum\b", "\N{MICRO SIGN}m", text))
     return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
@@ -133,11 +130,11 @@ def resting(evidence: Mapping[str, Any], *paths: str) -> str:
 def named_with_origin(evidence: Mapping[str, Any], path: str) -> str:
     """An input's name, with its origin where it is neither given nor measured."""
     origin = (evidence["scene"].get("origins") or {}).get(path, "given")
-    return input_name(path) + ("" if origin in _CERTAIN else f" ({origin})")
+    return input_name(path) + ("" if origin in _KNOWN_ORIGINS else f" ({origin})")
 
 
 def input_name(path: str) -> str:
-    """The name of an input that a path in the scene file stands for, such as "bore of the tube"."""
+    """Name of the input at a path of the scene file, such as "bore of the tube"."""
     if path == FITTED:
         return "what was fitted together"
     table, _, key = path.partition(".")
@@ -158,9 +155,9 @@ class _Equation:
 
     latex: str
     words: str
-    """Read aloud, or by those who cannot see it."""
+    """Text for screen readers."""
     source: str
-    """Where it stands in the paper, or what it is."""
+    """Number in the paper, or description."""
 
 
 @cache
@@ -171,44 +168,40 @@ def equations() -> Mapping[str, _Equation]:
 
 
 @cache
-def equation_svg(latex: str, words: str, name: str) -> str:
-    """One equation as an SVG element in the current text colour, sized in the text's em.
-
-    One that is not kept, as of a case of the user's own, is shown as its LaTeX.
-
-    Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
-    """
-    text = _kept().get(latex)
-    if text is None:
-        return f"<code>{escape(latex)}</code>"
-    text = re.sub(r'\bid="', f'id="{name}-', text)
-    text = re.sub(r'href="#', f'href="#{name}-', text)
-    text = re.sub(r' width="([\d.]+)" height="([\d.]+)"', _in_em, text, count=1)
-    label = words.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
-    return text.replace("<svg ", f'<svg role="img" aria-label="{label}" class="math" ', 1)
-
-
-@cache
-def _kept() -> Mapping[str, str]:
+def _equation_svgs() -> Mapping[str, str]:
     """SVG of the program's own equations by their LaTeX, as `tools/doc_tables.py` has set them."""
     packed = files("ringbalance.reports").joinpath("data", "equations.json.xz").read_bytes()
     return cast(Mapping[str, str], json.loads(lzma.decompress(packed)))
 
 
+@cache
+def equation_svg(latex: str, words: str, name: str) -> str:
+    """One equation as an SVG element in the current text colour, sized in the text's em.
+
+    An equation of a case of the user's own, which is not among those of the program, is shown as its LaTeX.
+
+    Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
+    """
+    text = _equation_svgs().get(latex)
+    if text is None:
+        return f"<code>{escape(latex)}</code>"
+    text = re.sub(r'\bid="', f'id="{name}-', text)
+    text = re.sub(r'href="#', f'href="#{name}-', text)
+
+    def in_em(size: re.Match[str]) -> str:
+        width, height = (float(pixels) / 16 for pixels in size.groups())
+        return f' style="width:{width:.3f}em;height:{height:.3f}em"'
+
+    text = re.sub(r' width="([\d.]+)" height="([\d.]+)"', in_em, text, count=1)
+    label = words.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
+    return text.replace("<svg ", f'<svg role="img" aria-label="{label}" class="math" ', 1)
+
+
 def share_glyphs(page: str) -> str:
-    """Keeps one copy of each glyph for all equations of a page: equations are mostly the same letters."""
+    """Leave one copy of each glyph for all equations of a page: equations are mostly the same letters."""
     names: dict[str, str] = {}
-    renamed: dict[str, str] = {}
-    for match in _SYMBOL.finditer(page):
-        content = match[2]
-        renamed[match[1]] = names.setdefault(content, f"glyph-{len(names)}")
-    bare = _SYMBOL.sub("", page)
-    used = _USE.sub(lambda match: f'href="#{renamed.get(match[1], match[1])}"', bare)
+    shared = {match[1]: names.setdefault(match[2], f"glyph-{len(names)}") for match in _SYMBOL.finditer(page)}
+    page = _USE.sub(lambda match: f'href="#{shared.get(match[1], match[1])}"', _SYMBOL.sub("", page))
     sheet = "".join(f'<symbol id="{name}"{content}' for content, name in names.items())
     hidden = 'width="0" height="0" style="position:absolute" aria-hidden="true"'
-    return used.replace(GLYPHS, f'<svg xmlns="http://www.w3.org/2000/svg" {hidden}>{sheet}</svg>', 1)
-
-
-def _in_em(size: re.Match[str]) -> str:
-    width, height = (float(group) / 16 for group in size.groups())
-    return f' style="width:{width:.3f}em;height:{height:.3f}em"'
+    return page.replace(GLYPHS, f'<svg xmlns="http://www.w3.org/2000/svg" {hidden}>{sheet}</svg>', 1)

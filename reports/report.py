@@ -1,11 +1,11 @@
-"""The whole report: evidence, figures, fields, pictures and page, put in place once all of it is there."""
+"""The whole report: evidence, figures, fields, pictures and pages, put in place once all are complete."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
@@ -33,7 +33,7 @@ from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
-"""Of a report, the page last: where it is, all else is."""
+"""Files of a report, the page last: where it exists, all others do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class Report:
     page: Path
     """report.html."""
     evidence: Record
-    """What evidence.json holds."""
+    """Content of evidence.json."""
 
     @property
     def sound(self) -> bool:
@@ -55,13 +55,13 @@ class Report:
 
     @property
     def summary(self) -> list[str]:
-        """What to say of it in a few sentences, and why it has no pictures where it has none."""
+        """Summary in a few sentences, and the reason where there are no pictures."""
         pictures = self.evidence["pictures"]
         return terminal_lines(self.evidence) + ([] if pictures["drawn"] else [pictures["text"]])
 
 
 def _views(path: Path, balancer: str, pool: Workers | None) -> Iterator[tuple[str, Record | None]]:
-    """What the pages show, by section and of the cases. Args: `path`: file of the evidence."""
+    """Views of all sections and of the cases, by name. Args: `path`: file of the evidence."""
     # The cases have most figures.
     names = (CASES_VIEW, *sections_of(balancer))
     return answers_of([Job(name=name, do=partial(_view_at, name, path)) for name in names], pool)
@@ -95,54 +95,40 @@ def write_report(
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
     """
-    folder, start, tell = Path(out), time.perf_counter(), progress or (lambda _: None)
-    saved = saved_cases(folder)
+    folder, start, report_progress = Path(out), time.perf_counter(), progress or (lambda _: None)
+    saved, ring = saved_cases(folder), ring_of(scene)
+    # Only a liquid ring has fields and pictures; they are drawn while the evidence is collected.
+    no_pictures = nullcontext(lambda: {"drawn": True, "text": "", "files": []})
     with (
         seldom_collected(),
         staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage,
         beside(workers, loading=paper_scene) as pool,
-        _pictures(scene, stage, opengl) as pictures,
+        no_pictures if ring is None else drawn(ring, stage, opengl) as finish_pictures,
     ):
         evidence = collect_evidence(
-            scene, level=level, scene_text=scene_text, saved=saved, pool=pool, progress=tell
+            scene, level=level, scene_text=scene_text, saved=saved, pool=pool, progress=report_progress
         )
-        tell("pictures")
-        evidence["pictures"] = pictures()
-        tell("page")
+        report_progress("pictures")
+        evidence["pictures"] = finish_pictures()
+        report_progress("page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
-        evidence = _write_page(evidence, stage, pool)
+        path, figures, tables = stage / "evidence.json", stage / "figures", stage / TABLES
+        path.write_text(evidence_text(evidence), encoding="utf-8")
+        # The pages are made of the evidence as it reads back from its file.
+        evidence = _read_at(path)
+        views = dict(_views(path, evidence["balancer"], pool))
+        figures.mkdir(exist_ok=True)
+        names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
+        pictures = {name: (figures / name).read_bytes() for name in names}
+        content = page_content(evidence, pictures=pictures, views=views)
+        for drawing in content.drawings:
+            (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
+        tables.mkdir()
+        for name, text in _csv_tables(evidence).items():
+            (tables / name).write_text(text, encoding="utf-8")
+        for name, page in render_pages(content).items():
+            (stage / name).write_text(page, encoding="utf-8")
     return Report(page=folder / "report.html", evidence=evidence)
-
-
-def _pictures(
-    scene: AnyScene, stage: Path, opengl: OpenGL | None
-) -> AbstractContextManager[Callable[[], Record]]:
-    """Draws while the body runs: only a liquid ring has fields and pictures."""
-    ring = ring_of(scene)
-    if ring is None:
-        return nullcontext(lambda: {"drawn": True, "text": "", "files": []})
-    return drawn(ring, stage, opengl)
-
-
-def _write_page(evidence: Record, stage: Path, pool: Workers | None) -> Record:
-    """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
-    path = stage / "evidence.json"
-    path.write_text(evidence_text(evidence), encoding="utf-8")
-    kept = _read_at(path)
-    views = dict(_views(path, kept["balancer"], pool))
-    figures = stage / "figures"
-    figures.mkdir(exist_ok=True)
-    names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
-    pictures = {name: (figures / name).read_bytes() for name in names}
-    content = page_content(kept, pictures=pictures, views=views)
-    for drawing in content.drawings:
-        (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
-    (stage / TABLES).mkdir()
-    for name, table in _csv_tables(kept).items():
-        (stage / TABLES / name).write_text(table, encoding="utf-8")
-    for name, page in render_pages(content).items():
-        (stage / name).write_text(page, encoding="utf-8")
-    return kept
 
 
 def _csv_tables(evidence: Record) -> dict[str, str]:
@@ -159,9 +145,20 @@ def _csv_tables(evidence: Record) -> dict[str, str]:
         if is_long(table)
     }
     if drag := (evidence.get("fifty") or {}).get("map"):
-        tables["map_of_k.csv"] = _drag_map(drag)
+        bores, viscosities = drag["bore_m"], drag["kinematic_viscosity_m2_s"]
+        tables["map_of_k.csv"] = {
+            "bore [m]": np.repeat(bores, len(viscosities)).tolist(),
+            "kinematic viscosity [m^2/s]": np.tile(viscosities, len(bores)).tolist(),
+            "k [1]": [k or None for k in np.ravel(drag["k"]).tolist()],
+            "expanded uncertainty of k [1]": [k or None for k in np.ravel(drag["k_uncertainty"]).tolist()],
+        }
     if operation := evidence.get("operation"):
-        tables["operating_map.csv"] = _operating_map(operation)
+        points = list(product(operation["gas_pressure_Pa"], operation["fill_ratio"]))
+        tables["operating_map.csv"] = {
+            "gas pressure [Pa]": [pressure for pressure, _ in points],
+            "fill ratio [1]": [fill for _, fill in points],
+            "regime": [operation["regimes"][int(sign)] for row in operation["regime"] for sign in row],
+        }
     for law, run in evidence["closed_loop"].items():
         tables[f"loop_{law}.csv"] = {
             "time [s]": run["time_s"],
@@ -169,22 +166,3 @@ def _csv_tables(evidence: Record) -> dict[str, str]:
             "phase [rad]": run.get("phase_rad") or [None] * len(run["time_s"]),
         }
     return {name: csv_text(columns) for name, columns in tables.items()}
-
-
-def _drag_map(drag: Record) -> Record:
-    bores, viscosities = drag["bore_m"], drag["kinematic_viscosity_m2_s"]
-    return {
-        "bore [m]": np.repeat(bores, len(viscosities)).tolist(),
-        "kinematic viscosity [m^2/s]": np.tile(viscosities, len(bores)).tolist(),
-        "k [1]": [k or None for k in np.ravel(drag["k"]).tolist()],
-        "expanded uncertainty of k [1]": [k or None for k in np.ravel(drag["k_uncertainty"]).tolist()],
-    }
-
-
-def _operating_map(operation: Record) -> Record:
-    places = list(product(operation["gas_pressure_Pa"], operation["fill_ratio"]))
-    return {
-        "gas pressure [Pa]": [pressure for pressure, _ in places],
-        "fill ratio [1]": [fill for _, fill in places],
-        "regime": [operation["regimes"][int(sign)] for row in operation["regime"] for sign in row],
-    }

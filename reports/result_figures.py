@@ -1,4 +1,4 @@
-"""What `plot()` draws of a result, in the report's style."""
+"""Figures of a result for `plot()`, in the report's style."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ringbalance.results.result import Result
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification import papers
 
-_LEAST: Final = 1e-12
+_MIN_ERROR: Final = 1e-12
 """Error at which a model that equals the finest is drawn."""
 
 
@@ -52,14 +52,14 @@ class _ResultFigures:
 
 
 def figures_of_result(result: Result) -> _ResultFigures:
-    """Of a calibration, a run, a tuning, a fit, a comparison, a trade study or a sweep.
+    """Figures of a calibration, a run, a tuning, a fit, a comparison, a trade study or a sweep.
 
-    Raises: TypeError: there is nothing to draw of such a result.
+    Raises: TypeError: a result of another type.
     """
     kind = type(result).__name__
-    if kind not in _DRAWN:
+    if kind not in _FIGURES:
         raise TypeError(f"of a result of the type {kind} there is no figure")
-    return _ResultFigures(drawings=tuple(_DRAWN[kind](result)))
+    return _ResultFigures(drawings=tuple(_FIGURES[kind](result)))
 
 
 def _calibration(result: Any) -> list[Drawing]:
@@ -97,12 +97,12 @@ def _trade(result: Any) -> list[Drawing]:
         speed = {each["model"]: each["designs_per_second"] for each in result.times.get(name, ())}
         models = [model for model in quantity["models"] if model["model"] in speed]
         rates = [speed[model["model"]] for model in models]
-        errors = [max(model["error"], _LEAST) for model in models]
-        known = max(quantity["uncertainty"], _LEAST)
+        errors = [max(model["error"], _MIN_ERROR) for model in models]
+        uncertainty = max(quantity["uncertainty"], _MIN_ERROR)
         drawing = draw(
             f"trade-{name.replace('_', '-')}",
             curve(rates, errors, quantity["title"], color=FOUND, linestyle="", marker="o", markersize=5),
-            level(known, "known to", color=PAPER, linewidth=1, linestyle=":"),
+            level(uncertainty, "known to", color=PAPER, linewidth=1, linestyle=":"),
             logarithmic("x"),
             logarithmic("y"),
             x=("designs a second", "1"),
@@ -112,15 +112,11 @@ def _trade(result: Any) -> list[Drawing]:
     return drawings
 
 
-def _run(result: Any) -> list[Drawing]:
-    return figures_of(result.scene, result)
-
-
-_DRAWN: Final[Mapping[str, Callable[[Any], list[Drawing]]]] = MappingProxyType(
+_FIGURES: Final[Mapping[str, Callable[[Any], list[Drawing]]]] = MappingProxyType(
     {
         "Calibration": _calibration,
-        "Simulation": _run,
-        "EccentricRun": _run,
+        "Simulation": lambda run: figures_of(run.scene, run),
+        "EccentricRun": lambda run: figures_of(run.scene, run),
         "Tuning": _tuning,
         "Comparison": _comparison,
         "Fit": lambda fit: fit_figures(against_fit(fit.result)),
@@ -128,4 +124,4 @@ _DRAWN: Final[Mapping[str, Callable[[Any], list[Drawing]]]] = MappingProxyType(
         "TradeStudy": _trade,
     }
 )
-"""By the name of the result's type."""
+"""Functions that draw a result, by the name of its type."""

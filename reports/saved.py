@@ -1,8 +1,7 @@
-"""Results of cases kept from earlier runs, so that a report runs only what its scene requires.
+"""Results of cases from earlier runs, so that a report runs only what its scene requires; its provenance.
 
-Heavy cases: those of an output folder, and those packaged.  Light cases that look at no scene: what this very
-program has found before, on the same packages and the same kind of processor.  And by what a report was made,
-for whoever must make it again.
+Heavy cases come from the output folder and from the package.  Light cases that look at no scene come from
+earlier runs of this very program, with the same packages, on the same kind of processor.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ _LISTS: Final = ("quantities", "series", "convergence", "tables", "mutations", "
 _KINDS: Final[Mapping[str, type]] = MappingProxyType(
     dict.fromkeys(_TEXTS, str) | dict.fromkeys(_LISTS, list) | {"reference": dict, "numbers": dict}
 )
-"""Of a heavy case's record, which a report may take over."""
+"""Types by key of a case's record that a report may take over."""
 _NAMES: Final[Mapping[type, str]] = MappingProxyType({str: "a text", list: "a list", dict: "an object"})
 
 
@@ -68,33 +67,26 @@ def saved_cases(folder: Path | None = None) -> list[Record]:
 
     Raises: OSError: an evidence file that cannot be read, or is none.
     """
-    found = _packaged()
-    if folder is not None and (folder / "evidence.json").is_file():
-        found += heavy_cases(_read(folder / "evidence.json"))
-    return sorted(found, key=lambda case: str(case["date"]))
-
-
-def _packaged() -> list[Record]:
-    source = files("ringbalance.reports").joinpath("data", PACKAGED)
-    return heavy_cases(json.loads(source.read_text(encoding="utf-8"))) if source.is_file() else []
-
-
-def _read(path: Path) -> Record:
-    try:
-        document = json.loads(path.read_bytes())
-        problem = _problem(document)
-    except (ValueError, RecursionError) as error:
-        problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-    if problem:
-        raise OSError(
-            f"{path} is not an evidence file: {problem}; its heavy results would be kept, so move it away or "
-            "choose another folder"
-        )
-    return dict(document)
+    packaged = files("ringbalance.reports").joinpath("data", PACKAGED)
+    cases = heavy_cases(json.loads(packaged.read_text(encoding="utf-8"))) if packaged.is_file() else []
+    path = None if folder is None else folder / "evidence.json"
+    if path is not None and path.is_file():
+        try:
+            document = json.loads(path.read_bytes())
+            problem = _problem(document)
+        except (ValueError, RecursionError) as error:
+            problem = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        if problem:
+            raise OSError(
+                f"{path} is not an evidence file: {problem}; its heavy results would be kept, so move it "
+                "away or choose another folder"
+            )
+        cases += heavy_cases(document)
+    return sorted(cases, key=lambda case: str(case["date"]))
 
 
 def _problem(document: Any) -> str:
-    """What a report could not work with in an evidence document; empty when there is nothing."""
+    """Reason why a report cannot work with an evidence document; empty: none."""
     # NaN and infinity, which no evidence holds, raise ValueError.
     json.dumps(document, allow_nan=False)
     if not isinstance(document, dict):
@@ -104,70 +96,61 @@ def _problem(document: Any) -> str:
         return '"times" is no object with a date'
     if not isinstance(cases, list) or not all(isinstance(case, dict) for case in cases):
         return '"verification" is no list of cases'
-    heavy = [(place, case) for place, case in enumerate(cases) if case.get("cost") == "heavy"]
-    problems = (_case_problem(case, f"verification[{place}]") for place, case in heavy)
+    heavy = [(i, case) for i, case in enumerate(cases) if case.get("cost") == "heavy"]
+    problems = (_case_problem(case, f"verification[{i}]") for i, case in heavy)
     return next(filter(None, problems), "")
 
 
-def _case_problem(case: Any, place: str) -> str:
-    """What a report could not work with in a case's record; empty when there is nothing."""
+def _case_problem(case: Any, name: str) -> str:
+    """Reason why a report cannot work with a case's record; empty: none."""
     if not isinstance(case, dict):
-        return f"{place} is no object"
+        return f"{name} is no object"
     for key, kind in _KINDS.items():
-        if not isinstance(case.get(key), kind):
-            return f'"{key}" of {place} is {_shown(case.get(key))}, not {_NAMES[kind]}'
+        if not isinstance(value := case.get(key), kind):
+            text = "missing" if value is None else toml_text(value)
+            return f'"{key}" of {name} is {text}, not {_NAMES[kind]}'
     return ""
-
-
-def _shown(value: Any) -> str:
-    return "missing" if value is None else toml_text(value)
 
 
 _PREFIX: Final = "cases-"
 
 
 def looks_at_no_scene(case: Mapping[str, Any]) -> bool:
-    """Whether a case's record is the same for every scene, and cheap enough to be run again unasked."""
+    """True if a case's record is the same for every scene, and the case is cheap enough to run unasked."""
     return bool(case["judged_on"] == "paper" and case["cost"] == "light")
 
 
 def kept_cases() -> dict[str, Record]:
-    """By its id, each light case that looks at no scene: its record and the date on which it was run."""
+    """Light cases that look at no scene, by id, each with its `record` and the `date` on which it was run."""
     path = _kept_file()
     if not trusted(path.parent):
         return {}
     try:
-        found: dict[str, Record] = json.loads(checked_content(path))
-        _check_kept(found)
+        entries: Any = json.loads(checked_content(path))
+        json.dumps(entries, allow_nan=False)
+        if not isinstance(entries, dict):
+            raise ValueError("it holds no object")
+        for name, entry in entries.items():
+            if not isinstance(entry, dict) or not isinstance(entry.get("date"), str):
+                raise ValueError(f'"{name}" has no date')
+            if problem := _case_problem(entry.get("record"), name):
+                raise ValueError(problem)
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, RecursionError):
         discard(path)
         return {}
-    return found
+    return dict(entries)
 
 
-def _check_kept(kept: object) -> None:
-    """Raises: ValueError: a report could not work with what was kept."""
-    json.dumps(kept, allow_nan=False)
-    if not isinstance(kept, dict):
-        raise ValueError("it holds no object")
-    for name, entry in kept.items():
-        if not isinstance(entry, dict) or not isinstance(entry.get("date"), str):
-            raise ValueError(f'"{name}" has no date')
-        problem = _case_problem(entry.get("record"), name)
-        if problem:
-            raise ValueError(problem)
-
-
-def keep_cases(kept: Mapping[str, Record]) -> None:
-    """Keep what `kept_cases` gives."""
+def keep_cases(entries: Mapping[str, Record]) -> None:
+    """Store entries for `kept_cases`."""
     path = _kept_file()
     if not trusted(path.parent):
         return
     # Without them the next report runs the cases again.
     with contextlib.suppress(OSError):
-        write_checked(path, json.dumps(kept, allow_nan=False).encode())
+        write_checked(path, json.dumps(entries, allow_nan=False).encode())
 
 
 def _kept_file() -> Path:
@@ -180,7 +163,7 @@ _PACKAGES: Final = (
 )
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _LOCK: Final = _ROOT / "requirements" / "lock.txt"
-_PATIENCE: Final = 10.0
+_GIT_TIMEOUT_S: Final = 10.0
 
 
 def provenance() -> Record:
@@ -188,27 +171,25 @@ def provenance() -> Record:
 
     Returns: Texts; empty where this copy of the program is no checkout. The machine's name is left out.
     """
+    # Folders of files say nothing to another machine.
+    program, *words = sys.argv
+    arguments = [Path(word).name if os.sep in word else word for word in words]
     return {
         "commit": _git("rev-parse", "HEAD"),
         "dirty": bool(_git("status", "--porcelain", "--untracked-files=no")),
         "lock_sha256": hashlib.sha256(_LOCK.read_bytes()).hexdigest() if _LOCK.is_file() else "",
-        "command": " ".join([Path(sys.argv[0]).name, *map(_bare, sys.argv[1:])]),
+        "command": " ".join([Path(program).name, *arguments]),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} logical processors",
     }
 
 
 def versions() -> Record:
     """Versions of this program, of Python and of the packages that numbers come from."""
-    found = {
+    return {
         "ringbalance": version_of("ringbalance") or "not installed",
         "python": platform.python_version(),
+        **{name: version for name in _PACKAGES if (version := version_of(name))},
     }
-    return found | {name: told for name in _PACKAGES if (told := version_of(name))}
-
-
-def _bare(argument: str) -> str:
-    """An argument without the folders of its file, which say nothing to another machine."""
-    return Path(argument).name if os.sep in argument else argument
 
 
 def _git(*arguments: str) -> str:
@@ -219,7 +200,7 @@ def _git(*arguments: str) -> str:
             ["git", "-C", str(_ROOT), *arguments],
             capture_output=True,
             text=True,
-            timeout=_PATIENCE,
+            timeout=_GIT_TIMEOUT_S,
             check=True,
         )
     except (OSError, subprocess.SubprocessError):

@@ -1,4 +1,4 @@
-"""What a section of the report is: a name, a title, a template, and what it collects and shows."""
+"""A section of the report: its name, title and template, what it collects and what it shows."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
-Place = Literal["report", "annex"]
+Document = Literal["report", "annex"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Work:
-    """What a section's evidence is collected from."""
+    """Scene and level of effort that the sections' evidence is collected for."""
 
     scene: AnyScene
     level: Level
@@ -32,7 +32,7 @@ class Work:
 
     @property
     def calibration(self) -> Calibration:
-        """Of a liquid ring, made once in a process."""
+        """Calibration of a liquid ring, made once in a process. Raises: SceneError: another balancer."""
         return calibration_of(self.ring)
 
 
@@ -61,22 +61,20 @@ class Section:
     name: str
     """Its id on the page, its key in the evidence, and the stem of its template."""
     title: str
-    """In the contents."""
-    place: Place = "annex"
-    """Which of the two documents it stands in."""
+    document: Document = "annex"
     of_paper: bool = False
-    """Whether it stands in the annex of every scene but the paper's own."""
+    """True if it stands in the annex of every scene but the paper's own."""
     collect: Callable[..., Record | None] = _nothing
     """From the work and the answers of `parts`: plain numbers and texts for the evidence, under the section's
-    name; None: nothing there."""
+    name; None: nothing to report."""
     parts: tuple[Job, ...] = ()
     """Jobs that take the work, and then what they need."""
     show: Callable[[Record, Record], Record | None] = _everything
-    """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
+    """From the section's evidence and the whole to the template's `view`: texts and drawings, or None."""
     always: bool = False
-    """Whether it is shown without evidence of its own, which is then empty."""
+    """True if it is shown without evidence of its own, which is then empty."""
     template: str = ""
-    """File in `templates`; by default that of its name."""
+    """File in `templates`; empty: the one of the section's name."""
 
     def jobs(self, work: Work) -> list[Job]:
         """Jobs that collect its evidence, the last under its own name; none where it collects nothing."""
@@ -92,8 +90,8 @@ class Section:
         return self.template or f"{self.name}.html"
 
     def view(self, evidence: Record) -> Record | None:
-        """What the template shows of the whole evidence; None: no such section."""
-        own = evidence.get(self.name)
-        if not own and not self.always and self.collect is not _nothing:
+        """Texts and figures for the template; None: the evidence has nothing for it."""
+        record = evidence.get(self.name)
+        if not record and not self.always and self.collect is not _nothing:
             return None
-        return self.show(own or {}, evidence)
+        return self.show(record or {}, evidence)

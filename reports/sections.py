@@ -26,16 +26,16 @@ from ringbalance.reports.pages import (
     tube_flow,
 )
 from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DOCUMENT
-from ringbalance.reports.section import Place, Record, Section
+from ringbalance.reports.section import Document, Record, Section
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
     CONDITIONS,
     operation.SECTION,
     loop.LOOP,
-    Section(name="claims", title="Claims of the liquid-ring paper", place="report", of_paper=True),
+    Section(name="claims", title="Claims of the liquid-ring paper", document="report", of_paper=True),
     CREDIBILITY,
-    Section(name="parameters", title="Parameters and their origin", place="report"),
+    Section(name="parameters", title="Parameters and their origin", document="report"),
     DOCUMENT,
     chamber.DISC,
     chamber.PRESSURE,
@@ -59,10 +59,10 @@ SECTIONS: Final[tuple[Section, ...]] = (
 _BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(
     {"liquid_ring": SECTIONS, eccentric.BALANCER: eccentric.SECTIONS}
 )
-"""Of those balancers that have pages of their own."""
+"""Sections by balancer, for those that have pages of their own."""
 CASES_VIEW: Final = "verification"
-"""Among the views of a report, that of all cases."""
-PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
+"""Key of the view of all cases among those of the sections."""
+PREFIXES: Final[Mapping[Document, str]] = MappingProxyType({"report": "", "annex": "A"})
 """Before the number of every section, figure, table and equation of a document."""
 
 
@@ -72,27 +72,27 @@ def sections_of(balancer: str) -> dict[str, Section]:
 
 
 def view_of(name: str, evidence: Record) -> Record | None:
-    """What a section shows of the whole evidence, or under `CASES_VIEW` what the page shows of each case."""
+    """Texts and figures of a section, or, under `CASES_VIEW`, of every case by its id."""
     if name == CASES_VIEW:
         return {case["id"]: cases.case_view(case) for case in evidence[CASES_VIEW]}
     return sections_of(evidence["balancer"])[name].view(evidence)
 
 
 def views_of(evidence: Record) -> dict[str, Record | None]:
-    """All that a report's pages show: of each section, None where it has nothing, and of the cases."""
+    """Views of all sections, None where one has nothing to show, and of the cases."""
     return {name: view_of(name, evidence) for name in (*sections_of(evidence["balancer"]), CASES_VIEW)}
 
 
 def numbered(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]:
     """The sections that have something to show, in order and numbered."""
-    counts, own = {"report": count(1), "annex": count(1)}, summary.is_papers(evidence)
+    counts, of_paper = {"report": count(1), "annex": count(1)}, summary.is_papers(evidence)
     return [
         {
             "name": name,
             "title": section.title,
             "template": section.file,
-            "place": (place := "annex" if section.of_paper and not own else section.place),
-            "number": f"{PREFIXES[place]}{next(counts[place])}",
+            "document": (document := "annex" if section.of_paper and not of_paper else section.document),
+            "number": f"{PREFIXES[document]}{next(counts[document])}",
             "view": view,
         }
         for name, section in sections_of(evidence["balancer"]).items()
@@ -107,4 +107,4 @@ def drawings_in(content: Any) -> list[Drawing]:
     if isinstance(content, dict):
         content = list(content.values())
     parts = content if isinstance(content, list | tuple) else ()
-    return [each for part in parts for each in drawings_in(part)]
+    return [drawing for part in parts for drawing in drawings_in(part)]

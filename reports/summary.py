@@ -1,4 +1,4 @@
-"""Verdicts in words: of devices that meet what is asked; claims and checks counted by theirs."""
+"""Claims and checks counted by their verdicts, and the colours of verdicts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TONES: Final = {
 
 
 def is_verdict(text: str) -> bool:
-    """Whether a cell of a table is a verdict, which has a colour of its own."""
+    """True if a table's cell is a verdict, which has a colour."""
     return text in _TONES
 
 
@@ -54,7 +54,7 @@ def verdict_counts(cases: list[Record], verdicts: tuple[str, ...]) -> list[Recor
 
 
 def common_causes(cases: list[Record]) -> list[Record]:
-    """What several claims that do not simply hold have in common; the most frequent cause first."""
+    """Causes that several claims share, with the claims' numbers; the most frequent cause first."""
     groups: dict[str, list[int]] = {}
     for case in cases:
         if case.get("cause"):
@@ -64,14 +64,14 @@ def common_causes(cases: list[Record]) -> list[Record]:
 
 
 def tallies(evidence: Record) -> Record:
-    """How many claims and checks have each verdict."""
-    judged, own = claims(evidence), checks(evidence)
-    measured = [case for case in own if case["kind"] == "validation"]
-    run = [case for case in own if case not in measured and case["verdict"] != "not run"]
+    """Numbers of claims, of checks and of comparisons with measurements by verdict."""
+    judged, checked = claims(evidence), checks(evidence)
+    measured = [case for case in checked if case["kind"] == "validation"]
+    run = [case for case in checked if case not in measured and case["verdict"] != "not run"]
     return {
         "claims": verdict_counts(judged, CLAIM_VERDICTS),
         "claims_elsewhere": sum(elsewhere(case, evidence) for case in judged),
-        "checks": verdict_counts(own, CHECK_VERDICTS),
+        "checks": verdict_counts(checked, CHECK_VERDICTS),
         "checks_run": len(run),
         "checks_passed": sum(case["verdict"] == "passed" for case in run),
         "measured": len(measured),
@@ -80,15 +80,12 @@ def tallies(evidence: Record) -> Record:
 
 
 def elsewhere(case: Record, evidence: Record) -> bool:
-    """Whether a case was judged on another disc than the report's, such as the paper's own.
-
-    Returns: True when its numbers are not those of the report's scene.
-    """
+    """True if a case was judged on another scene than the report's, such as the paper's own disc."""
     judged = case.get("scene_sha256")
     return bool(judged) and judged != evidence["scene"]["values_sha256"]
 
 
 def is_papers(evidence: Record) -> bool:
-    """Whether the scene is the one that its paper's claims are judged on."""
+    """True if the scene is the one that its paper's claims are judged on."""
     cases = claims(evidence)
     return bool(cases) and not any(elsewhere(case, evidence) for case in cases)

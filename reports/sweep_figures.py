@@ -13,17 +13,16 @@ from matplotlib.colors import ListedColormap
 
 from ringbalance.design.axes import unit_of_path
 from ringbalance.design.sweep import Sweep
-from ringbalance.reports.figure import FIFTH, FOUND, INK, MAP, MUTED, Axis, Drawing, draw
+from ringbalance.reports.figure import FIFTH, FOUND, INK, MAP, MUTED, AxisLabel, Drawing, draw
 from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.platform.files import write_whole
 
-_SHOWN: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor")
+_COLUMNS: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor")
 """Columns that are drawn, where there are numbers."""
-_LONGEST_NOTE: Final = 50
-"""Characters beside a legend."""
+_MAX_NOTE_CHARACTERS: Final = 50
 _OUTSIDE: Final = {"marker": "x", "linewidths": 1.0}
-_OF_POINTS: Final = MAP[3:]
+_POINT_SHADES: Final = MAP[3:]
 """Shades that stand out from the page."""
 _BEST: Final = {"marker": "*", "facecolors": "none", "edgecolors": INK}
 _Shades = list[tuple[str, BoolArray]]
@@ -32,15 +31,15 @@ _Shades = list[tuple[str, BoolArray]]
 
 @dataclass(frozen=True, kw_only=True)
 class _View:
-    """What of a sweep a figure shows."""
+    """Part of a sweep that its figures show."""
 
     sweep: Sweep
     paths: tuple[str, ...]
     """Keys of one or two axes."""
     shown: BoolArray
-    """By point: of a grid of more axes those with the others as in one row."""
+    """Mask of the points; in a grid of more axes the others have the values of one row."""
     note: str
-    """The values of these; empty where all points are shown."""
+    """Values of the other axes; empty: all points are shown."""
 
 
 def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
@@ -60,41 +59,41 @@ def sweep_drawings(sweep: Sweep) -> list[Drawing]:
         return []
     return [
         _drawing(view, name, *fields[name])
-        for name in _SHOWN
+        for name in _COLUMNS
         if name in fields and any(value is not None for value in np.array(fields[name][1])[view.shown])
     ]
 
 
 def _view(sweep: Sweep) -> _View | None:
-    """None where no axis has numbers."""
-    numbers = [axis for axis in sweep.plan.axes if not axis.names and _numbers(sweep, axis.head)]
-    everything = np.ones(len(sweep.points), dtype=np.bool_)
+    """Axes and points to draw; None where no axis has numbers."""
+    numbers = [
+        axis
+        for axis in sweep.plan.axes
+        if not axis.names and all(isinstance(point.get(axis.head), int | float) for point in sweep.points)
+    ]
+    shown = np.ones(len(sweep.points), dtype=np.bool_)
     if not numbers:
         return None
     if sweep.plan.sample:
         paths = tuple(axis.head for axis in numbers[:2])
-        return _View(sweep=sweep, paths=paths, shown=everything, note="")
+        return _View(sweep=sweep, paths=paths, shown=shown, note="")
     most = sorted(numbers, key=lambda axis: -len(axis.grid()))[:2]
-    drawn = [axis for axis in sweep.plan.axes if axis in most]
+    axes = [axis for axis in sweep.plan.axes if axis in most]
     row = sweep.best_or_nearest or 0
     others = [axis for axis in sweep.plan.axes if axis not in most and len(axis.grid()) > 1]
     for axis in others:
         values = [sweep.points[row].get(path) for path in axis.paths]
-        everything &= [[point.get(path) for path in axis.paths] == values for point in sweep.points]
+        shown &= [[point.get(path) for path in axis.paths] == values for point in sweep.points]
     held = ", ".join(sweep.axis_text(axis, row) for axis in others)
-    note = f"{held if len(held) <= _LONGEST_NOTE else 'other keys'} as in row {row}" if others else ""
-    return _View(sweep=sweep, paths=tuple(axis.head for axis in drawn), shown=everything, note=note)
-
-
-def _numbers(sweep: Sweep, path: str) -> bool:
-    return all(isinstance(point.get(path), int | float) for point in sweep.points)
+    note = f"{held if len(held) <= _MAX_NOTE_CHARACTERS else 'other keys'} as in row {row}" if others else ""
+    return _View(sweep=sweep, paths=tuple(axis.head for axis in axes), shown=shown, note=note)
 
 
 def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
     sweep, paths = view.sweep, view.paths
     keys = [np.array([point[path] for point in sweep.points], dtype=np.float64)[view.shown] for path in paths]
     shown = np.array([np.nan if value is None else value for value in values], dtype=np.float64)[view.shown]
-    axes: list[Axis] = [(path, unit_of_path(sweep.scene, path)) for path in paths]
+    axes: list[AxisLabel] = [(path, unit_of_path(sweep.scene, path)) for path in paths]
     title = name.replace("_", " ")
     feasible = np.array(sweep.feasible)[view.shown]
     best = np.flatnonzero(view.shown) == sweep.best_or_nearest
@@ -112,10 +111,10 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
             _noted(panel, view.note)
         else:
             inside, outside = _coloured(panel, view, keys, shown, feasible, title, unit)
-        for place, (shade, mask) in enumerate(inside):
-            points(panel, mask, s=14, color=shade, label="" if place else "feasible")
-        for place, (shade, mask) in enumerate(outside):
-            points(panel, mask, s=14, color=shade, label="" if place else "not feasible", **_OUTSIDE)
+        for index, (shade, mask) in enumerate(inside):
+            points(panel, mask, s=14, color=shade, label="" if index else "feasible")
+        for index, (shade, mask) in enumerate(outside):
+            points(panel, mask, s=14, color=shade, label="" if index else "not feasible", **_OUTSIDE)
         points(panel, best, s=90, label="nearest" if sweep.best is None else "best", **_BEST)
 
     y = axes[1] if len(axes) > 1 else (title, unit)
@@ -123,7 +122,7 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
 
 
 def _noted(panel: Axes, *parts: str) -> None:
-    """A line above the frame, on the right, beside the legend."""
+    """Write a line above the frame, on the right of the legend."""
     panel.text(1, 1.02, "; ".join(filter(None, parts)), ha="right", transform=panel.transAxes)
 
 
@@ -132,10 +131,10 @@ def _coloured(
 ) -> tuple[_Shades, _Shades]:
     """Shades over a grid of two keys, with the boundary of what is feasible; else those of points.
 
-    Returns: Of the feasible points and of the others that are still to be drawn.
+    Returns: Colours of the feasible points and of the others that are still to be drawn.
     """
-    known = shown[np.isfinite(shown)]
-    low, high = float(known.min()), float(known.max())
+    finite = shown[np.isfinite(shown)]
+    low, high = float(finite.min()), float(finite.max())
     ends = f"{title}: {given(low, unit, digits=3)} (light) to {given(high, unit, digits=3)} (dark)"
     _noted(panel, view.note, ends)
     sizes = [len(np.unique(each)) for each in keys]
@@ -151,9 +150,9 @@ def _coloured(
 
 
 def _shades(shown: FloatArray, low: float, high: float, among: BoolArray) -> _Shades:
-    """Shades that points have, the darkest first, each with its points: one colour is written at a time."""
+    """Shades of points, the darkest first, each with a mask of its points."""
     share = np.nan_to_num((shown - low) / ((high - low) or 1.0))
-    place = np.minimum(share * len(_OF_POINTS), len(_OF_POINTS) - 1).astype(int)
-    known = among & np.isfinite(shown)
-    masks = [(shade, known & (place == number)) for number, shade in enumerate(_OF_POINTS)]
+    index = np.minimum(share * len(_POINT_SHADES), len(_POINT_SHADES) - 1).astype(int)
+    finite = among & np.isfinite(shown)
+    masks = [(shade, finite & (index == number)) for number, shade in enumerate(_POINT_SHADES)]
     return [(shade, mask) for shade, mask in reversed(masks) if mask.any()]

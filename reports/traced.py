@@ -1,6 +1,6 @@
 """The evidence as templates see it, and the one filter that formats, typesets and traces what they print.
 
-A number taken out of the evidence knows its place there, so a template that prints it need not repeat it.
+A number taken out of the evidence knows its path there, so that a template need not repeat it.
 """
 
 from __future__ import annotations
@@ -45,26 +45,15 @@ _SYMBOL: Final = re.compile(r"(?<![\w.])([A-Za-zα-ωΑ-Ω])_([A-Za-zΩ]{1,3})(?
 
 
 def marked(text: str, value: object) -> str:
-    """A value's text in an element that names the value's dotted place in the evidence, where it has one."""
+    """A value's text in an element that names the value's dotted path in the evidence, where it has one."""
     path = getattr(value, "path", "")
     return Markup('<span data-from="{}">{}</span>').format(path, text) if path else text
 
 
-def _marked_up(value: object) -> object:
-    """Text as it goes onto the page: typeset, symbols such as K_B with their index below the line.
-
-    Markup, and what is marked `verbatim`, is left as it is.
-    """
-    if not isinstance(value, str) or isinstance(value, Markup):
-        return value
-    text = typeset(value)
-    return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _SYMBOL.search(text) else text
-
-
 def evidence_at(evidence: Any, path: str) -> Any:
-    """What the evidence holds at a dotted place; in a list by position, or by the `id` or `key` of an item.
+    """Value of the evidence at a dotted path; in a list by position, or by the `id` or `key` of an item.
 
-    Raises: KeyError, IndexError: nothing is there.
+    Raises: KeyError, IndexError: no such value.
     """
     for key in path.split("."):
         if not isinstance(evidence, list):
@@ -78,8 +67,8 @@ def evidence_at(evidence: Any, path: str) -> Any:
 
 def budgets_of(evidence: Mapping[str, Any]) -> dict[str, Any]:
     """Quantities of the calibration that have an uncertainty budget, by key; empty without a calibration."""
-    found = (evidence.get("calibration") or {}).get("quantities") or ()
-    return {each["key"]: each for each in found if each["parts"]}
+    quantities = (evidence.get("calibration") or {}).get("quantities") or ()
+    return {each["key"]: each for each in quantities if each["parts"]}
 
 
 def inputs_of(quantity: Mapping[str, Any]) -> dict[str, float]:
@@ -93,12 +82,12 @@ def total_of(quantity: Mapping[str, Any]) -> float:
 
 
 def states_uncertainty(evidence: Any) -> bool:
-    """Whether the scene file says of any input how uncertain it is."""
+    """True if the scene file states the uncertainty of any input."""
     return bool(evidence.get("scene", {}).get("states_uncertainty"))
 
 
 class Number(float):
-    """A number of the evidence with its dotted place there."""
+    """A number of the evidence with its dotted path."""
 
     __slots__ = ("path",)
     path: str
@@ -110,7 +99,7 @@ class Number(float):
 
 
 class Count(int):
-    """A whole number of the evidence with its dotted place there."""
+    """A whole number of the evidence with its dotted path."""
 
     path: str
 
@@ -132,7 +121,7 @@ class _Items(Sequence[Any]):
     def __getitem__(self, index: slice) -> list[Any]: ...
     def __getitem__(self, index: int | slice) -> Any:
         if isinstance(index, slice):
-            return [self[place] for place in range(*index.indices(len(self)))]
+            return [self[i] for i in range(*index.indices(len(self)))]
         value = self._values[index]
         key = value.get("key", "") if isinstance(value, Mapping) else ""
         return placed(value, f"{self._path}.{key if key.isidentifier() else index}")
@@ -149,7 +138,7 @@ class Part(Mapping[str, Any]):
 
     def __getitem__(self, key: str) -> Any:
         if "." in key:
-            # A quantile's name, which no dotted place can hold.
+            # A quantile's name, which no dotted path can hold.
             return self._record[key]
         return placed(self._record[key], f"{self._path}.{key}" if self._path else key)
 
@@ -161,7 +150,7 @@ class Part(Mapping[str, Any]):
 
 
 def placed(value: Any, path: str = "") -> Any:
-    """A value of the evidence that knows its dotted place, with all that is in it; texts as they are."""
+    """A value of the evidence that knows its dotted path, with all that is in it; texts as they are."""
     if isinstance(value, Mapping):
         return Part(value, path)
     if isinstance(value, list | tuple):
@@ -172,7 +161,7 @@ def placed(value: Any, path: str = "") -> Any:
 
 
 def unit_of(path: str) -> str:
-    """The SI unit that the ending of a key says; "1" where it says none."""
+    """SI unit by the ending of a key; "1" without such an ending."""
     key = next((part for part in reversed(path.split(".")) if not part.lstrip("-").isdigit()), "")
     return next((unit for ending, unit in UNITS.items() if key.endswith(f"_{ending}")), "1")
 
@@ -185,7 +174,7 @@ def printed(
     unit: str | None = None,
     form: Form = "measured",
 ) -> str:
-    """A number as a reader meets it, traced to its place in the evidence.
+    """A number as the page shows it, traced to its path in the evidence.
 
     Args: `width`: half-width (95 %) in SI, which decides the digits. `digits`: significant ones, without a
         width; decimals of "fixed". `unit`: SI; by default what the evidence's key says. `form`: "given" for
@@ -194,36 +183,34 @@ def printed(
     """
     if value is None:
         return numbers.MISSING
-    unit = unit_of(getattr(value, "path", "")) if unit is None else unit
-    return marked(_text(float(value), width, digits, unit, form), value)
-
-
-def _text(value: float, width: float | None, digits: int | None, unit: str, form: Form) -> str:
-    if form == "given":
-        return numbers.given(value, unit, digits=digits or 6)
-    if form == "fixed":
-        return numbers.fixed(value, digits or 0)
-    if form != "measured":
-        return numbers.percent(value, digits=digits or 2, signed=form == "change")
-    return numbers.shown(value, unit, None if width is None else float(width), digits=digits or 4)
+    number, unit = float(value), unit_of(getattr(value, "path", "")) if unit is None else unit
+    if form == "measured":
+        text = numbers.shown(number, unit, None if width is None else float(width), digits=digits or 4)
+    elif form == "given":
+        text = numbers.given(number, unit, digits=digits or 6)
+    elif form == "fixed":
+        text = numbers.fixed(number, digits or 0)
+    else:
+        text = numbers.percent(number, digits=digits or 2, signed=form == "change")
+    return marked(text, value)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class _NumberColumn:
     """Numbers in one unit and to one decimal place, that of the last digit of the largest."""
 
     symbol: str
     texts: list[str]
 
 
-def column(values: _Items, digits: int = 6) -> Column:
+def column(values: _Items, digits: int = 6) -> _NumberColumn:
     """A column of the evidence in the unit that suits its largest value, which has so many digits."""
     numbers_of = list(values)
     display = numbers.display_unit(unit_of(numbers_of[0].path), *numbers_of)
     largest = max(abs(value) for value in numbers_of) * display.factor
     decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest else 0
     texts = [marked(numbers.fixed(value * display.factor, decimals), value) for value in numbers_of]
-    return Column(symbol=display.symbol, texts=texts)
+    return _NumberColumn(symbol=display.symbol, texts=texts)
 
 
 def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3) -> str:
@@ -241,17 +228,18 @@ def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3)
 
 
 def table_of(texts: Sequence[str], caption: str = "", style: str = "narrow") -> Table:
-    """A table of which each text is a row: a line `Head :: cell` for each column.
+    """A table of which each text is a row: a line `Head :: cell` for each column; both stay markup.
 
-    Columns that say nothing in any row are left out.
+    Columns that are empty in every row are left out.
     """
-    rows = [_cells(text) for text in texts]
+    lines = [[line.partition("::") for line in text.splitlines() if "::" in line] for text in texts]
+    rows = [[(head.strip(), cell.strip()) for head, _, cell in row] for row in lines]
     heads = [head for head, _ in rows[0]] if rows else []
-    kept = [place for place in range(len(heads)) if any(row[place][1] for row in rows)]
+    columns = [i for i in range(len(heads)) if any(row[i][1] for row in rows)]
     return Table(
         caption=caption,
-        heads=[heads[place] for place in kept],
-        rows=[[row[place][1] for place in kept] for row in rows],
+        heads=[heads[i] for i in columns],
+        rows=[[row[i][1] for i in columns] for row in rows],
         style=style,
     )
 
@@ -259,37 +247,36 @@ def table_of(texts: Sequence[str], caption: str = "", style: str = "narrow") -> 
 def listing_of(text: str, heads: Sequence[str], caption: str = "", style: str = "narrow") -> Table:
     """A table of the lines `Label :: cell :: cell` of a text; an empty one is left out."""
     rows = [[cell.strip() for cell in line.split("::")] for line in text.splitlines() if "::" in line]
-    said = [row for row in rows if any(cell not in {"", numbers.MISSING} for cell in row[1:])]
-    return Table(caption=caption, heads=[Markup(head) for head in heads], rows=said, style=style)
+    filled = [row for row in rows if any(cell not in {"", numbers.MISSING} for cell in row[1:])]
+    return Table(caption=caption, heads=[Markup(head) for head in heads], rows=filled, style=style)
 
 
 def _part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str:
-    """A part of an uncertainty to the place of the second digit of the total, in the value's unit.
-
-    One that is smaller than that is so named.
-    """
+    """Part of an uncertainty to the second digit of the total, in the value's unit; smaller: "< ..."."""
     if total is None:
         return numbers.MISSING
     factor = numbers.display_unit(budget["unit"], budget["value"], total).factor
-    place = math.floor(math.log10(total * factor)) - 1
-    decimals = max(-place, 0)
-    if round(part * factor, -place) == 0:
-        return f"< {numbers.fixed(10.0**place, decimals)}"
-    text = numbers.fixed(round(part * factor, -place), decimals)
-    return marked(text, part)
-
-
-def _cells(text: str) -> list[tuple[str, str]]:
-    """Heads and cells of a row's lines; both stay markup."""
-    lines = [line.partition("::") for line in text.splitlines() if "::" in line]
-    return [(head.strip(), cell.strip()) for head, _, cell in lines]
+    exponent = math.floor(math.log10(total * factor)) - 1
+    decimals = max(-exponent, 0)
+    if round(part * factor, -exponent) == 0:
+        return f"< {numbers.fixed(10.0**exponent, decimals)}"
+    return marked(numbers.fixed(round(part * factor, -exponent), decimals), part)
 
 
 def finished(value: object) -> object:
-    """What a template prints: text typeset, counts traced; other numbers must have passed the filter."""
+    """Text as it goes onto the page: typeset, an index such as that of K_B below the line; counts traced.
+
+    Markup, and text that is marked `verbatim`, is left as it is.
+    Raises: TypeError: a float, which must pass through a filter.
+    """
     if isinstance(value, float):
         raise TypeError(f"{getattr(value, 'path', value)} is printed without a filter")
-    return marked(str(value), value) if isinstance(value, Count) else _marked_up(value)
+    if isinstance(value, Count):
+        return marked(str(value), value)
+    if not isinstance(value, str) or isinstance(value, Markup):
+        return value
+    text = typeset(value)
+    return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _SYMBOL.search(text) else text
 
 
 _FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")

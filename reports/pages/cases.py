@@ -1,5 +1,5 @@
-"""Verification on the page, every number already text and nothing judged again: a case; and the studies of a
-scene: where answers end and what is said beyond, and speed against accuracy.
+"""Cases of verification on the page, numbers as texts, and two studies of a scene: limits of validity, and
+speed against accuracy.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ringbalance.reports.figure import (
     AS_PAPER,
@@ -39,30 +40,29 @@ from ringbalance.results.numbers import (
     with_unit,
 )
 from ringbalance.results.result import Table
-from ringbalance.scene.models import Scene
 from ringbalance.verification.extremes.study import axis_rows
-from ringbalance.verification.trade import TradeStudy, error_text, models_table, trade_study
+from ringbalance.verification.trade import error_text, models_table, trade_study
 
-Quantity = Mapping[str, Any]
-"""A judged quantity of a case, whose numbers know their place in the evidence."""
-_NOTHING: Final = 1e-3
+JudgedQuantity = Mapping[str, Any]
+"""A judged quantity of a case, whose numbers know their path in the evidence."""
+_ZERO_FRACTION: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
-_TOLD: Final = (
+_BOX_KEYS: Final = (
     *("explanation", "judgement", "protects", "assumes", "does_not_cover", "rests_on", "reference"),
     *("declared_mutations", "doubts", "level", "status", "judged_on", "scene_sha256"),
 )
-"""Keys of a case's record that its box on the page tells."""
+"""Keys of a case's record that its box on the page shows."""
 _NO_SEQUENCE: Final = dict.fromkeys(
     ("unit", "unknowns", "value", "error", "formal_order", "observed_order", "gci", "note")
 )
-_LOPSIDED: Final = 1.2
+_LOPSIDED_RATIO: Final = 1.2
 """Ratio of the two sides of an interval from which on both ends are shown."""
-_FINE: Final = 0.01
-"""Half-width over error below which two digits of the error say enough."""
-_NAMED_INPUTS: Final = 2
-_DIGITS: Final = 4
-"""Most that a number in brief has: the inputs leave no more standing, however fine a comparison is."""
-_LONGEST_LABEL: Final = 28
+_FINE_RATIO: Final = 0.01
+"""Half-width over error below which two digits of the error suffice."""
+_MAX_NAMED_INPUTS: Final = 2
+_MAX_DIGITS: Final = 4
+"""Digits of a number in brief: the uncertainty of the inputs allows no more, however fine a comparison is."""
+_MAX_LABEL_CHARACTERS: Final = 28
 _CURVES: Final[dict[str, Record]] = {
     "paper": AS_PAPER,
     "found": {"color": FOUND},
@@ -76,13 +76,13 @@ _SPARE: Final = (*(line(index) for index in (2, 3, 5)), {"color": INK})
 
 TABLES: Final = "tables"
 """Folder of the tables that are files."""
-LONG: Final = 14
+MAX_PAGE_ROWS: Final = 14
 """Rows above which a case's table is a file instead of a part of the page."""
 
 
 def is_long(table: Record) -> bool:
-    """Whether a case's table is a file of its own."""
-    return any(len(values) > LONG for values in table["columns"].values())
+    """True if a case's table is a file instead of a part of the page."""
+    return any(len(values) > MAX_PAGE_ROWS for values in table["columns"].values())
 
 
 def table_file(case: Record, table: Record) -> str:
@@ -92,12 +92,12 @@ def table_file(case: Record, table: Record) -> str:
 
 
 def anchor(case: Record) -> str:
-    """Place of a case on the page."""
+    """Id of a case's element on the page."""
     return f"case-{str(case['id']).replace('_', '-')}"
 
 
-def _found(quantity: Quantity) -> str:
-    """What was found, with its uncertainty or, where lopsided, its range; a count without decimals."""
+def _found(quantity: JudgedQuantity) -> str:
+    """Value of the program with its uncertainty or, where lopsided, its range; a count without decimals."""
     unit, value, ends = quantity.get("unit") or "1", quantity.get("value"), _range(quantity)
     if ends:
         return printed(value, digits=2, unit=unit, form="given") + f" ({ends})"
@@ -105,51 +105,35 @@ def _found(quantity: Quantity) -> str:
     return printed(value, quantity.get("uncertainty") if width is None else width, **_form(quantity))
 
 
-def _form(quantity: Quantity) -> Record:
-    """How a quantity's value is written."""
+def _form(quantity: JudgedQuantity) -> Record:
+    """Unit, form and digits of a quantity's value."""
     value, count = quantity.get("value"), quantity.get("basis") == "count"
     if value is None or not count:
         return {"unit": quantity.get("unit") or "1"}
     return {"unit": "1", "form": "given", "digits": 6 if float(value).is_integer() else 3}
 
 
-def _error(quantity: Quantity) -> str:
-    """To the second digit of its half-width, or to two digits of its own where those are fewer."""
+def _error(quantity: JudgedQuantity) -> str:
+    """Error to the second digit of its half-width, or to two digits of its own where those are fewer."""
     error, width = quantity.get("error"), quantity.get("uncertainty")
-    fine = error and width and (width < _FINE * abs(error) or _range(quantity))
+    fine = error and width and (width < _FINE_RATIO * abs(error) or _range(quantity))
     return printed(error, None if fine else width, digits=2, unit=quantity.get("unit") or "1")
 
 
-def _data_table(table: Record) -> Table:
-    """One data table of a case, each column in one unit."""
-    heads, columns = [], []
-    for name, values in table["columns"].items():
-        unit = table["units"].get(name, "1")
-        display = display_unit(unit, *(value for value in values if not isinstance(value, str)))
-        heads.append(f"{name} in {display.symbol}" if display.symbol else name)
-        columns.append(
-            [
-                v if isinstance(v, str) else short(None if v is None else v * display.factor, digits=5)
-                for v in values
-            ]
-        )
-    return Table(caption=table["name"], heads=tuple(heads), rows=list(zip(*columns, strict=True)))
-
-
-def deciding(quantities: Sequence[Quantity], verdict: str) -> Quantity | None:
+def deciding(quantities: Sequence[JudgedQuantity], verdict: str) -> JudgedQuantity | None:
     """The judged quantity that a case's verdict rests on: the first that has the case's own verdict."""
-    own = [quantity for quantity in quantities if quantity.get("verdict") == verdict]
-    return next(iter([*own, *quantities]), None)
+    deciding = [quantity for quantity in quantities if quantity.get("verdict") == verdict]
+    return next(iter([*deciding, *quantities]), None)
 
 
-def _in_brief(quantity: Quantity) -> str:
-    """A found number with the digits that the comparison leaves standing, at least two."""
+def _in_brief(quantity: JudgedQuantity) -> str:
+    """Value of the program with the digits that the comparison supports, at least two."""
     value, unit = quantity.get("value"), quantity.get("unit") or "1"
     width = max(quantity.get("value_uncertainty") or 0.0, quantity.get("uncertainty") or 0.0)
     if value and width > abs(value) / 2:
         return printed(value, unit=unit, digits=2, form="given")
     if value and 0 < width < _last_digit(value) / 2:
-        return printed(value, unit=unit, digits=_DIGITS)
+        return printed(value, unit=unit, digits=_MAX_DIGITS)
     if not value or not width or quantity.get("basis") == "count":
         return printed(value, **_form(quantity))
     display = display_unit(unit, value, width)
@@ -159,12 +143,11 @@ def _in_brief(quantity: Quantity) -> str:
     return marked(with_unit(text, display.symbol), value)
 
 
-def _width(quantity: Quantity) -> str:
-    """Half-width of the comparison; a range where assumed inputs move the number further one way than the
-    other."""
+def _width(quantity: JudgedQuantity) -> str:
+    """Half-width of the comparison; a range where assumed inputs make it lopsided."""
     value, half_width = quantity.get("value"), quantity.get("uncertainty")
-    if value and half_width and half_width < (place := _last_digit(value)) / 2:
-        return f"<{THIN_SPACE}{given(place, quantity.get('unit') or '1', digits=1)}"
+    if value and half_width and half_width < (digit := _last_digit(value)) / 2:
+        return f"<{THIN_SPACE}{given(digit, quantity.get('unit') or '1', digits=1)}"
     if ends := _range(quantity):
         return ends
     if not half_width:
@@ -173,95 +156,81 @@ def _width(quantity: Quantity) -> str:
     return marked(with_unit(number(half_width * display.factor, digits=2), display.symbol), half_width)
 
 
-def _range(quantity: Quantity) -> str:
+def _range(quantity: JudgedQuantity) -> str:
     """Both ends of a number's interval in its unit; empty where it is about as wide on both sides."""
     value, low, high = (quantity.get(key) for key in ("value", "value_low", "value_high"))
     if value is None or low is None or high is None:
         return ""
     sides = sorted((value - low, high - value))
-    if sides[1] <= _LOPSIDED * sides[0] or sides[1] <= 0.1 * abs(value):
+    if sides[1] <= _LOPSIDED_RATIO * sides[0] or sides[1] <= 0.1 * abs(value):
         return ""
     display = display_unit(quantity.get("unit") or "1", value or max(map(abs, (low, high))))
     # What is left of a numerical uncertainty about zero is zero.
-    least = _NOTHING * (high - low)
+    least = _ZERO_FRACTION * (high - low)
     ends = (end * display.factor if abs(end) > least else 0.0 for end in (low, high))
     return with_unit(" to ".join(number(end, digits=2) for end in ends), display.symbol)
 
 
 def _last_digit(value: float) -> float:
     """One unit of the last of the digits that a number in brief has."""
-    return float(10.0 ** (math.floor(math.log10(abs(value))) - _DIGITS + 1))
-
-
-def _order_plot(case: Record, sequences: list[Record]) -> Drawing | None:
-    """Error against mesh size, a line per sequence, dotted the formal order as a slope to compare.
-
-    Returns: The figure; None when no sequence has errors.
-    """
-    if not sequences:
-        return None
-    paints: list[Paint] = []
-    for index, sequence in enumerate(sequences):
-        size, error, look = np.asarray(sequence["h"]), np.asarray(sequence["error"]), line(index, size=4)
-        paints.append(curve(size, error, sequence["label"], **look))
-        if order := sequence["formal_order"]:
-            slope = 0.6 * error[-1] * (size / size[-1]) ** order
-            paints.append(curve(size, slope, color=look["color"], linewidth=0.8, linestyle=":"))
-    return draw(
-        f"order-{case['id'].replace('_', '-')}",
-        *paints,
-        logarithmic("x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]})),
-        logarithmic("y"),
-        x=("relative mesh or step size", "1"),
-        y=("error", "1"),
-        columns=1,
-        height=2.7 + 0.175 * len(sequences),
-    )
+    return float(10.0 ** (math.floor(math.log10(abs(value))) - _MAX_DIGITS + 1))
 
 
 def _series_plot(name: str, series: Record) -> Drawing:
     x, curves, title = series["x"], series["y"], typeset(series["name"])
-    values = _with_gaps(x["values"])
     spare, used, paints = count(), list[Record](), list[Paint]()
+
+    def with_gaps(values: list[float | None]) -> Any:
+        return np.array([np.nan if value is None else value for value in values])
+
     for each in curves:
         look = _CURVES[each.get("style") or "found"]
         look = _SPARE[next(spare) % len(_SPARE)] if look in used else look
         used.append(look)
-        width = each.get("uncertainty")
-        band = None if not width else _with_gaps(width)
-        paints.append(curve(values, _with_gaps(each["values"]), typeset(each["name"]), band=band, **look))
-    if series.get("log"):
+        width, values = each.get("uncertainty"), with_gaps(each["values"])
+        band = with_gaps(width) if width else None
+        paints.append(curve(with_gaps(x["values"]), values, typeset(each["name"]), band=band, **look))
+
+    def log_axes(axes: Axes) -> None:
         # Decades alone would be too few labels within one or two of them.
-        paints += [lambda axes: logarithmic("x", within=_few(axes.get_xlim()))(axes)]
-        paints += [lambda axes: logarithmic("y", within=_few(axes.get_ylim()))(axes)]
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        logarithmic("x", within=(left, right) if 0 < left < right < 50 * left else None)(axes)
+        logarithmic("y", within=(low, high) if 0 < low < high < 50 * low else None)(axes)
+
+    paints += [log_axes] if series.get("log") else []
     return draw(
         name,
         *paints,
         x=(typeset(x["name"]), x["unit"].replace("*", " ")),
-        y=(opening(title) if len(title) < _LONGEST_LABEL else "", curves[0]["unit"]),
+        y=(opening(title) if len(title) < _MAX_LABEL_CHARACTERS else "", curves[0]["unit"]),
     )
-
-
-def _with_gaps(values: list[float | None]) -> Any:
-    """None leaves a gap in a line."""
-    return np.array([np.nan if value is None else value for value in values])
-
-
-def _few(limits: tuple[float, float]) -> tuple[float, float] | None:
-    return limits if 0 < limits[0] < limits[1] < 50 * limits[0] else None
 
 
 def case_view(case: Record) -> Record:
     """Everything that the page shows of one case."""
-    tables, stem = case.get("tables") or [], case["id"].replace("_", "-")
+    stem = case["id"].replace("_", "-")
     sequences = []
     for each in case.get("convergence") or []:
         geometry = f", {each['geometry']} geometry" if each.get("geometry") else ""
         sequences.append({**_NO_SEQUENCE, **each, "label": f"{each['quantity']}{geometry}"})
     falling = [s for s in sequences if s["error"] and all(e is not None and e > 0 for e in s["error"])]
     inputs = [f"{input_name(each['path'])} ({each['origin']})" for each in case.get("rests_on") or []]
-    if len(inputs) > _NAMED_INPUTS + 1:
-        inputs[_NAMED_INPUTS:] = [f"{len(inputs) - _NAMED_INPUTS} more"]
+    if len(inputs) > _MAX_NAMED_INPUTS + 1:
+        inputs[_MAX_NAMED_INPUTS:] = [f"{len(inputs) - _MAX_NAMED_INPUTS} more"]
+    tables: list[Table] = []
+    files: list[tuple[str, str]] = []
+    for table in case.get("tables") or []:
+        if is_long(table):
+            files.append((table["name"], f"{TABLES}/{table_file(case, table)}"))
+            continue
+        heads, columns = [], []
+        for name, values in table["columns"].items():
+            unit = table["units"].get(name, "1")
+            display = display_unit(unit, *(value for value in values if not isinstance(value, str)))
+            heads.append(f"{name} in {display.symbol}" if display.symbol else name)
+            scaled = [v if v is None or isinstance(v, str) else v * display.factor for v in values]
+            columns.append([v if isinstance(v, str) else short(v, digits=5) for v in scaled])
+        tables.append(Table(caption=table["name"], heads=tuple(heads), rows=list(zip(*columns, strict=True))))
     return {
         "id": case["id"],
         "anchor": anchor(case),
@@ -273,13 +242,13 @@ def case_view(case: Record) -> Record:
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
         "rests_on": inputs,
-        "told": {key: case.get(key) for key in _TOLD},
+        "told": {key: case.get(key) for key in _BOX_KEYS},
         "mutations": {each["id"]: each for each in case.get("mutations") or []},
         "equations": [
             {"svg": equation_svg(latex, f"Equation in LaTeX: {latex}", f"{anchor(case)}-{n}"), "source": ""}
             for n, latex in enumerate(case.get("equations") or [])
         ],
-        "order_plot": _order_plot(case, falling),
+        "order_plot": _order_plot(f"order-{stem}", falling) if falling else None,
         # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
         "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],
         "drawings": [
@@ -287,25 +256,41 @@ def case_view(case: Record) -> Record:
         ],
         "series": [series["name"] for series in case.get("series") or []],
         "sequences": sequences,
-        "tables": [_data_table(table) for table in tables if not is_long(table)],
-        "files": [
-            (table["name"], f"{TABLES}/{table_file(case, table)}") for table in tables if is_long(table)
-        ],
+        "tables": tables,
+        "files": files,
     }
 
 
-FILTERS: Final[Mapping[str, Callable[[Quantity], str]]] = MappingProxyType(
+def _order_plot(name: str, sequences: list[Record]) -> Drawing:
+    """Error against mesh size, a line per sequence, dotted the formal order as a slope to compare."""
+    paints: list[Paint] = []
+    for index, sequence in enumerate(sequences):
+        size, error, look = np.asarray(sequence["h"]), np.asarray(sequence["error"]), line(index, size=4)
+        paints.append(curve(size, error, sequence["label"], **look))
+        if order := sequence["formal_order"]:
+            slope = 0.6 * error[-1] * (size / size[-1]) ** order
+            paints.append(curve(size, slope, color=look["color"], linewidth=0.8, linestyle=":"))
+    return draw(
+        name,
+        *paints,
+        logarithmic("x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]})),
+        logarithmic("y"),
+        x=("relative mesh or step size", "1"),
+        y=("error", "1"),
+        columns=1,
+        height=2.7 + 0.175 * len(sequences),
+    )
+
+
+FILTERS: Final[Mapping[str, Callable[[JudgedQuantity], str]]] = MappingProxyType(
     {"found": _found, "error": _error, "brief": _in_brief, "half_width": _width}
 )
 """Filters of the templates, for a judged quantity."""
 
 
-_CASE: Final = "extremes"
-
-
 def _extremes(_own: Record, evidence: Record) -> Record:
     """Sentences and the table of axes."""
-    case = next((c for c in evidence.get("verification", []) if c["id"] == _CASE), None)
+    case = next((c for c in evidence.get("verification", []) if c["id"] == "extremes"), None)
     if case is None or not case.get("tables"):
         return {"ran": False}
     tables = {table["name"]: table["columns"] for table in case["tables"]}
@@ -327,15 +312,13 @@ EXTREMES: Final = Section(name="extremes", title="At the extremes", show=_extrem
 """Shown also where it was not run, to say how it is."""
 
 
+_trade_study = lru_cache(maxsize=4)(trade_study)
+"""One measurement serves every report of a scene within a process."""
+
+
 def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without meshes in three dimensions."""
-    return _study(work.ring).to_dict()
-
-
-@lru_cache(maxsize=4)
-def _study(scene: Scene) -> TradeStudy:
-    """One measurement serves every report of a scene within a process."""
-    return trade_study(scene, level="light")
+    return _trade_study(work.ring, level="light").to_dict()
 
 
 def _trade(trade: Record, evidence: Record) -> Record:

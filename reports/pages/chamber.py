@@ -22,7 +22,7 @@ from ringbalance.reports.figure import (
     MUTED,
     PAPER,
     THIRD,
-    Axis,
+    AxisLabel,
     Drawing,
     Paint,
     curve,
@@ -35,28 +35,27 @@ from ringbalance.reports.figure import (
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import budgets_of, total_of
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
 
 _DOTS: Final[Record] = {"color": FOUND, "marker": "o", "markersize": 3}
-_FILL: Final[Axis] = ("fill ratio", "1")
+_FILL: Final[AxisLabel] = ("fill ratio", "1")
 _MODES: Final = 4
-_POINTS: Final = 17
-_CUT_POINTS: Final = 9
-"""Of an imported chamber, whose mesh each fill cuts twice."""
+_FILLS: Final = 17
+_IMPORTED_FILLS: Final = 9
+"""Number of fills of an imported chamber, whose mesh each fill cuts twice."""
 _COARSE: Final = ((8, 24), (4, 12), (2, 6))
 """Meshes for figures and sentences: three digits."""
-_NEAR: Final = 0.15
+_NEAR_SPEED: Final = 0.15
 """Distance of a frequency from the speed, over the speed, that counts as a fill to avoid."""
-_MEETING: Final = (1 / HIGHEST_TRUE, 1 / LOWEST_TRUE)
-"""Frequencies over the speed, by theory, that may be the speed."""
+_RESONANT_RATIOS: Final = (1 / HIGHEST_TRUE, 1 / LOWEST_TRUE)
+"""Range of frequencies over the speed, by theory, that may be resonant."""
 
 
-def _pressure(own: Record, _evidence: Record) -> Record:
+def _pressure(record: Record, _evidence: Record) -> Record:
     """Pressure from the free surface to the wall: finite elements against what Eq. 12 implies.
 
     p(r) = rho omega^2 (r^2 - a^2)/2; Eq. 12 has the same form with the surface a of a chamber without plates.
     """
-    profile = own["profile"]
+    profile = record["profile"]
     radius, pressure = profile["radius_m"], profile["pressure_Pa"]
     figure = draw(
         "pressure-profile",
@@ -73,14 +72,14 @@ def _pressure(own: Record, _evidence: Record) -> Record:
 
 
 def _moment(_own: Record, evidence: Record) -> Record:
-    """Balancing moment of one chamber, and lambda per transferred mass, with what the paper has."""
+    """Balancing moment of one chamber, and lambda per transferred mass, with the paper's."""
     calibration, paper = evidence["calibration"], evidence["paper"]
     chamber = calibration["chamber"]
-    fill, found, printed = chamber["fill_ratio"], chamber["moment_kg_m"], paper["lambda_m"]
+    fill, moments, printed = chamber["fill_ratio"], chamber["moment_kg_m"], paper["lambda_m"]
     spread = printed * paper["lambda_spread"]
     moment = draw(
         "moment",
-        curve(fill, found, "finite elements", band=chamber["moment_uncertainty"], **_DOTS),
+        curve(fill, moments, "finite elements", band=chamber["moment_uncertainty"], **_DOTS),
         curve(fill, chamber["moment_paper_kg_m"], "Eq. 7, plates left out", **AS_PAPER),
         x=_FILL,
         y=("moment of one chamber", "kg m"),
@@ -104,41 +103,37 @@ def _moment(_own: Record, evidence: Record) -> Record:
 
 
 def _collect(work: Work) -> Record | None:
-    """Frequencies and swings over the fills, as plain numbers."""
+    """Natural frequencies and swing of the liquid over the fill; None where gravity drives no waves."""
     scene = work.ring
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
+    largest, imported = scene.disc.max_fill_ratio, scene.disc.geometry is not None
     try:
-        return _waves(scene)
+        met = resonant_fills(disc=scene.disc, modes=_MODES)
+        if imported:
+            # Denser where the ring is thin, for there the frequencies rise fastest.
+            fills = (0.02 + 0.98 * np.linspace(0, 1, _IMPORTED_FILLS) ** 2) * largest
+        else:
+            # A peak is narrower than the distance of even points.
+            peaks = [
+                x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest
+            ]
+            fills = np.unique([*(np.linspace(0.02, 1.0, _FILLS) * largest), *peaks])
+        modes = sloshing_modes(disc=scene.disc, fill_ratio=fills, modes=_MODES, cells=_COARSE)
+        answer = sloshing_response(
+            disc=scene.disc,
+            fill_ratio=np.append(fills, scene.disc.initial_fill),
+            angular_velocity=abs(scene.rotor.speed),
+            kinematic_viscosity=scene.liquid.kinematic_viscosity,
+            gravity=scene.environment.gravity,
+            cells=_COARSE,
+        )
     except NoPlaneWavesError as error:
         return {"left_out": str(error)}
-
-
-def _waves(scene: Scene) -> Record:
-    largest = scene.disc.max_fill_ratio
-    met = resonant_fills(disc=scene.disc, modes=_MODES)
-    imported = scene.disc.geometry is not None
-    # A peak is narrower than the distance of even points.
-    peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
-    if imported:
-        # Denser where the ring is thin, for there the frequencies rise fastest.
-        drawn = (0.02 + 0.98 * np.linspace(0, 1, _CUT_POINTS) ** 2) * largest
-    else:
-        drawn = np.unique([*(np.linspace(0.02, 1.0, _POINTS) * largest), *peaks])
-    fills = np.append(drawn, scene.disc.initial_fill)
-    modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
-    answer = sloshing_response(
-        disc=scene.disc,
-        fill_ratio=fills,
-        angular_velocity=abs(scene.rotor.speed),
-        kinematic_viscosity=scene.liquid.kinematic_viscosity,
-        gravity=scene.environment.gravity,
-        cells=_COARSE,
-    )
     ratios, swing = modes.frequency_ratio.value.T, answer.amplification.value[:-1]
     depth = scene.disc.outer_radius - answer.surface_radius[:-1]
-    near = abs(ratios[0][-1] - 1) <= _NEAR
-    shown = {
+    near = abs(ratios[0][-1] - 1) <= _NEAR_SPEED
+    results = {
         "amplification": answer.amplification.value,
         "amplification_interval": answer.amplification_interval,
         "pressure_amplification": answer.pressure_amplification.value,
@@ -147,55 +142,55 @@ def _waves(scene: Scene) -> Record:
     }
     tilt = scene.environment.gravity / (scene.rotor.speed**2 * answer.surface_radius[-1])
     return {
-        "fill_ratio": fills[:-1].tolist(),
-        "avoid": _to_avoid(ratios, fills[:-1], [mode for mode, _ in met], imported=imported),
-        "near_from_fill_ratio": _nearing(fills[:-1], swing) if near else None,
+        "fill_ratio": fills.tolist(),
+        "avoid": _to_avoid(ratios, fills, [mode for mode, _ in met], imported=imported),
+        "near_from_fill_ratio": _nearing(fills, swing) if near else None,
         "frequency_uncertainty": FREQUENCY_UNCERTAINTY,
         "largest_wave_over_depth": float(np.max(answer.surface_amplitude_interval[:-1, 1] / depth)),
         "frequency_ratio": ratios.tolist(),
-        **{name: values[:-1].tolist() for name, values in shown.items()},
+        **{name: values[:-1].tolist() for name, values in results.items()},
         "imported": imported,
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
             "fill_ratio": scene.disc.initial_fill,
-            **{name: values[-1].tolist() for name, values in shown.items()},
+            **{name: values[-1].tolist() for name, values in results.items()},
             "tilt_ratio": float(tilt),
         },
         "status": {"code": str(answer.status.code), "text": answer.status.text},
     }
 
 
-def _view(found: Record, _evidence: Record) -> Record:
-    return {} if "left_out" in found else {"frequencies": _frequencies(found), "swing": _swing(found)}
+def _view(waves: Record, _evidence: Record) -> Record:
+    return {} if "left_out" in waves else {"frequencies": _frequencies(waves), "swing": _swing(waves)}
 
 
 def _to_avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, imported: bool) -> list[Record]:
-    """Fills between which a mode that gravity drives meets the speed, for what its frequency may be.
+    """Ranges of the fill in which a mode that gravity drives may be resonant, its frequency being uncertain.
 
     Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
-    Args: `ratios`: frequencies over the speed, a row a mode. `met`: modes that meet the speed by theory.
+    Args: `ratios`: frequencies over the speed, a row a mode. `met`: modes resonant at some fill by theory.
     """
-    low, high = _MEETING
+    low, high = _RESONANT_RATIOS
     within = [
         mode
         for mode, row in enumerate(ratios, start=1)
         if (mode in met or (row[0] < high and row[-1] > low)) and (imported or mode % 2)
     ]
     # On a thin ring the square of a frequency grows with the depth, so a straight line meets it best.
-    ends = {mode: np.interp(np.square(_MEETING), ratios[mode - 1] ** 2, fills) for mode in within}
+    ends = {mode: np.interp(np.square(_RESONANT_RATIOS), ratios[mode - 1] ** 2, fills) for mode in within}
     return [{"mode": mode, "from_fill_ratio": a, "to_fill_ratio": b} for mode, (a, b) in ends.items()]
 
 
 def _nearing(fills: FloatArray, swing: FloatArray) -> float:
-    """Fill from which the swing is more than twice that of a surface that follows at once."""
+    """Fill from which the swing is more than twice that of a surface in equilibrium."""
     quiet = np.flatnonzero(swing < 2)
     return float(fills[min(int(quiet[-1]) + 1, fills.size - 1)]) if quiet.size else float(fills[0])
 
 
-def _frequencies(found: Record) -> Drawing:
-    fills, met = found["fill_ratio"], [item["fill_ratio"] for item in found["resonant"]]
+def _frequencies(waves: Record) -> Drawing:
+    fills, met = waves["fill_ratio"], [item["fill_ratio"] for item in waves["resonant"]]
     modes: list[Paint] = []
-    for index, ratios in enumerate(found["frequency_ratio"]):
+    for index, ratios in enumerate(waves["frequency_ratio"]):
         label = None if index else "natural frequencies"
         modes.append(curve(fills, ratios, label, color=FOUND, linewidth=1.6 - 0.25 * index))
         modes.append(note(f"{index + 1}", (fills[-1], ratios[-1]), (3, 0), color=FOUND, va="center"))
@@ -211,11 +206,11 @@ def _frequencies(found: Record) -> Drawing:
     )
 
 
-def _swing(found: Record) -> Drawing:
+def _swing(waves: Record) -> Drawing:
     fills, moment, pressure = (
-        found[key] for key in ("fill_ratio", "amplification", "pressure_amplification")
+        waves[key] for key in ("fill_ratio", "amplification", "pressure_amplification")
     )
-    points = {"marker": "o" if found["imported"] else "", "markersize": 3}
+    points = {"marker": "o" if waves["imported"] else "", "markersize": 3}
     return draw(
         "sloshing-swing",
         curve(fills, moment, "moment", color=FOUND, **points),
@@ -223,7 +218,7 @@ def _swing(found: Record) -> Drawing:
         level(1.0, "surface follows at once", color=MUTED, linewidth=1.2, linestyle=(0, (5, 2))),
         *(
             upright(each["fill_ratio"], color=MUTED, linewidth=0.8, linestyle=":")
-            for each in found["resonant"]
+            for each in waves["resonant"]
         ),
         logarithmic("y", within=(1e-3, 5e3)),
         x=_FILL,

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -45,12 +45,14 @@ from ringbalance.scene.uncertain import (
     without_fitted,
 )
 
-_CHARGED: Final = ("bore", "kinematic_viscosity")
-"""Inputs that a map is drawn over."""
-_OF_LIQUID: Final = {"density": "density_uncertainty", "kinematic_viscosity": "viscosity_uncertainty"}
-"""Properties with the relative uncertainty that a liquid has of each."""
-_NODES: Final = 13
-"""Of either axis of a map, at which half-widths are found; between them their ratio to k is interpolated."""
+_MAP_INPUTS: Final = ("bore", "kinematic_viscosity")
+_LIQUID_UNCERTAINTIES: Final = {
+    "density": "density_uncertainty",
+    "kinematic_viscosity": "viscosity_uncertainty",
+}
+"""Attributes of a liquid with the relative uncertainty of each property."""
+_UNCERTAINTY_NODES: Final = 13
+"""Points of either axis with half-widths; between them the ratio of half-width and value is interpolated."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,17 +65,17 @@ class _DragPoint:
     regime: IntArray
     """Values of `Regime`: siphon or separated, and blocked where the gas starts no flow in an empty tube."""
     runs: BoolArray
-    """Whether a primed tube flows: only there have the numbers a meaning."""
+    """True if a primed tube flows; else the numbers have no meaning."""
     separation_excess: FloatArray
     """ln of siphon velocity over separation velocity: positive where separated; without a crest -1."""
     velocity: FloatArray
     """u, m/s."""
     velocity_uncertainty: FloatArray
-    """Expanded uncertainty (95 %), m/s; zero where none was asked for."""
+    """Expanded uncertainty (95 %), m/s; zero without errors."""
     k: FloatArray
     """Loss coefficient of the tube at u."""
     k_uncertainty: FloatArray
-    """Expanded uncertainty (95 %) of k, whose u moves with k and with what drives the flow, likewise."""
+    """Expanded uncertainty (95 %) of k at a velocity that varies with it; zero without errors."""
     apparent_k: FloatArray
     """2 p/(rho u^2) - 1: the k that Eq. 18 reads off this velocity; above k where the column is separated."""
     reynolds: FloatArray
@@ -84,7 +86,7 @@ class _DragPoint:
 
     @classmethod
     def of(cls, designs: Designs, errors: Sequence[Uncertainty] = ()) -> _DragPoint:
-        """Find the operating point of each design.
+        """Solve the operating point of each design.
 
         Args: `errors`: for the half-widths.
         Returns: _DragPoint, arrays of shape (n,).
@@ -112,26 +114,26 @@ class _DragPoint:
         notes = range_notes(tube=varied.tube, state=state, velocity=u)
         outside = np.any(np.array([np.zeros(u.shape, dtype=np.bool_), *notes.values()]), axis=0)
 
-        def kept(values: FloatArray) -> FloatArray:
+        def zero_at_rest(values: FloatArray) -> FloatArray:
             return np.where(runs, values, 0.0)
 
         flows = np.where(separated, Regime.SEPARATED, Regime.SIPHON)
         return cls(
             regime=np.asarray(np.where(starts, flows, Regime.BLOCKED), dtype=np.int64),
             runs=runs,
-            separation_excess=kept(excess),
-            velocity=kept(u),
-            velocity_uncertainty=kept(widths[0]),
-            k=kept(state.k),
-            k_uncertainty=kept(widths[1]),
-            apparent_k=kept(2 * varied.gas.pressure / (varied.liquid.density * u**2) - 1),
-            reynolds=kept(state.reynolds),
+            separation_excess=zero_at_rest(excess),
+            velocity=zero_at_rest(u),
+            velocity_uncertainty=zero_at_rest(widths[0]),
+            k=zero_at_rest(state.k),
+            k_uncertainty=zero_at_rest(widths[1]),
+            apparent_k=zero_at_rest(2 * varied.gas.pressure / (varied.liquid.density * u**2) - 1),
+            reynolds=zero_at_rest(state.reynolds),
             flow_state=flow_states(state),
             in_range=np.asarray(~outside),
         )
 
     def at(self, i: int) -> dict[str, Any]:
-        """One of the points, plain values in SI."""
+        """Point number i as plain values in SI."""
         keys = {"velocity": "velocity_m_s", "velocity_uncertainty": "velocity_uncertainty"}
         keys |= {name: name for name in ("k", "k_uncertainty", "apparent_k", "reynolds")}
         return {
@@ -143,7 +145,7 @@ class _DragPoint:
         }
 
     def reshaped(self, *shape: int) -> _DragPoint:
-        """The same with arrays of another shape."""
+        """The points with arrays of another shape."""
         return _DragPoint(**{name: values.reshape(shape) for name, values in vars(self).items()})
 
 
@@ -161,18 +163,18 @@ def _velocity_and_k(designs: Designs) -> FloatArray:
     return np.array([column.velocity, tube.drag_coefficient(column.velocity)])
 
 
-def _errors(scene: Scene, *, over: Sequence[str] = _CHARGED) -> list[Uncertainty]:
-    """Uncertainties of a scene that act on the flow. Args: `over`: inputs that are known, axes of a map."""
+def _errors(scene: Scene, *, over: Sequence[str] = _MAP_INPUTS) -> list[Uncertainty]:
+    """Uncertainties of a scene that act on the flow. Args: `over`: inputs taken as exact, axes of a map."""
     return [each for each in of_flow(without_fitted(scene)) if each.name not in over]
 
 
 BORES: Final = (0.2e-3, 5e-3)
-"""m: the map's range, widened when the scene's own bore lies near its edge."""
+"""Range of the map, m, widened when the scene's own bore lies near its edge."""
 _VISCOSITIES: Final = (2e-7, 5e-4)
-"""m^2/s: the same, from below liquid gallium to above silicone oil of 350 cSt."""
+"""Range of the map, m^2/s, from below liquid gallium to above silicone oil of 350 cSt."""
 _BORE_POINTS: Final = 41
 _VISCOSITY_POINTS: Final = 49
-_ROOM: Final = 1.5
+_EDGE_FACTOR: Final = 1.5
 _FIFTY: Final = paper.PAPER_DRAG_COEFFICIENT
 
 
@@ -206,9 +208,8 @@ class DragMap:
         """
         scene = calibration.scene
         d = _axis(bore, BORES, _BORE_POINTS, scene.tube.bore)
-        own = scene.liquid.kinematic_viscosity
-        nu = _axis(kinematic_viscosity, _VISCOSITIES, _VISCOSITY_POINTS, own)
-        nodes = [np.unique(np.linspace(0, each.size - 1, _NODES).astype(int)) for each in (d, nu)]
+        nu = _axis(kinematic_viscosity, _VISCOSITIES, _VISCOSITY_POINTS, scene.liquid.kinematic_viscosity)
+        nodes = [np.unique(np.linspace(0, each.size - 1, _UNCERTAINTY_NODES).astype(int)) for each in (d, nu)]
 
         def points(d: FloatArray, nu: FloatArray, errors: Sequence[Uncertainty]) -> _DragPoint:
             varied = {"tube.bore": np.repeat(d, nu.size), "liquid.kinematic_viscosity": np.tile(nu, d.size)}
@@ -248,20 +249,23 @@ def liquids_in_tube(
     """Liquids in the scene's tube, primed, at equal fills; SI.
 
     Under the scene's gas pressure where that starts the flow, else at the pressure of equal head.
-    Args: `liquids`: those to ask; default the known ones at 20 degC or the next temperature with data.
-    Returns: By liquid, the scene's own first, another of its name left out.
+    Args: `liquids`: default the known ones at 20 degC or the next temperature with data.
+    Returns: Records by liquid, the scene's own first, another of its name left out.
     Source: `_DragPoint.of`, density and the spread of the properties included.
     """
     scene, law = calibration.scene, calibration.flow_law
-    asked = liquids_at_room_temperature() if liquids is None else liquids
-    chosen = (scene.liquid, *(q for q in asked if q.name != scene.liquid.name))
-    density = np.array([q.density for q in chosen])
+    others = liquids_at_room_temperature() if liquids is None else liquids
+    chosen = (scene.liquid, *(liquid for liquid in others if liquid.name != scene.liquid.name))
+    density = np.array([liquid.density for liquid in chosen])
     equal = scene.gas.pressure * density / scene.liquid.density
     bores = np.geomspace(*BORES, _BORE_POINTS)
     at_scene = _in_tube(calibration, chosen, np.full(density.shape, scene.gas.pressure))
     at_equal = _in_tube(calibration, chosen, equal)
     over_bores = _in_tube(calibration, chosen, equal, bores)
-    start = _starting_pressure(calibration)
+    # The scene's liquid starts to flow at this pressure, at equal fills, by the law's own kind of crest gas.
+    half, gas = law.max_fill_ratio / 2, "trapped" if law.path.trapped else "vented"
+    priming = law.priming_pressure(fill_ratio=half, opposite_fill_ratio=half, hump_gas=cast(HumpGas, gas))
+    start = 0.0 if priming is None else max(float(priming), 0.0)
     records = []
     for i, liquid in enumerate(chosen):
         starts = bool(at_scene.regime[i] != Regime.BLOCKED)
@@ -291,19 +295,19 @@ def _in_tube(
     gas_pressure: FloatArray,
     bores: FloatArray | None = None,
 ) -> _DragPoint:
-    """Of liquids, shape (m,), or, without half-widths, in a tube of each bore, shape (n, m)."""
+    """Operating points of liquids, shape (m,), or, without half-widths, in a tube of each bore, (n, m)."""
     scene = calibration.scene
-    times, own = (1, scene.tube.bore) if bores is None else (bores.size, bores)
+    times, bore = (1, scene.tube.bore) if bores is None else (bores.size, bores)
     values: dict[str, Any] = {"gas.pressure": gas_pressure}
     for key in ("kinematic_viscosity", "density", "vapour_pressure"):
         values[f"liquid.{key}"] = [getattr(q, key) for q in liquids]
     tiled = {path: np.tile(np.asarray(each), times) for path, each in values.items()}
-    designs = _designs(scene, {"tube.bore": np.repeat(own, len(liquids)), **tiled})
+    designs = _designs(scene, {"tube.bore": np.repeat(bore, len(liquids)), **tiled})
     if bores is not None:
         return _DragPoint.of(designs).reshaped(times, len(liquids))
-    errors = [each for each in _errors(scene, over=()) if each.name not in _OF_LIQUID]
+    errors = [each for each in _errors(scene, over=()) if each.name not in _LIQUID_UNCERTAINTIES]
     stated = independent_half_widths(scene)
-    for name, spread in _OF_LIQUID.items():
+    for name, spread in _LIQUID_UNCERTAINTIES.items():
         widths = np.array([getattr(q, spread) * getattr(q, name) for q in liquids])
         # What the scene states is of its own liquid.
         widths[0] = stated.get(name, widths[0])
@@ -345,21 +349,16 @@ def _bore_of(bore: FloatArray, k: FloatArray, runs: Any) -> float | None:
     return float(np.exp(roots[np.isfinite(roots)]).max(initial=0.0)) or None
 
 
-def _starting_pressure(calibration: Calibration) -> float:
-    """Of the scene's liquid, at equal fills, by the law's own kind of crest gas, Pa."""
-    law = calibration.flow_law
-    half = law.max_fill_ratio / 2
-    gas: HumpGas = "trapped" if law.path.trapped else "vented"
-    pressure = law.priming_pressure(fill_ratio=half, opposite_fill_ratio=half, hump_gas=gas)
-    return 0.0 if pressure is None else max(float(pressure), 0.0)
-
-
 def _designs(scene: Scene, values: Mapping[str, FloatArray]) -> Designs:
-    """Of a scene whose k is not prescribed."""
+    """Designs of a scene whose k is not prescribed."""
     return Designs.of(replace(scene, tube=replace(scene.tube, drag_coefficient=None)), values)
 
 
-def _axis(given: npt.ArrayLike | None, limits: tuple[float, float], count: int, own: float) -> FloatArray:
-    if given is None:
-        return np.geomspace(min(limits[0], own / _ROOM), max(limits[1], own * _ROOM), count)
-    return np.asarray(given, dtype=np.float64)
+def _axis(
+    values: npt.ArrayLike | None, limits: tuple[float, float], count: int, nominal: float
+) -> FloatArray:
+    if values is None:
+        return np.geomspace(
+            min(limits[0], nominal / _EDGE_FACTOR), max(limits[1], nominal * _EDGE_FACTOR), count
+        )
+    return np.asarray(values, dtype=np.float64)

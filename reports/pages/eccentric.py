@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -11,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle
 
 from ringbalance.reports import summary
-from ringbalance.reports.figure import INK, MUTED, Drawing, draw, line, panels
+from ringbalance.reports.figure import INK, MUTED, draw, line, panels
 from ringbalance.reports.mass_figures import (
-    DEVIATIONS,
+    BAND_SIGMAS,
     friction_estimates,
     imbalance_estimate,
     mass_angles,
@@ -25,8 +24,11 @@ from ringbalance.reports.pages.plain import decision, decision_view
 from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Record, Section
 
-_POLE_ROOM, _NEAR, _WHOLE = 0.75, 0.02, 1.12
-"""Half of the poles' magnified picture over their extent, the least extent, and half of the whole picture."""
+_MAGNIFIED_HALF: Final = 0.75
+"""Half of the magnified picture over the poles' extent."""
+_MIN_EXTENT: Final = 0.02
+_UNIT_CIRCLE_HALF: Final = 1.12
+"""Half of the picture of the unit circle, or over the pole outside it."""
 
 
 def _run(_own: Record, evidence: Record) -> Record:
@@ -36,79 +38,72 @@ def _run(_own: Record, evidence: Record) -> Record:
     return {
         "over_speed": run_up(run, locked, evidence["rotor"], evidence["drawn"]) if varies else [],
         "over_time": over_time(run, locked, evidence["drawn"]),
-        "stages": [{"place": place, "amplitude_m": float(end)} for place, end in enumerate(ends)],
+        "stages": [{"index": index, "amplitude_m": float(end)} for index, end in enumerate(ends)],
     }
 
 
 def _estimates(_own: Record, evidence: Record) -> Record:
-    run, truth = evidence["closed_loop"]["balanced"], evidence["truth"]
-    return {
-        "imbalance": imbalance_estimate(run, truth["unbalance_kg_m"]),
-        "friction": friction_estimates(run, truth["friction_arm_m"]),
-        "rows": _estimate_rows(run["estimates"], truth),
-    }
-
-
-def _estimate_rows(estimates: Record, truth: Record) -> list[Record]:
     """Final estimates with their 95 % half-widths beside the true values, errors in standard deviations."""
+    run, truth = evidence["closed_loop"]["balanced"], evidence["truth"]
+    estimates, arms = run["estimates"], truth["friction_arm_m"]
     true = truth["unbalance_kg_m"] * np.array([math.cos(truth["phase_rad"]), math.sin(truth["phase_rad"])])
     covariance = np.asarray(estimates["imbalance_covariance"][-1])
     covariance = covariance + np.asarray(estimates["imbalance_rotor_covariance"])
-    last = [row[-1] for row in estimates["imbalance_kg_m"]]
-    arms = [row[-1] for row in estimates["friction_arm_m"]]
-    variances = [(width / DEVIATIONS) ** 2 for width in estimates["friction_half_width_m"]]
-    plant = truth["friction_arm_m"]
+    imbalance = [row[-1] for row in estimates["imbalance_kg_m"]]
+    friction = [row[-1] for row in estimates["friction_arm_m"]]
+    variances = [(width / BAND_SIGMAS) ** 2 for width in estimates["friction_half_width_m"]]
     entries = [
-        ("imbalance along x", "kg m", last[0], covariance[0, 0], true[0]),
-        ("imbalance along y", "kg m", last[1], covariance[1, 1], true[1]),
-        ("friction arm of mass 1", "m", arms[0], variances[0], plant[0]),
-        ("friction arm of mass 2", "m", arms[1], variances[1], plant[1]),
+        ("imbalance along x", "kg m", imbalance[0], covariance[0, 0], true[0]),
+        ("imbalance along y", "kg m", imbalance[1], covariance[1, 1], true[1]),
+        ("friction arm of mass 1", "m", friction[0], variances[0], arms[0]),
+        ("friction arm of mass 2", "m", friction[1], variances[1], arms[1]),
     ]
-    return [
+    rows = [
         {
             "name": name,
             "unit": unit,
             "value": float(value),
-            "width": DEVIATIONS * math.sqrt(variance) or None,
+            "width": BAND_SIGMAS * math.sqrt(variance) or None,
             "plant": float(right),
             "deviations": float(value - right) / math.sqrt(variance) if variance > 0 else None,
         }
         for name, unit, value, variance, right in entries
     ]
-
-
-def _loops(_own: Record, evidence: Record) -> Record:
-    loops = evidence["tuning"]["loops"]
     return {
-        "poles": _sampled_poles(loops),
-        "unstable": [loop["name"] for loop in loops if not loop["stable"]],
-        "angles": mass_angles(evidence["closed_loop"]["balanced"]),
+        "imbalance": imbalance_estimate(run, truth["unbalance_kg_m"]),
+        "friction": friction_estimates(run, arms),
+        "rows": rows,
     }
 
 
-def _sampled_poles(loops: Sequence[Record]) -> Drawing:
+def _loops(_own: Record, evidence: Record) -> Record:
     """Sampled poles of the drives' loops in the complex plane, with the unit circle, and magnified."""
+    loops = evidence["tuning"]["loops"]
     groups = [np.array(loop["poles"]).reshape(-1, 2) for loop in loops]
     points = np.concatenate([np.zeros((0, 2)), *groups])
     low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = (low + high) / 2, _POLE_ROOM * max(*(high - low), _NEAR)
-    whole = max(_WHOLE, float(np.abs(points).max()) * _WHOLE)
+    middle, half = (low + high) / 2, _MAGNIFIED_HALF * max(*(high - low), _MIN_EXTENT)
+    circle_half = max(_UNIT_CIRCLE_HALF, float(np.abs(points).max()) * _UNIT_CIRCLE_HALF)
 
     def paint(axes: Axes) -> None:
-        everything, near = panels(axes, (0.075, 0.15, 0.4, 0.74), (0.575, 0.15, 0.4, 0.74))
-        for panel, centre, reach in ((everything, (0.0, 0.0), whole), (near, middle, half)):
+        circle, near = panels(axes, (0.075, 0.15, 0.4, 0.74), (0.575, 0.15, 0.4, 0.74))
+        for panel, centre, reach in ((circle, (0.0, 0.0), circle_half), (near, middle, half)):
             panel.add_patch(Circle((0, 0), 1, fill=False, color=INK, linewidth=1))
             for index, group in enumerate(groups):
                 panel.plot(*group.T, linestyle="", **line(index, size=6))
             ends = [(at - reach, at + reach) for at in centre]
             panel.set(xlim=ends[0], ylim=ends[1], aspect="equal", xlabel="real part")
-        everything.set_ylabel("imaginary part")
+        circle.set_ylabel("imaginary part")
         frame = Rectangle(middle - half, 2 * half, 2 * half, fill=False, color=MUTED, linewidth=0.8)
-        everything.add_patch(frame)
+        circle.add_patch(frame)
         for index, loop in enumerate(loops):
             axes.plot([], [], linestyle="", label=loop["name"], **line(index, size=6))
 
-    return draw("sampled-poles", paint, columns=3, wide=True, height=3.3)
+    return {
+        "poles": draw("sampled-poles", paint, columns=3, wide=True, height=3.3),
+        "unstable": [loop["name"] for loop in loops if not loop["stable"]],
+        "angles": mass_angles(evidence["closed_loop"]["balanced"]),
+    }
 
 
 def _claims(_own: Record, evidence: Record) -> Record:
@@ -121,32 +116,36 @@ SECTIONS: Final = (
     Section(
         name="summary",
         title="Decision",
-        place="report",
+        document="report",
         collect=decision,
         show=decision_view,
         template="masses_summary.html",
     ),
-    Section(name="run", title="Run-up and stages", place="report", show=_run, template="masses_run.html"),
+    Section(name="run", title="Run-up and stages", document="report", show=_run, template="masses_run.html"),
     Section(
-        name="estimates", title="Estimates", place="report", show=_estimates, template="masses_estimates.html"
+        name="estimates",
+        title="Estimates",
+        document="report",
+        show=_estimates,
+        template="masses_estimates.html",
     ),
     Section(
         name="loops",
         title="Drives: poles, margins and what they do",
-        place="report",
+        document="report",
         show=_loops,
         template="masses_loops.html",
     ),
     Section(
         name="claims",
         title="Claims of the eccentric-mass paper",
-        place="report",
+        document="report",
         of_paper=True,
         show=_claims,
         template="masses_claims.html",
     ),
     CREDIBILITY,
-    Section(name="parameters", title="Parameters and their origin", place="report"),
+    Section(name="parameters", title="Parameters and their origin", document="report"),
     DOCUMENT,
     CASES,
     measured.SECTION,

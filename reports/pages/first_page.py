@@ -15,7 +15,6 @@ from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports import summary
 from ringbalance.reports.figure import FOUND, INK, MUTED, PAPER, THIRD, Drawing, draw, figure_of, panels
 from ringbalance.reports.judged import (
@@ -29,7 +28,6 @@ from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.requirements import MET, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.platform.jobs import Job
 from ringbalance.verification.loops import calibration_of
@@ -51,11 +49,11 @@ SETTINGS: Final = (
     "controller.period",
     "controller.limit",
 )
-"""What a controller and a valve are set to."""
+"""Settings of controller and valve."""
 _OTHER_READING: Final = "liquid_ring_paper_calibrated"
 """The paper's disc with the bore that its Fig. 7 implies under the calibrated law."""
 _QUESTION: Final = ("claim_06_wall_pressure", "claim_09_drag_coefficient", "claim_11_lambda")
-"""What the study of the paper's disc asks: Eq. 12, k and lambda."""
+"""Claims that the study of the paper's disc decides: Eq. 12, k and lambda."""
 _RESTS: Final = {
     "settling_time": (
         "tube.bore",
@@ -66,7 +64,7 @@ _RESTS: Final = {
     ),
     "correction_moment": ("tube.bore", "tube.hump_radius", "disc.plate_thickness"),
 }
-"""Inputs behind what is asked, by its code."""
+"""Inputs that a requirement rests on, by its code."""
 _RUN: Final = (
     "verdict",
     "loop_factor",
@@ -78,9 +76,9 @@ _RUN: Final = (
     "misadjustments",
 )
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
-_DOMINANT: Final = 3
-_SHADES: Final = {MET: 0.28, OPEN: 0.1}
-"""Opacity of the ground by what is known of the fraction there."""
+_MAX_DOMINANT: Final = 3
+_VERDICT_OPACITY: Final = {MET: 0.28, OPEN: 0.1}
+"""Opacity of the ground by the verdict on the fraction of devices."""
 
 
 def _tuning(work: Work) -> Record:
@@ -88,13 +86,19 @@ def _tuning(work: Work) -> Record:
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
     tuning = tuned(balancer, along=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
+    recommended_run = None
+    if tuning.recommended.settings:
+        run = simulate(chosen, work.calibration.model).to_dict()
+        recommended_run = {key: run[key] for key in _RUN if key in run} | {
+            "injections": len(run["injections"])
+        }
     return {
         "judged": tuning_record(balancer, tuning),
         "scene": tuning.recommended_scene,
         "settings": settings_lines(chosen, SETTINGS),
         "gas_pressure_Pa": scene.gas.pressure,
         "recommended_pressure_Pa": chosen.gas.pressure,
-        "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
+        "run": recommended_run,
     }
 
 
@@ -104,15 +108,14 @@ def _choices(some: slice, _work: Work, tuning: Record) -> list[Record]:
 
 def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices: list[Record]) -> Record:
     scene, limit = work.ring, LiquidRingBalancer(work.ring).limit
-    shown = ("settings", "gas_pressure_Pa", "recommended_pressure_Pa", "run")
     return {
         "limit_m": limit,
         "valve_given": scene.gas.conductance is not None,
         **tuning["judged"],
         "noise_open": not scene.sensor.amplitude_noise
         and scene.origin_of("sensor.amplitude_noise") == "default",
-        "choices": [each for some in choices for each in some],
-        **{key: tuning[key] for key in shown},
+        "choices": [choice for records in choices for choice in records],
+        **{key: tuning[key] for key in ("settings", "gas_pressure_Pa", "recommended_pressure_Pa", "run")},
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
         "requirement": _requirement_record(scene, limit=limit),
         "bore_m": scene.tube.bore,
@@ -121,14 +124,8 @@ def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices:
     }
 
 
-def _run_record(scene: Scene, model: BalancerModel) -> Record:
-    """One run with the recommended settings, as the table of runs has it."""
-    run = simulate(scene, model).to_dict()
-    return {**{key: run[key] for key in _RUN if key in run}, "injections": len(run["injections"])}
-
-
 def _requirement_record(scene: Scene, *, limit: float) -> Record:
-    """What the limit of a scene's vibration amplitude, m, means for its rotor; SI, None where not known."""
+    """Unbalance and balance quality grade that the limit of the amplitude, m, allows; SI, None: not known."""
     rotor = scene.rotor
     left = limit / rotor.influence_coefficient
     return {
@@ -148,108 +145,101 @@ def _other_reading(work: Work) -> Record | None:
         other = liquid_ring_scene(load_scene(bundled_scene(_OTHER_READING)))
     except SceneError:
         return None
-    found = judgement_record(judged(balancer_of(other), {}, most=BLOCK))
+    judgement = judgement_record(judged(balancer_of(other), {}, most=BLOCK))
     k = calibration_of(other).quantities["drag_coefficient"].value
-    return {"bore_m": other.tube.bore, "k": k, "fraction": found["fraction"]}
+    return {"bore_m": other.tube.bore, "k": k, "fraction": judgement["fraction"]}
 
 
-def _view(found: Record, evidence: Record) -> Record:
+def _view(record: Record, evidence: Record) -> Record:
     origins = evidence["scene"]["origins"]
     rows = {row["path"]: row["origin"] for row in evidence["scene"]["table"]}
+    verdicts = {case["id"]: case["verdict"] for case in summary.claims(evidence)}
+    # Only the paper's own disc answers the study's question.
+    answered = summary.is_papers(evidence) and verdicts.keys() >= set(_QUESTION)
     return {
-        "question": _question(evidence),
+        "question": {name: verdicts[name] for name in _QUESTION} if answered else {},
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
-        "pressure": _pressure_figure(found),
-        **advice_view(found),
-        # Inputs that decide most of what the drawn devices differ in.
+        "pressure": _pressure_figure(record),
+        **advice_view(record),
+        # Inputs that decide most of the differences between drawn devices.
         "dominant": [
-            place for place, each in enumerate(found["ranking"][:_DOMINANT]) if each["index"] > each["noise"]
+            i for i, each in enumerate(record["ranking"][:_MAX_DOMINANT]) if each["index"] > each["noise"]
         ],
         "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],
     }
 
 
-def _pressure_figure(found: Record) -> Drawing | None:
+def _pressure_figure(record: Record) -> Drawing | None:
     """Drawn devices at every gas pressure, each with its best settings; None with fewer than three."""
-    levels = (found.get("along") or {"levels": ()})["levels"]
+    levels = (record.get("along") or {"levels": ()})["levels"]
     if len(levels) < 3:
         return None
-    pressure = 1e-6 * np.array([each["value"] for each in levels])
+    pressure = 1e-6 * np.array([level["value"] for level in levels])
     half = (pressure[1:] + pressure[:-1]) / 2
     ends = np.concatenate([pressure[:1], half, pressure[-1:]])
-    own, recommended = (1e-6 * found[f"{key}_pressure_Pa"] for key in ("gas", "recommended"))
+    scene_pressure, recommended = (1e-6 * record[f"{key}_pressure_Pa"] for key in ("gas", "recommended"))
+    fractions = (
+        100 * np.array([[level["fraction"][key] for key in ("low", "value", "high")] for level in levels]).T
+    )
+    usable = [list(level["usable_moment_kg_m"].values()) for level in levels]
+    moments = 1e6 * np.array(usable, dtype=np.float64).T
+    times = {key: [level["settling_time_s"][key] for level in levels] for key in ("p50", "p90")}
 
     def paint(axes: Axes) -> None:
-        three = panels(axes, (0.12, 0.64, 0.85, 0.2), (0.12, 0.385, 0.85, 0.17), (0.12, 0.12, 0.85, 0.17))
-        for panel, fill in zip(three, (_shares, _moments, _times), strict=True):
-            for low, high, each in zip(ends[:-1], ends[1:], levels, strict=True):
-                panel.axvspan(low, high, color=THIRD, alpha=_SHADES.get(each["verdict"], 0.0), linewidth=0)
-            panel.axvline(own, color=INK, linewidth=1, linestyle=":", label="the scene’s pressure")
-            if recommended != own:
+        boxes = (0.12, 0.64, 0.85, 0.2), (0.12, 0.385, 0.85, 0.17), (0.12, 0.12, 0.85, 0.17)
+        titles = (
+            "devices that settle, in %",
+            "moment that can be corrected, in g mm",
+            "time to settle, in s",
+        )
+        three = panels(axes, *boxes)
+        for panel, title in zip(three, titles, strict=True):
+            for low, high, level in zip(ends[:-1], ends[1:], levels, strict=True):
+                shade = _VERDICT_OPACITY.get(level["verdict"], 0.0)
+                panel.axvspan(low, high, color=THIRD, alpha=shade, linewidth=0)
+            panel.axvline(scene_pressure, color=INK, linewidth=1, linestyle=":", label="the scene’s pressure")
+            if recommended != scene_pressure:
                 panel.axvline(recommended, color=INK, linewidth=1.4, label="recommended")
-            fill(panel, pressure, levels, found)
+            panel.set_title(title, loc="left", fontsize="medium", pad=3)
+        required = 100 * (record["recommended"] or record["own"])["asked"]
+        _banded(three[0], (pressure, *fractions), (required, "asked"), marker="o", markersize=3)
+        _banded(three[1], (pressure, *moments), (1e6 * record["needed_moment_kg_m"], "unbalance"))
+        for values, colour, marker in zip(times.values(), (FOUND, MUTED), "os", strict=True):
+            heights = np.array(values, dtype=np.float64)
+            three[2].plot(pressure, heights, color=colour, marker=marker, markersize=3)
+        if not any(time is not None for time in times["p50"]):
+            three[2].set_yticks([])
+            middle = three[2].transAxes
+            three[2].text(0.5, 0.5, "half of the devices nowhere settle", ha="center", transform=middle)
+        for panel in three:
             panel.set(xlim=(pressure[0], pressure[-1]), ylim=(0, None))
-            panel.tick_params(labelbottom=panel is three[-1])
-        three[-1].set_xlabel("gas pressure in MPa, gauge")
+            panel.tick_params(labelbottom=panel is three[2])
+        three[2].set_xlabel("gas pressure in MPa, gauge")
         handles, labels = three[0].get_legend_handles_labels()
-        grounds = [Patch(color=THIRD, alpha=shade, linewidth=0) for shade in _SHADES.values()]
-        place: Record = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0, "borderpad": 0.1}
-        figure_of(axes).legend([*handles, *grounds], [*labels, *_SHADES], **place)
+        grounds = [Patch(color=THIRD, alpha=shade, linewidth=0) for shade in _VERDICT_OPACITY.values()]
+        legend: Record = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0, "borderpad": 0.1}
+        figure_of(axes).legend([*handles, *grounds], [*labels, *_VERDICT_OPACITY], **legend)
 
     return draw("pressure-choice", paint, columns=0, height=3.5)
 
 
-def _shares(panel: Axes, pressure: FloatArray, levels: Sequence[Record], found: Record) -> None:
-    fractions = [each["fraction"] for each in levels]
-    value, low, high = (100 * np.array([each[key] for each in fractions]) for key in ("value", "low", "high"))
-    _banded(panel, pressure, low, value, high, marker="o", markersize=3)
-    _asked(panel, 100 * (found["recommended"] or found["own"])["asked"], "asked")
-    panel.set_title("devices that settle, in %", loc="left", fontsize="medium", pad=3)
+def _banded(panel: Axes, curves: Sequence[Any], level: tuple[float, str], **look: Any) -> None:
+    """A line in its band, and a dashed level with its name at its right end, below it.
 
-
-def _moments(panel: Axes, pressure: FloatArray, levels: Sequence[Record], found: Record) -> None:
-    moments = [list(each["usable_moment_kg_m"].values()) for each in levels]
-    _banded(panel, pressure, *(1e6 * np.array(moments, dtype=np.float64).T))
-    _asked(panel, 1e6 * found["needed_moment_kg_m"], "unbalance")
-    panel.set_title("moment that can be corrected, in g mm", loc="left", fontsize="medium", pad=3)
-
-
-def _times(panel: Axes, pressure: FloatArray, levels: Sequence[Record], _found: Record) -> None:
-    times = {key: [each["settling_time_s"][key] for each in levels] for key in ("p50", "p90")}
-    for (_, values), colour, marker in zip(times.items(), (FOUND, MUTED), "os", strict=True):
-        panel.plot(pressure, np.array(values, dtype=np.float64), color=colour, marker=marker, markersize=3)
-    panel.set_title("time to settle, in s", loc="left", fontsize="medium", pad=3)
-    if not any(time is not None for time in times["p50"]):
-        panel.set_yticks([])
-        panel.text(0.5, 0.5, "half of the devices nowhere settle", ha="center", transform=panel.transAxes)
-
-
-def _banded(
-    panel: Axes, x: FloatArray, low: FloatArray, middle: FloatArray, high: FloatArray, **look: Any
-) -> None:
+    Args: `curves`: x, lower end of the band, line, and upper end. `level`: height and name.
+    """
+    (x, low, middle, high), (height, name) = curves, level
     panel.fill_between(x, low, high, color=FOUND, alpha=0.25, linewidth=0)
     panel.plot(x, middle, color=FOUND, **look)
-
-
-def _asked(panel: Axes, level: float, text: str) -> None:
-    """A dashed level with its name at its right end, below it."""
-    panel.axhline(level, color=PAPER, linestyle="--", linewidth=1)
-    look: Record = {"color": PAPER, "fontsize": "small", "ha": "right", "va": "top"}
-    panel.annotate(text, (1.0, level), (-3, -2), panel.get_yaxis_transform(), "offset points", **look)
-
-
-def _question(evidence: Record) -> Record:
-    """Verdicts on what the study of the paper's disc asks, by case; empty for any other disc."""
-    cases = {case["id"]: case for case in summary.claims(evidence)}
-    if not summary.is_papers(evidence) or not cases.keys() >= set(_QUESTION):
-        return {}
-    return {name: cases[name]["verdict"] for name in _QUESTION}
+    panel.axhline(height, color=PAPER, linestyle="--", linewidth=1)
+    text: Record = {"color": PAPER, "fontsize": "small", "ha": "right", "va": "top"}
+    panel.annotate(name, (1.0, height), (-3, -2), panel.get_yaxis_transform(), "offset points", **text)
 
 
 SECTION: Final = Section(
     name="summary",
     title="Decision",
-    place="report",
+    document="report",
     collect=_collect,
     parts=(
         Job(name="tuning", title="Settings by runs", do=_tuning),

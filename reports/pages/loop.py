@@ -47,16 +47,14 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": FOUND, "label": "the calibrated law"},
     "paper": {**AS_PAPER, "label": "the paper’s law"},
 }
-_REST: Final = 0.6
-"""Fraction of a run up to which its injections are drawn apart from the rest of it."""
-_LETTERED: Final = 14
-"""Most injections that are lettered."""
-_FRAMES: Final = 7
-"""Rings side by side at the most."""
+_EARLY_FRACTION: Final = 0.6
+"""Fraction of a run up to which its injections have an axis apart from the rest of the run."""
+_MAX_LETTERED: Final = 14
+_MAX_FRAMES: Final = 7
 
 
 def _reach(work: Work) -> Record:
-    """What a pair cancels at the most, as a vibration; where the first pair's lies, by the sensor's phase."""
+    """Largest vibration, m, that a pair cancels, and the first pair's direction by the sensor's phase."""
     scene, moment = work.ring, float(work.calibration.answers.usable_moment)
     return {
         "pairs": scene.disc.chambers // 2,
@@ -65,10 +63,10 @@ def _reach(work: Work) -> Record:
     }
 
 
-def _loop(own: Record, evidence: Record) -> Record:
-    ran, limit = evidence["closed_loop"], evidence["limit_m"]
+def _loop(reach: Record, evidence: Record) -> Record:
+    loops, limit = evidence["closed_loop"], evidence["limit_m"]
     # The paper's law is compared on the paper's own disc alone.
-    runs = {law: ran[law] for law in _LAWS if law in ran and (law != "paper" or is_papers(evidence))}
+    runs = {law: loops[law] for law in _LAWS if law in loops and (law != "paper" or is_papers(evidence))}
     run, disc = runs.get("calibrated"), (evidence.get("operation") or {}).get("disc")
     judged_settings = evidence.get("summary") or {}
     settled = [
@@ -81,13 +79,13 @@ def _loop(own: Record, evidence: Record) -> Record:
         "amplitude": _amplitude(runs, limit) if runs else None,
         "rings": _rings(run, disc) if run and disc else None,
         "laws": list(runs),
-        "polar": residual_polar(run, own) if run and own else None,
+        "polar": residual_polar(run, reach) if run and reach else None,
         "settling": settling(settled, best["asked"]) if best else None,
     }
 
 
 def _injections_until(run: Record) -> float:
-    """End of the last injection, s; of the run where there is none."""
+    """End of the last injection, s; without injections the end of the run."""
     ends = [item["time_s"] + item["duration_s"] for item in run["injections"]]
     return float(max(ends, default=run["time_s"][-1]))
 
@@ -100,13 +98,13 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
     end = max(float(run["time_s"][-1]) for run in runs.values())
     early = 1.15 * max(map(_injections_until, runs.values()))
     parts = {(0.0, end): (0.09, 0.15, 0.89, 0.68)}
-    if 0 < early < _REST * end:
+    if 0 < early < _EARLY_FRACTION * end:
         parts = {(0.0, early): (0.09, 0.15, 0.6, 0.68), (early, end): (0.72, 0.15, 0.26, 0.68)}
     curves = [(run["time_s"], 1e6 * np.asarray(run["amplitude_m"]), _LAWS[law]) for law, run in runs.items()]
 
     def paint(axes: Axes) -> None:
-        first, *others = drawn = panels(axes, *parts.values())
-        for panel, span in zip(drawn, parts, strict=True):
+        first, *others = axes_of_parts = panels(axes, *parts.values())
+        for panel, span in zip(axes_of_parts, parts, strict=True):
             amplitudes(curves, 1e6 * limit)(panel)
             panel.set(xlim=span, xlabel="time in s")
             panel.xaxis.set_major_formatter(FuncFormatter(plain_number))
@@ -118,7 +116,7 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
             # For the time that a chamber keeps its valve open.
             first.plot((start, last), (1.0, 1.0), color=INK, linewidth=3, transform=across, clip_on=False)
             first.axvline(start, color=MUTED, linewidth=0.5, alpha=0.6)
-            if len(groups) <= _LETTERED:
+            if len(groups) <= _MAX_LETTERED:
                 first.text(start, 1.02, "".join(letters), ha="center", va="bottom", transform=across)
         for look in (*(_LAWS[law] for law in runs), {"color": MUTED, "linestyle": ":", "label": "limit"}):
             axes.plot([], [], **look)
@@ -127,7 +125,7 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
 
 
 def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str]]]:
-    """When valves open together, when the last of them closes, s, and their chambers."""
+    """Groups of valves that open together: time, s, time when the last of them closes, and chambers."""
     groups = [list(items) for _, items in groupby(injections, key=lambda item: item["time_s"])]
     return [
         (
@@ -148,7 +146,7 @@ def _frames_of(run: Record) -> list[tuple[str, float]]:
         (f"{series(letters)}, {shown(start, 's', digits=2)}", min(rest, last))
         for (start, _, letters), rest in zip(groups, rests, strict=False)
     ]
-    return [("start", 0.0), *after[: _FRAMES - 2], ("end", last)]
+    return [("start", 0.0), *after[: _MAX_FRAMES - 2], ("end", last)]
 
 
 def _rings(run: Record, disc: Record) -> Drawing:
@@ -156,38 +154,34 @@ def _rings(run: Record, disc: Record) -> Drawing:
     with its liquid, drawn as a sector between the radii that its fill takes."""
     frames = _frames_of(run)
     width = 1 / len(frames)
+    outer, inner, half = disc["outer_radius_m"], disc["inner_radius_m"], 180 / disc["chambers"]
 
     def at(time: float, values: Sequence[float]) -> float:
         return float(np.interp(time, run["time_s"], values))
 
     def paint(axes: Axes) -> None:
-        boxes = [(place * width + 0.004, 0.0, width - 0.008, 0.76) for place in range(len(frames))]
+        boxes = [(index * width + 0.004, 0.0, width - 0.008, 0.76) for index in range(len(frames))]
         for panel, (title, time) in zip(panels(axes, *boxes), frames, strict=True):
-            _ring(panel, {letter: at(time, fills) for letter, fills in run["fill_ratio"].items()}, disc)
+            for index, (letter, fills) in enumerate(run["fill_ratio"].items()):
+                ends = ((2 * index - 1) * half, (2 * index + 1) * half)
+                depth = outer - math.sqrt(outer**2 - at(time, fills) * (outer**2 - inner**2))
+                for thick, colour in ((outer - inner, SURFACE), (depth, MAP[8])):
+                    panel.add_patch(Wedge((0, 0), outer, *ends, width=thick, facecolor=colour, edgecolor=INK))
+                point = 0.55 * inner * np.exp(1j * math.radians(2 * half * index))
+                look: Record = {"ha": "center", "va": "center", "color": MUTED, "fontsize": "small"}
+                panel.text(point.real, point.imag, letter, **look)
+            panel.set(xlim=(-1.05 * outer, 1.05 * outer), ylim=(-1.05 * outer, 1.05 * outer), aspect="equal")
+            panel.set_axis_off()
             left = shown(at(time, run["amplitude_m"]), "m", digits=2)
             panel.set_title(f"{title}\n{left}", color=INK, fontsize="small")
 
     return draw("ring-frames", paint, columns=0, wide=True, height=1.15 + 6.6 / max(len(frames), 4) * 0.9)
 
 
-def _ring(panel: Axes, fills: dict[str, float], disc: Record) -> None:
-    outer, inner, half = disc["outer_radius_m"], disc["inner_radius_m"], 180 / disc["chambers"]
-    for place, (letter, fill) in enumerate(fills.items()):
-        ends = ((2 * place - 1) * half, (2 * place + 1) * half)
-        depth = outer - math.sqrt(outer**2 - fill * (outer**2 - inner**2))
-        for thick, colour in ((outer - inner, SURFACE), (depth, MAP[8])):
-            panel.add_patch(Wedge((0, 0), outer, *ends, width=thick, facecolor=colour, edgecolor=INK))
-        at = 0.55 * inner * np.exp(1j * math.radians(2 * half * place))
-        panel.text(at.real, at.imag, letter, ha="center", va="center", color=MUTED, fontsize="small")
-    panel.set(xlim=(-1.05 * outer, 1.05 * outer), ylim=(-1.05 * outer, 1.05 * outer), aspect="equal")
-    panel.set_axis_off()
-
-
-def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> Drawing | None:
+def settling(curves: Sequence[tuple[dict[str, Any], Record]], required_fraction: float) -> Drawing | None:
     """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles.
 
-    Args: `curves`: looks, and times, fractions and bounds as in the evidence. `asked`: share of the
-        devices that a scene asks to settle.
+    Args: `curves`: looks, and times, fractions and bounds as in the evidence.
     """
     if not any(each["time_s"] for _, each in curves):
         return None
@@ -197,7 +191,7 @@ def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> D
             time, value, low, high = (np.array(each[key]) for key in ("time_s", "value", "low", "high"))
             axes.step(time, value, where="post", **look)
             axes.fill_between(time, low, high, step="post", color=look["color"], alpha=0.2, linewidth=0)
-        axes.axhline(asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
+        axes.axhline(required_fraction, color=MUTED, linewidth=1, linestyle=":", label="asked")
         axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
 
     look: Record = {"x": TIME, "y": ("settled devices in %", "1"), "xlim": (0, None), "ylim": (0, 1.05)}
@@ -205,7 +199,7 @@ def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> D
 
 
 LOOP: Final = Section(
-    name="loop", title="Loop and tuning", place="report", collect=_reach, show=_loop, always=True
+    name="loop", title="Loop and tuning", document="report", collect=_reach, show=_loop, always=True
 )
 
 
@@ -219,8 +213,7 @@ INJECTIONS: Final = Section(
 )
 
 
-_SMALL_FILL: Final = 1e-3
-"""Change of fill over which a loop counts as linear."""
+_LINEAR_FILL_CHANGE: Final = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,9 +245,9 @@ def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
     u = float(flow.velocity)
     if u <= 0 or pressure <= 0:
         return None
-    ends = np.array([x - _SMALL_FILL, x + _SMALL_FILL])
+    ends = np.array([x - _LINEAR_FILL_CHANGE, x + _LINEAR_FILL_CHANGE])
     moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
-    per_fill = float(abs(moments[1] - moments[0])) / (2 * _SMALL_FILL)
+    per_fill = float(abs(moments[1] - moments[0])) / (2 * _LINEAR_FILL_CHANGE)
     slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
     return _LoopGain(
         law=model.name,
@@ -267,7 +260,7 @@ def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
 
 
 def _consequences(work: Work) -> Record:
-    """The paper's law over the devices on which the summary judges the calibrated one."""
+    """Gains of both laws, and the paper's law judged on the devices of the calibrated one in the summary."""
     gains = [_loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
     paper = judged(balancer_of(work.ring, flow_law="paper"), {})
     return {
@@ -276,10 +269,9 @@ def _consequences(work: Work) -> Record:
     }
 
 
-def _where_judged(_own: Record, evidence: Record) -> Record | None:
-    return {} if (evidence.get("summary") or {}).get("own") else None
-
-
 CONSEQUENCES: Final = Section(
-    name="consequences", title="What a wrong k costs", collect=_consequences, show=_where_judged
+    name="consequences",
+    title="What a wrong k costs",
+    collect=_consequences,
+    show=lambda _own, evidence: {} if (evidence.get("summary") or {}).get("own") else None,
 )

@@ -1,8 +1,9 @@
-"""Measurements and fit: data against fit, and of a fitted scene what was known before and after."""
+"""Measurements and fit: data against fit, and the findings of a fitted scene."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,7 +15,6 @@ from ringbalance.reports.figure import (
     MUTED,
     SURFACE,
     Drawing,
-    Paint,
     curve,
     draw,
     line,
@@ -27,14 +27,14 @@ from ringbalance.scene.units import unit_factor
 
 
 def _show(_own: Record, evidence: Record) -> Record | None:
-    found = evidence["scene"].get("measured")
-    if not found:
+    measured = evidence["scene"].get("measured")
+    if not measured:
         return None
     sentences = []
-    for finding in found["findings"]:
+    for finding in measured["findings"]:
         text = finding["text"]
-        for each in found["quantities"]:
-            # Usual names in place of keys that are no words.
+        for each in measured["quantities"]:
+            # Names in place of keys.
             if "_" in each["quantity"]:
                 text = text.replace(each["quantity"], usual_name(each["quantity"]))
         sentences.append(f"{opening(text)}.".replace(" -", " \N{MINUS SIGN}"))
@@ -57,58 +57,56 @@ _NAMES: Final = {
 _SIGNS: Final = {"g*mm": "g mm", "ml/s": "ml/s", "um": "µm", "deg": "°"}
 _PARTS: Final = ("real part", "imaginary part")
 _MARGIN: Final = 0.08
-"""Of the range of values, beside the outermost."""
+"""Room beside the outermost values, over their range."""
 
 
-def fit_figures(found: Sequence[AgainstFit]) -> list[Drawing]:
+def fit_figures(comparisons: Sequence[AgainstFit]) -> list[Drawing]:
     """Measured over fitted values with their 95 % intervals, and the line on which both are equal."""
-    return [_against(each, place) for place, each in enumerate(found)]
+    drawings = []
+    for index, data in enumerate(comparisons):
+        factor = unit_factor(data.unit) if data.unit else 1.0
+        unit = _SIGNS.get(data.unit, data.unit) or "1"
+        pairs = ((data.measured, data.measured_uncertainty), (data.fitted, data.fitted_uncertainty))
+        least = min(float(np.min(value - width)) for value, width in pairs) / factor
+        most = max(float(np.max(value + width)) for value, width in pairs) / factor
+        ends = least - _MARGIN * (most - least), most + _MARGIN * (most - least)
+        drawing = draw(
+            f"fit-{data.kind.replace('_', '-')}-{index}",
+            curve(ends, ends, "fitted = measured", color=MUTED, linewidth=1),
+            partial(_readings, data, factor),
+            partial(_slope, data, ends),
+            x=(f"{_NAMES.get(data.kind, data.kind)}, fitted", unit),
+            y=("measured", unit),
+            height=3.6,
+        )
+        drawings.append(drawing)
+    return drawings
 
 
-def _against(found: AgainstFit, place: int) -> Drawing:
-    factor = unit_factor(found.unit) if found.unit else 1.0
-    unit = _SIGNS.get(found.unit, found.unit) or "1"
-    pairs = ((found.measured, found.measured_uncertainty), (found.fitted, found.fitted_uncertainty))
-    least = min(float(np.min(value - width)) for value, width in pairs) / factor
-    most = max(float(np.max(value + width)) for value, width in pairs) / factor
-    low, high = least - _MARGIN * (most - least), most + _MARGIN * (most - least)
-    slope, width, told = found.slope, found.slope_uncertainty, "undefined"
-    if slope is not None and width is not None:
-        told = f"{rounded(slope, width)} ± {rounded(width, width)}"
-
-    def ends(axes: Axes) -> None:
-        axes.set(xlim=(low, high), ylim=(low, high))
-        axes.set_yticks([tick for tick in axes.get_xticks() if low <= tick <= high])
-        axes.annotate(
-            f"slope {told}",
-            (0.97, 0.05),
-            xycoords="axes fraction",
-            ha="right",
-            color=INK,
-            bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 1.5},
+def _readings(data: AgainstFit, factor: float, axes: Axes) -> None:
+    """Each component of the readings, with bars both ways."""
+    vibration = bool(np.any(data.component))
+    for part in np.unique(data.component).tolist():
+        mask = data.component == part
+        axes.errorbar(
+            data.fitted[mask] / factor,
+            data.measured[mask] / factor,
+            xerr=data.fitted_uncertainty[mask] / factor,
+            yerr=data.measured_uncertainty[mask] / factor,
+            **line(part, size=3.2),
+            linestyle="none",
+            elinewidth=0.8,
+            label=_PARTS[part] if vibration else "readings",
         )
 
-    return draw(
-        f"fit-{found.kind.replace('_', '-')}-{place}",
-        curve((low, high), (low, high), "fitted = measured", color=MUTED, linewidth=1),
-        *(_points(found, part, factor) for part in np.unique(found.component).tolist()),
-        ends,
-        x=(f"{_NAMES.get(found.kind, found.kind)}, fitted", unit),
-        y=("measured", unit),
-        height=3.6,
-    )
 
-
-def _points(found: AgainstFit, part: int, factor: float) -> Paint:
-    """One component of the numbers, with bars both ways."""
-    mine, vibration = found.component == part, bool(np.any(found.component))
-    return lambda axes: axes.errorbar(
-        found.fitted[mine] / factor,
-        found.measured[mine] / factor,
-        xerr=found.fitted_uncertainty[mine] / factor,
-        yerr=found.measured_uncertainty[mine] / factor,
-        **line(part, size=3.2),
-        linestyle="none",
-        elinewidth=0.8,
-        label=_PARTS[part] if vibration else "readings",
-    )
+def _slope(data: AgainstFit, ends: tuple[float, float], axes: Axes) -> None:
+    """Equal limits and ticks on both axes, and the slope of measured over fitted values."""
+    axes.set(xlim=ends, ylim=ends)
+    axes.set_yticks([tick for tick in axes.get_xticks() if ends[0] <= tick <= ends[1]])
+    slope, width, text = data.slope, data.slope_uncertainty, "undefined"
+    if slope is not None and width is not None:
+        text = f"{rounded(slope, width)} ± {rounded(width, width)}"
+    ground = {"facecolor": SURFACE, "edgecolor": "none", "pad": 1.5}
+    look: Record = {"xycoords": "axes fraction", "ha": "right", "color": INK, "bbox": ground}
+    axes.annotate(f"slope {text}", (0.97, 0.05), **look)

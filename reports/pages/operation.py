@@ -1,4 +1,4 @@
-"""Where the disc works: the operating map and the dimensioned section."""
+"""The operating map and the dimensioned section of the disc."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ringbalance.reports.figure import (
     PAPER,
     SURFACE,
     THIRD,
-    WIDE,
+    WIDE_IN,
     Drawing,
     curve,
     draw,
@@ -35,19 +35,15 @@ from ringbalance.reports.figure import (
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import number
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.models import Scene
 from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import RestsOn
 
 _FILLS: Final = 101
 _PRESSURES: Final = 121
-_HIGHEST: Final = 1.5
+_TOP_FACTOR: Final = 1.5
 """Top of the map over the scene's gas pressure, or over the priming pressure where that is higher."""
-_STEP: Final = math.radians(3)
-"""Between the points of an arc."""
-_PLACES: Final = 7
-"""Of an outline, m."""
+_ARC_STEP_RAD: Final = math.radians(3)
+_OUTLINE_DECIMALS_M: Final = 7
 _SPILLING: Final = "spilling"
 _NAMES: Final = (*(regime.label for regime in Regime), _SPILLING)
 _SHADES: Final = {
@@ -65,25 +61,24 @@ _HATCHED: Final[dict[str, Any]] = {
     "linewidth": 0.8,
 }
 _CREST: Final = "tube.hump_radius"
-_SMOOTHED: Final = 1.0
-"""Standard deviation, in points of the map, over which its borders are smoothed."""
-_CLEARANCE: Final = 2.2
-"""Cells between a regime's name and the edge of its area, at the least."""
-_LINE: Final = 0.035
-"""Of the map's height on either side of the working range, which its regimes' names keep clear of."""
-_MILLIMETRES: Final = 1e3
-_HEIGHT: Final = 4.1
-_REACH: Final = 1.42
+_SMOOTHING_SIGMA_POINTS: Final = 1.0
+"""Standard deviation over which the map's borders are smoothed."""
+_NAME_CLEARANCE_POINTS: Final = 2.2
+"""Least distance of a regime's name from the edge of its area."""
+_WORKING_RANGE_CLEARANCE: Final = 0.035
+"""Least distance of regimes' names from the working range, over the map's height."""
+_MM_PER_M: Final = 1e3
+_HEIGHT_IN: Final = 4.1
+_PICTURE_HALF: Final = 1.42
 """Half the height of the picture over the outer radius: room for the dimensions."""
-_AXIS: Final = (0, (6, 2, 1, 2))
-"""Dashes of a line through a middle."""
+_CENTRE_LINE_DASHES: Final = (0, (6, 2, 1, 2))
 _TUBE: Final[dict[str, Any]] = {"color": PAPER, "linewidth": 2.0}
 
 
 def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.ArrayLike) -> IntArray:
-    """Numbers of `_NAMES` for an unprimed tube.
+    """Regimes of an unprimed tube, as numbers of `_NAMES`.
 
-    Spilling: a separated column that has not carried the gas off the crest and so does not prime the tube.
+    Spilling: a separated column that leaves gas over the crest and so does not prime the tube.
     """
     flow = law.evaluate(fill_ratio=fill, gas_pressure=pressure)
     ends = law.ends(fill_ratio=fill, gas_pressure=pressure)
@@ -94,113 +89,99 @@ def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.
 
 def _collect(work: Work) -> Record:
     scene, calibration = work.ring, work.calibration
-    law, answers, half = calibration.flow_law, calibration.answers, scene.disc.max_fill_ratio / 2
-    top = _HIGHEST * np.nanmax([scene.gas.pressure, float(answers.priming_pressure_vented)])
+    disc, tube, law, answers = scene.disc, scene.tube, calibration.flow_law, calibration.answers
+    half = disc.max_fill_ratio / 2
+    top = _TOP_FACTOR * np.nanmax([scene.gas.pressure, float(answers.priming_pressure_vented)])
     fill, pressure = np.linspace(0, law.max_fill_ratio, _FILLS), np.linspace(0, top, _PRESSURES)
-    at = int(_regimes(law, half, scene.gas.pressure))
+    at_point = int(_regimes(law, half, scene.gas.pressure))
+    # Range of the siphon crest's radius, assumed or stated, and the gas pressures that lift the liquid over
+    # both of its ends.
+    crest, ends, radius = None, None, tube.hump_radius
+    (assumed,) = assumptions_of((RestsOn(path=_CREST, documented=True, why="see there"),), scene) or (None,)
+    width = next((each for each in scene.uncertainty if _CREST.endswith(each.quantity)), None)
+    if assumed is not None:
+        ends = [assumed.low, assumed.high]
+    elif width is not None and radius is not None:
+        ends = [radius - width.absolute(radius), radius + width.absolute(radius)]
+    if ends is not None:
+        surface = surface_radius(disc=disc, fill_ratio=fill)
+        head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / law.gas_factor
+        lifting = [np.maximum(head * (surface**2 - end**2), 0.0).tolist() for end in ends]
+        crest = {"radius_m": ends, "lifting_pressure_Pa": lifting}
+    # Sections through the middle of an imported chamber, across the shaft, (x, y), and along it, (x, z).
+    sections = (
+        {}
+        if disc.geometry is None
+        else {
+            name: [
+                np.round(loop, _OUTLINE_DECIMALS_M).tolist() for loop in outlines(disc.geometry, axis=axis)
+            ]
+            for name, axis in (("across_m", 2), ("along_m", 1))
+        }
+    )
     return {
         "fill_ratio": fill.tolist(),
         "gas_pressure_Pa": pressure.tolist(),
         "regimes": list(_NAMES),
         "regime": ["".join(map(str, row)) for row in _regimes(law, fill[None, :], pressure[:, None])],
-        "point": {
-            "fill_ratio": half,
-            "gas_pressure_Pa": scene.gas.pressure,
-            "regime": _NAMES[at],
-        },
-        "crest": _crest(work, fill),
+        "point": {"fill_ratio": half, "gas_pressure_Pa": scene.gas.pressure, "regime": _NAMES[at_point]},
+        "crest": crest,
         "working_fill_ratio": [float(answers.residual_fill_ratio), float(answers.largest_fill_ratio)],
-        "disc": _disc(work),
+        "disc": {
+            **({"outlines": sections} if sections else {}),
+            "chambers": disc.chambers,
+            "central_angle_rad": disc.central_angle,
+            "outer_radius_m": disc.outer_radius,
+            "inner_radius_m": disc.inner_radius,
+            "axial_width_m": disc.axial_width,
+            "plate_thickness_m": disc.plate_thickness,
+            "fill_ratio": disc.initial_fill,
+            "port_radius_m": tube.port_radius,
+            "crest_radius_m": tube.hump_radius,
+            "bore_m": tube.bore,
+            "length_m": tube.length,
+            "origins": {key: scene.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
+        },
     }
 
 
-def _crest(work: Work, fill: FloatArray) -> Record | None:
-    """Range of the siphon crest's radius, assumed or stated, and the gas pressure that lifts the liquid of
-    each fill over either end of it; None without a crest, or where it is known.
-    """
-    scene, calibration = work.ring, work.calibration
-    ends = _crest_range(scene)
-    if ends is None:
-        return None
-    surface = surface_radius(disc=scene.disc, fill_ratio=fill)
-    head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / calibration.flow_law.gas_factor
-    return {
-        "radius_m": list(ends),
-        "lifting_pressure_Pa": [np.maximum(head * (surface**2 - end**2), 0.0).tolist() for end in ends],
-    }
-
-
-def _crest_range(scene: Scene) -> tuple[float, float] | None:
-    (assumed,) = assumptions_of((RestsOn(path=_CREST, documented=True, why="see there"),), scene) or (None,)
-    if assumed is not None:
-        return assumed.low, assumed.high
-    width = next((each for each in scene.uncertainty if _CREST.endswith(each.quantity)), None)
-    if width is None or scene.tube.hump_radius is None:
-        return None
-    half = width.absolute(scene.tube.hump_radius)
-    return scene.tube.hump_radius - half, scene.tube.hump_radius + half
-
-
-def _disc(work: Work) -> Record:
-    """The disc's dimensions and first fill; of an imported chamber its sections too."""
-    disc, tube = work.ring.disc, work.ring.tube
-    imported = {} if disc.geometry is None else {"outlines": _outlines(disc.geometry)}
-    return imported | {
-        "chambers": disc.chambers,
-        "central_angle_rad": disc.central_angle,
-        "outer_radius_m": disc.outer_radius,
-        "inner_radius_m": disc.inner_radius,
-        "axial_width_m": disc.axial_width,
-        "plate_thickness_m": disc.plate_thickness,
-        "fill_ratio": disc.initial_fill,
-        "port_radius_m": tube.port_radius,
-        "crest_radius_m": tube.hump_radius,
-        "bore_m": tube.bore,
-        "length_m": tube.length,
-        "origins": {key: work.ring.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
-    }
-
-
-def _outlines(geometry: ChamberGeometry) -> Record:
-    """Sections through the middle of a chamber, across the shaft, (x, y), and along it, (x, z), m."""
-    return {
-        name: [np.round(loop, _PLACES).tolist() for loop in outlines(geometry, axis=axis)]
-        for name, axis in (("across_m", 2), ("along_m", 1))
-    }
-
-
-def _view(found: Record, evidence: Record) -> Record:
-    chamber, disc = evidence["calibration"]["chamber"], found["disc"]
+def _view(record: Record, evidence: Record) -> Record:
+    chamber, disc = evidence["calibration"]["chamber"], record["disc"]
     surface = np.interp(disc["fill_ratio"], chamber["fill_ratio"], chamber["free_surface_radius_m"])
     disc = {**disc, "free_surface_radius_m": float(surface)}
-    return {"map": _operating_map(found), "disc": _disc_section(disc)}
+    return {"map": _operating_map(record), "disc": _disc_section(disc)}
 
 
-def _operating_map(found: Record) -> Drawing:
+def _operating_map(record: Record) -> Drawing:
     """Regime of the unprimed tube over the driven chamber's fill and the gas pressure.
 
-    Args: `found`: axes, names and numbers of the regimes, the operating point and the fills that the scene's
-        gas works between.
+    Args: `record`: axes, names and numbers of the regimes, the operating point and the working fills.
     """
-    fill, pressure = np.asarray(found["fill_ratio"]), np.asarray(found["gas_pressure_Pa"])
-    regime = np.array([[int(sign) for sign in row] for row in found["regime"]])
-    point, gas = found["point"], found["point"]["gas_pressure_Pa"]
+    fill, pressure = np.asarray(record["fill_ratio"]), np.asarray(record["gas_pressure_Pa"])
+    regime = np.array([[int(sign) for sign in row] for row in record["regime"]])
+    point, gas = record["point"], record["point"]["gas_pressure_Pa"]
 
     def areas(axes: Axes) -> None:
-        for index, name in enumerate(found["regimes"]):
+        for index, name in enumerate(record["regimes"]):
             colour, strength = _SHADES[name]
-            there = regime == index
-            if not there.all() and there.any():
-                smooth = gaussian_filter(there.astype(float), _SMOOTHED)
+            area = regime == index
+            if not area.all() and area.any():
+                smooth = gaussian_filter(area.astype(float), _SMOOTHING_SIGMA_POINTS)
                 axes.contourf(fill, pressure, smooth, levels=[0.5, 1.5], colors=[colour], alpha=strength)
                 axes.contour(fill, pressure, smooth, levels=[0.5], colors=[MUTED], linewidths=0.7)
-        near = np.abs(pressure - gas)[:, None] < _LINE * (pressure[-1] - pressure[0])
-        _name_areas(axes, fill, pressure, np.where(near, -1, regime), found["regimes"])
+        near = np.abs(pressure - gas)[:, None] < _WORKING_RANGE_CLEARANCE * (pressure[-1] - pressure[0])
+        for index, name in enumerate(record["regimes"]):
+            # Each name at the point of its area that is farthest from the edges.
+            room = distance_transform_edt(np.pad((regime == index) & ~near, 1))[1:-1, 1:-1]
+            row, column = np.unravel_index(np.argmax(room), room.shape)
+            if room[row, column] >= _NAME_CLEARANCE_POINTS:
+                look: dict[str, Any] = {"ha": "center", "va": "center", "color": INK, "weight": "bold"}
+                axes.text(fill[column], pressure[row], name, **look)
         axes.grid(visible=False)
 
     def crest(axes: Axes) -> None:
-        if found.get("crest"):
-            low, high = found["crest"]["lifting_pressure_Pa"]
+        if record.get("crest"):
+            low, high = record["crest"]["lifting_pressure_Pa"]
             axes.fill_between(fill, high, low, label="start of the flow, crest in its range", **_HATCHED)
 
     working: dict[str, Any] = {"color": INK, "marker": "|", "linewidth": 2, "markersize": 9}
@@ -208,7 +189,7 @@ def _operating_map(found: Record) -> Drawing:
         "operating-map",
         areas,
         crest,
-        curve(found["working_fill_ratio"], [gas, gas], "working range", **working),
+        curve(record["working_fill_ratio"], [gas, gas], "working range", **working),
         curve(
             [point["fill_ratio"]], [gas], "operating point", color=INK, linestyle="", marker="o", markersize=6
         ),
@@ -222,61 +203,109 @@ def _operating_map(found: Record) -> Drawing:
     )
 
 
-def _name_areas(axes: Axes, fill: FloatArray, pressure: FloatArray, regime: Any, names: list[str]) -> None:
-    """Each regime's name at the place in its area that is farthest from the edges."""
-    for index, name in enumerate(names):
-        room = distance_transform_edt(np.pad(regime == index, 1))[1:-1, 1:-1]
-        row, column = np.unravel_index(np.argmax(room), room.shape)
-        if room[row, column] >= _CLEARANCE:
-            axes.text(fill[column], pressure[row], name, ha="center", va="center", color=INK, weight="bold")
+def _across(panel: Axes, disc: Record, size: dict[str, float]) -> None:
+    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
+    angle, count, (loops, _) = disc["central_angle_rad"] / 2, disc["chambers"], _closed_lines(disc, size)
+    panel.add_patch(Circle((0, 0), outer, facecolor=MAP[3], edgecolor=INK, linewidth=1))
+    ring = _area([_arc(1.1 * outer, 0, 2 * math.pi), _arc(surface, 0, 2 * math.pi)])
+    for index, middle in enumerate(2 * math.pi * np.arange(count) / count):
+        turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
+        _filled(panel, _area([loop @ turn for loop in loops]), ring)
+        x, y = _polar(_letter_radius(size), middle + 0.62 * angle)
+        panel.text(x, y, chr(ord("A") + index), ha="center", va="center", weight="bold")
+    panel.plot(0, 0, "+", color=INK, markersize=9)
+    _tube(panel, size)
+    for name, radius, turned in (("R₂", outer, -0.5), ("R₁", inner, -2.1), ("R₁′", surface, -2.62)):
+        _line(panel, (0, 0), _polar(radius, turned), "-|>")
+        text = f"{name} {number(radius, digits=4)}"
+        _note(panel, text, _polar(radius, turned), _polar(1.3 * outer, turned))
+    low, high = (_polar(1.1 * outer, side) for side in (-angle, angle))
+    _line(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(angle / 2):.3f}")
+    for x, y in (_polar(1.14 * outer, side) for side in (-angle, angle)):
+        panel.plot([0, x], [0, y], color=MUTED, linewidth=0.7, linestyle=_CENTRE_LINE_DASHES)
+    panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(2 * angle), digits=3)}°")
+    if "outlines" not in disc:
+        strip = size["plate_thickness"]
+        wall = _polar(0.9 * outer, angle - strip / outer / 2)
+        text = f"t {number(strip, digits=3)} each side"
+        _note(panel, text, wall, (0.72 * outer, 1.25 * outer), ha="left")
 
 
-def _disc_section(found: Record) -> Drawing:
+def _along(panel: Axes, disc: Record, size: dict[str, float]) -> None:
+    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
+    _, loops = _closed_lines(disc, size)
+    half, port, crest = (
+        size["axial_width"] / 2,
+        0.985 * size["port_radius"],
+        size.get("crest_radius", 0.0),
+    )
+    wall = half + 0.06 * outer
+    for sign in (-1, 1):
+        corners = 1.1 * half * np.array([[-1, 0], [1, 0], [1, 0], [-1, 0]])
+        heights = sign * np.array([surface, surface, 1.1 * outer, 1.1 * outer])
+        liquid = Path(np.vstack([corners + np.outer(heights, (0, 1)), corners[:1]]), closed=True)
+        _filled(panel, _area([loop * (1, sign) for loop in loops]), liquid)
+    panel.plot([half, wall, wall, wall, half], [port, port, crest, -port, -port], **_TUBE)
+    shaft: Record = {"color": MUTED, "linewidth": 0.8, "linestyle": _CENTRE_LINE_DASHES}
+    panel.plot([-1.35 * half, 1.5 * half], [0, 0], **shaft)
+    level = -1.14 * outer
+    _line(panel, (-half, level), (half, level), "<->")
+    panel.plot([[-half, half]] * 2, [[0.9 * level] * 2, [1.04 * level] * 2], color=MUTED, linewidth=0.7)
+    panel.text(0, 1.03 * level, f"B {number(2 * half, digits=4)}", ha="center", va="top")
+    gas, text = 0.5 * (inner + surface), "valve side:\ngas line"
+    _line(panel, (-half - 0.35 * outer, gas), (-half, gas), "-|>", color=THIRD, linewidth=1.4)
+    panel.text(-half - 0.1 * outer, 0.62 * (inner + outer), text, ha="right", va="center")
+    panel.text(wall + 0.06 * outer, 0.72 * outer, "tube", color=PAPER, va="center")
+    panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
+    # Beside the middle, where a gas tube may stand.
+    panel.text(-half / 2, gas, "gas", ha="center", va="center")
+    panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=MUTED)
+
+
+def _disc_section(disc: Record) -> Drawing:
     """Section of the disc with its dimensions.
 
-    Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn and, of an
-        imported chamber, its sections under "outlines".
+    Args: `disc`: lengths in m, angles in rad, the fill that is drawn and, for an imported chamber, its
+        sections under "outlines".
     """
     size = {
-        key.removesuffix("_m"): value * _MILLIMETRES
-        for key, value in found.items()
+        key.removesuffix("_m"): value * _MM_PER_M
+        for key, value in disc.items()
         if key.endswith("_m") and value is not None
     }
-    reach = _REACH * size["outer_radius"]
 
     def paint(axes: Axes) -> None:
-        across, along = panels(axes, (0.0, 0.0, 0.56, 1), (0.57, 0.0, 0.43, 1))
-        for panel, width in ((across, 0.56), (along, 0.43)):
-            half = reach * width * WIDE / _HEIGHT
+        left, right = panels(axes, (0.0, 0.0, 0.56, 1), (0.57, 0.0, 0.43, 1))
+        reach = _PICTURE_HALF * size["outer_radius"]
+        for panel, width in ((left, 0.56), (right, 0.43)):
+            half = reach * width * WIDE_IN / _HEIGHT_IN
             panel.set(xlim=(-half, half), ylim=(-reach, reach), aspect="equal")
             panel.set_axis_off()
-        _across(across, found, size)
-        _along(along, found, size)
+        _across(left, disc, size)
+        _along(right, disc, size)
 
-    return draw("disc-section", paint, columns=0, wide=True, height=_HEIGHT)
+    return draw("disc-section", paint, columns=0, wide=True, height=_HEIGHT_IN)
 
 
 def _arc(radius: float, start: float, end: float) -> FloatArray:
-    angle = np.linspace(start, end, 2 + round(abs(end - start) / _STEP))
+    angle = np.linspace(start, end, 2 + round(abs(end - start) / _ARC_STEP_RAD))
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def _closed_lines(found: Record, size: dict[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Closed lines around the first chamber's space across the shaft, (x, y), and along it, (z, x)."""
-    if drawn := found.get("outlines"):
-        across, along = (
-            [np.array(loop) * _MILLIMETRES for loop in drawn[plane]] for plane in ("across_m", "along_m")
-        )
-        return across, [loop[:, ::-1] for loop in along]
+def _closed_lines(disc: Record, size: dict[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Closed lines around the first chamber's space across the shaft, (x, y), and along it, (z, x), mm."""
+    if sections := disc.get("outlines"):
+        across = [np.array(loop) * _MM_PER_M for loop in sections["across_m"]]
+        return across, [np.array(loop)[:, ::-1] * _MM_PER_M for loop in sections["along_m"]]
     inner, outer, half = size["inner_radius"], size["outer_radius"], size["axial_width"] / 2
     strip = size["plate_thickness"]
-    low, high = (found["central_angle_rad"] / 2 - math.asin(min(strip / r, 1.0)) for r in (inner, outer))
+    low, high = (disc["central_angle_rad"] / 2 - math.asin(min(strip / r, 1.0)) for r in (inner, outer))
     sector = np.vstack([_arc(outer, -high, high), _arc(inner, low, -low)])
     return [sector], [np.array([[-half, inner], [half, inner], [half, outer], [-half, outer]])]
 
 
 def _area(loops: Sequence[FloatArray]) -> Path:
-    """What lies within the outermost lines and outside those within them."""
+    """Area within the outermost lines and outside those within them."""
     parts = []
     for loop in loops:
         within = sum(Path(other).contains_point(loop[0]) for other in loops if other is not loop)
@@ -288,7 +317,7 @@ def _area(loops: Sequence[FloatArray]) -> Path:
 
 
 def _filled(panel: Axes, area: Path, liquid: Path) -> None:
-    """A chamber's gas, and its liquid with the surface where the place is one of `liquid`."""
+    """A chamber's gas, and its liquid with the surface: the part of the chamber within `liquid`."""
     edge: dict[str, Any] = {"edgecolor": INK, "linewidth": 0.6}
     panel.add_patch(PathPatch(area, facecolor=SURFACE, **edge))
     panel.add_patch(PathPatch(area, facecolor=MAP[7], **edge)).set_clip_path(liquid, panel.transData)
@@ -296,46 +325,19 @@ def _filled(panel: Axes, area: Path, liquid: Path) -> None:
     panel.add_patch(PathPatch(area, facecolor="none", **edge))
 
 
-def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
-    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
-    half, count = found["central_angle_rad"] / 2, found["chambers"]
-    panel.add_patch(Circle((0, 0), outer, facecolor=MAP[3], edgecolor=INK, linewidth=1))
-    loops, _ = _closed_lines(found, size)
-    ring = _area([_arc(1.1 * outer, 0, 2 * math.pi), _arc(surface, 0, 2 * math.pi)])
-    for index, middle in enumerate(2 * math.pi * np.arange(count) / count):
-        turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
-        _filled(panel, _area([loop @ turn for loop in loops]), ring)
-        x, y = _polar(_letter_radius(size), middle + 0.62 * half)
-        panel.text(x, y, chr(ord("A") + index), ha="center", va="center", weight="bold")
-    panel.plot(0, 0, "+", color=INK, markersize=9)
-    _tube(panel, size)
-    for name, radius, angle in (("R₂", outer, -0.5), ("R₁", inner, -2.1), ("R₁′", surface, -2.62)):
-        _line(panel, (0, 0), _polar(radius, angle), "-|>")
-        _note(panel, f"{name} {number(radius, digits=4)}", _polar(radius, angle), _polar(1.3 * outer, angle))
-    low, high = (_polar(1.1 * outer, angle) for angle in (-half, half))
-    _line(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(half / 2):.3f}")
-    for x, y in (_polar(1.14 * outer, angle) for angle in (-half, half)):
-        panel.plot([0, x], [0, y], color=MUTED, linewidth=0.7, linestyle=_AXIS)
-    panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(2 * half), digits=3)}°")
-    if "outlines" not in found:
-        strip = size["plate_thickness"]
-        wall, place = _polar(0.9 * outer, half - strip / outer / 2), (0.72 * outer, 1.25 * outer)
-        _note(panel, f"t {number(strip, digits=3)} each side", wall, place, ha="left")
-
-
 def _polar(radius: float, angle: float) -> tuple[float, float]:
     return radius * math.cos(angle), radius * math.sin(angle)
 
 
 def _letter_radius(size: dict[str, float]) -> float:
-    """In the gas, in the wider of the gaps that the tube's way round leaves."""
+    """Radius of a chamber's letter, mm: in the gas, on the wider side of the tube."""
     inner, surface = size["inner_radius"], size["free_surface_radius"]
     crest = min(max(size.get("crest_radius", inner), inner), surface)
     return (inner + crest) / 2 if crest - inner > surface - crest else (crest + surface) / 2
 
 
 def _tube(panel: Axes, size: dict[str, float]) -> None:
-    """Out of chamber A, inward to the crest, half-way round at its radius, and outward."""
+    """Draw the tube: out of chamber A, inward to the crest, half-way round at its radius, and outward."""
     port, crest = size["port_radius"], size.get("crest_radius")
     if crest is None:
         panel.plot([port, -port], [0, 0], **_TUBE)
@@ -351,45 +353,19 @@ def _tube(panel: Axes, size: dict[str, float]) -> None:
 
 
 def _line(panel: Axes, start: Sequence[float], end: Sequence[float], kind: str, **line: Any) -> None:
-    """A line between two places, with the heads of its kind."""
+    """Draw a line between two points, with the arrow heads of its kind."""
     shape = {"arrowstyle": kind, "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
     panel.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=shape)
 
 
 def _note(
-    panel: Axes, text: str, at: tuple[float, float], place: tuple[float, float], ha: str = "center"
+    panel: Axes, text: str, point: tuple[float, float], text_at: tuple[float, float], ha: str = "center"
 ) -> None:
-    """A text, and a thin line from it to a place."""
+    """Write a text, and draw a thin line from it to a point."""
     thin = {"arrowstyle": "-", "color": MUTED, "linewidth": 0.7}
-    panel.annotate(text, at, place, color=INK, ha=ha, va="center", arrowprops=thin)
-
-
-def _along(panel: Axes, found: Record, size: dict[str, float]) -> None:
-    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
-    half, port, crest = size["axial_width"] / 2, 0.985 * size["port_radius"], size.get("crest_radius", 0.0)
-    wall = half + 0.06 * outer
-    _, loops = _closed_lines(found, size)
-    for sign in (-1, 1):
-        corners = 1.1 * half * np.array([[-1, 0], [1, 0], [1, 0], [-1, 0]])
-        heights = sign * np.array([surface, surface, 1.1 * outer, 1.1 * outer])
-        liquid = Path(np.vstack([corners + np.outer(heights, (0, 1)), corners[:1]]), closed=True)
-        _filled(panel, _area([loop * (1, sign) for loop in loops]), liquid)
-    panel.plot([half, wall, wall, wall, half], [port, port, crest, -port, -port], **_TUBE)
-    panel.plot([-1.35 * half, 1.5 * half], [0, 0], color=MUTED, linewidth=0.8, linestyle=_AXIS)
-    level = -1.14 * outer
-    _line(panel, (-half, level), (half, level), "<->")
-    panel.plot([[-half, half]] * 2, [[0.9 * level] * 2, [1.04 * level] * 2], color=MUTED, linewidth=0.7)
-    panel.text(0, 1.03 * level, f"B {number(2 * half, digits=4)}", ha="center", va="top")
-    gas = 0.5 * (inner + surface)
-    _line(panel, (-half - 0.35 * outer, gas), (-half, gas), "-|>", color=THIRD, linewidth=1.4)
-    panel.text(-half - 0.1 * outer, 0.62 * (inner + outer), "valve side:\ngas line", ha="right", va="center")
-    panel.text(wall + 0.06 * outer, 0.72 * outer, "tube", color=PAPER, va="center")
-    panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
-    # Beside the middle, where a gas tube may stand.
-    panel.text(-half / 2, gas, "gas", ha="center", va="center")
-    panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=MUTED)
+    panel.annotate(text, point, text_at, color=INK, ha=ha, va="center", arrowprops=thin)
 
 
 SECTION: Final = Section(
-    name="operation", title="Where it works", place="report", collect=_collect, show=_view
+    name="operation", title="Where it works", document="report", collect=_collect, show=_view
 )

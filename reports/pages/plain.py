@@ -5,51 +5,47 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from ringbalance.controller.balancer import Balancer, balancer_of
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.reports.judged import advice_view, own_record, settings_lines
 from ringbalance.reports.pages.standing import DOCUMENT
 from ringbalance.reports.run_figures import run_amplitude
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.faults import SceneError
 
-_DRAWN: Final = {"time_s", "amplitude_m", "limit_m"}
-"""Keys of a run's document that its figure is made of."""
-_FEWEST, _MOST = 16, 64
-"""Devices that are drawn of a balancer whose runs take long."""
+_FIGURE_KEYS: Final = {"time_s", "amplitude_m", "limit_m"}
+"""Keys of a run's document that its figure needs."""
+_MIN_DEVICES, _MAX_DEVICES = 16, 64
 
 
 def decision(work: Work) -> Record:
-    """What the first page of any balancer rests on."""
+    """Evidence of the first page of any balancer: its own settings judged on drawn devices, with remedies."""
     balancer = balancer_of(work.scene)
-    paths = (each.path for each in balancer.settings() if "[" not in each.path)
+    paths = (setting.path for setting in balancer.settings() if "[" not in setting.path)
+    try:
+        limit = balancer.rotor().limit
+    except SceneError:
+        limit = None
     return {
-        "limit_m": _limit(balancer),
-        **own_record(balancer, first=_FEWEST, most=_MOST),
+        "limit_m": limit,
+        **own_record(balancer, first=_MIN_DEVICES, most=_MAX_DEVICES),
         "recommended": None,
         "settings": settings_lines(work.scene, paths),
     }
 
 
-def _limit(balancer: Balancer) -> float | None:
-    try:
-        return balancer.rotor().limit
-    except SceneError:
-        return None
-
-
-def decision_view(found: Record, evidence: Record) -> Record:
-    """What the first page of any balancer shows of it."""
+def decision_view(record: Record, evidence: Record) -> Record:
+    """Advice in words, and numbers of inputs by origin, for the first page of any balancer."""
     return {
-        **advice_view(found),
+        **advice_view(record),
         "origins": Counter(row["origin"] for row in evidence["scene"]["table"]).most_common(),
     }
 
 
-def _summary(found: Record, evidence: Record) -> Record:
+def _summary(record: Record, evidence: Record) -> Record:
     run = evidence["closed_loop"]["balanced"]
     return {
-        **decision_view(found, evidence),
-        "amplitude": run_amplitude(run) if run.keys() >= _DRAWN else None,
+        **decision_view(record, evidence),
+        "amplitude": run_amplitude(run) if run.keys() >= _FIGURE_KEYS else None,
     }
 
 
@@ -57,12 +53,12 @@ SECTIONS: Final = (
     Section(
         name="summary",
         title="Decision",
-        place="report",
+        document="report",
         collect=decision,
         show=_summary,
         template="plain_summary.html",
     ),
-    Section(name="parameters", title="Parameters and their origin", place="report"),
+    Section(name="parameters", title="Parameters and their origin", document="report"),
     DOCUMENT,
     Section(name="scene", title="Scene file"),
 )

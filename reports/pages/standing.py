@@ -1,4 +1,4 @@
-"""What the report rests on: numbers to use, evidence and credibility, document data, symbols, sources."""
+"""Numbers to use, evidence and credibility, document data, symbols and sources."""
 
 from __future__ import annotations
 
@@ -31,32 +31,33 @@ from ringbalance.reports.traced import budgets_of, inputs_of
 from ringbalance.results.result import Table
 from ringbalance.verification.standing import HEADS, budget_standing, standing_rows
 
-_DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
-_BARS: Final = 5
-"""Inputs that a panel of the tornado shows."""
+_TORNADO: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
+_MAX_BARS: Final = 5
 
 
 def _conditions(_own: Record, evidence: Record) -> Record:
     budgets = budgets_of(evidence)
-    drawn = {_DRAWN[key]: budgets[key] for key in _DRAWN if key in budgets and budgets[key]["value"]}
-    causes = {title: _causes(budget) for title, budget in drawn.items()}
+    causes: dict[str, list[tuple[str, float]]] = {}
+    for key, title in _TORNADO.items():
+        if key in budgets and (value := budgets[key]["value"]):
+            # Causes with their parts relative to the result, the largest first.
+            parts = {key_words(path): width for path, width in inputs_of(budgets[key]).items()}
+            parts |= {
+                "the model": budgets[key]["parts"]["model"],
+                "numerics": budgets[key]["parts"]["numerical"],
+            }
+            shares = [(name, abs(part / value)) for name, part in parts.items()]
+            causes[title] = sorted(shares, key=lambda cause: -cause[1])
     return {
         "behind": {name: budget_standing(evidence["verification"], name) for name in budgets},
         "tornado": _tornado(causes) if causes else None,
-        "largest": {title: each[0][0] for title, each in causes.items()},
+        "largest": {title: shares[0][0] for title, shares in causes.items()},
         "inputs": {
             key: max(inputs, key=inputs.__getitem__)
-            for key, each in budgets.items()
-            if (inputs := inputs_of(each))
+            for key, budget in budgets.items()
+            if (inputs := inputs_of(budget))
         },
     }
-
-
-def _causes(budget: Record) -> list[tuple[str, float]]:
-    """What makes a result uncertain, with its part relative to the result, the largest first."""
-    parts = {key_words(path): width for path, width in inputs_of(budget).items()}
-    parts |= {"the model": budget["parts"]["model"], "numerics": budget["parts"]["numerical"]}
-    return sorted(((name, abs(part / budget["value"])) for name, part in parts.items()), key=lambda c: -c[1])
 
 
 def _tornado(causes: dict[str, list[tuple[str, float]]]) -> Drawing:
@@ -64,54 +65,50 @@ def _tornado(causes: dict[str, list[tuple[str, float]]]) -> Drawing:
     columns = min(len(causes), 3)
     rows = -(-len(causes) // columns)
     side, room = 1 / columns, 1 / rows
-    places = [divmod(place, columns) for place in range(len(causes))]
+    cells = [divmod(index, columns) for index in range(len(causes))]
 
     def paint(axes: Axes) -> None:
-        boxes = [((j + 0.47) * side, 1 - (i + 0.86) * room, 0.47 * side, 0.68 * room) for i, j in places]
-        for bars, (title, parts) in zip(panels(axes, *boxes), causes.items(), strict=True):
-            _panel(bars, title, parts[:_BARS])
+        boxes = [((j + 0.47) * side, 1 - (i + 0.86) * room, 0.47 * side, 0.68 * room) for i, j in cells]
+        for bars, (title, shares) in zip(panels(axes, *boxes), causes.items(), strict=True):
+            largest = shares[:_MAX_BARS]
+            for index, (name, share) in enumerate(largest):
+                colour = {"the model": PAPER, "numerics": MUTED}.get(name, FOUND)
+                bars.barh(index, 200 * share, left=-100 * share, height=0.62, color=colour, linewidth=0)
+            limit = 115 * max(largest[0][1], 1e-9)
+            bars.set(ylim=(len(largest) - 0.4, -0.6), xlim=(-limit, limit))
+            bars.set_yticks(range(len(largest)), [name for name, _ in largest])
+            bars.tick_params(axis="y", length=0)
+            ticks = nice_span(limit)[:: len(nice_span(limit)) // 2]
+            bars.set_xticks(ticks, [f"{plain_number(tick)} %" for tick in ticks])
+            bars.set_title(title, loc="left", x=-0.9, fontsize="medium", weight="bold", color=INK)
+            bars.grid(visible=False, axis="y")
+            bars.spines["left"].set_visible(False)
 
-    return draw("tornado", paint, columns=0, wide=True, height=0.35 + rows * (0.55 + 0.2 * (_BARS + 2)))
-
-
-def _panel(bars: Axes, title: str, causes: list[tuple[str, float]]) -> None:
-    for place, (name, share) in enumerate(causes):
-        colour = {"the model": PAPER, "numerics": MUTED}.get(name, FOUND)
-        bars.barh(place, 200 * share, left=-100 * share, height=0.62, color=colour, linewidth=0)
-    limit = 115 * max(causes[0][1], 1e-9)
-    bars.set(ylim=(len(causes) - 0.4, -0.6), xlim=(-limit, limit))
-    bars.set_yticks(range(len(causes)), [name for name, _ in causes])
-    bars.tick_params(axis="y", length=0)
-    ticks = nice_span(limit)[:: len(nice_span(limit)) // 2]
-    bars.set_xticks(ticks, [f"{plain_number(tick)} %" for tick in ticks])
-    bars.set_title(title, loc="left", x=-0.9, fontsize="medium", weight="bold", color=INK)
-    bars.grid(visible=False, axis="y")
-    bars.spines["left"].set_visible(False)
+    return draw("tornado", paint, columns=0, wide=True, height=0.35 + rows * (0.55 + 0.2 * (_MAX_BARS + 2)))
 
 
 CONDITIONS: Final = Section(
-    name="conditions", title="Numbers to use, and their conditions", place="report", show=_conditions
+    name="conditions", title="Numbers to use, and their conditions", document="report", show=_conditions
 )
 
 
-_NOBODYS: Final = {"assumed": "are assumed", "default": "are defaults of the program"}
-
-
-_MAIN_HEADS: Final = tuple(head for place, head in enumerate(HEADS) if place not in (2, 3))
-"""What the report shows of the table that the annex has whole."""
+_UNDOCUMENTED: Final = {"assumed": "are assumed", "default": "are defaults of the program"}
+_MAIN_HEADS: Final = tuple(head for index, head in enumerate(HEADS) if index not in (2, 3))
+"""Columns in the report; the annex shows all."""
 
 
 def _credibility(_own: Record, evidence: Record) -> Record:
     checks, scene = summary.checks(evidence), evidence["scene"]
     origins: dict[str, str] = scene.get("origins") or {}
     counts = Counter(row["origin"] for row in scene.get("table") or [])
+    verdicts = Counter(case["verdict"] for case in checks)
     return {
         "standing": _standing(evidence, _MAIN_HEADS),
         "documented": bool({"given", "measured"} & set(origins.values())),
-        "checks": _outcome(checks),
-        "failed": any(case["verdict"] == "failed" for case in checks),
+        "checks": ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items()),
+        "failed": verdicts["failed"] > 0,
         "validated": any(case["kind"] == "validation" for case in checks),
-        "unsure": [f"{counts[origin]} {words}" for origin, words in _NOBODYS.items() if counts[origin]],
+        "unsure": [f"{counts[origin]} {words}" for origin, words in _UNDOCUMENTED.items() if counts[origin]],
         "budgets": bool(budgets_of(evidence)),
         "drawn": "summary" in evidence,
     }
@@ -130,14 +127,8 @@ def _standing(evidence: Record, heads: Sequence[str] = HEADS) -> Table:
     )
 
 
-def _outcome(cases: Sequence[Record]) -> str:
-    """Number of cases under each verdict; empty without cases."""
-    counts = Counter(case["verdict"] for case in cases)
-    return ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-
-
 CREDIBILITY: Final = Section(
-    name="credibility", title="What is validated, verified and assumed", place="report", show=_credibility
+    name="credibility", title="What is validated, verified and assumed", document="report", show=_credibility
 )
 
 
@@ -156,7 +147,7 @@ def _symbols_and_sources() -> Record:
 
 
 def evidence_text(evidence: Record) -> str:
-    """The evidence as its file holds it."""
+    """Text of the evidence file."""
     return json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False) + "\n"
 
 
@@ -173,5 +164,5 @@ def _document(_own: Record, evidence: Record) -> Record:
 
 
 DOCUMENT: Final = Section(
-    name="document", title="Document data, symbols and sources", place="report", show=_document
+    name="document", title="Document data, symbols and sources", document="report", show=_document
 )

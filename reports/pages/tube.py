@@ -20,7 +20,7 @@ from ringbalance.reports.figure import (
     INK,
     MUTED,
     REGIME_COLOURS,
-    Axis,
+    AxisLabel,
     Drawing,
     Paint,
     curve,
@@ -38,7 +38,7 @@ from ringbalance.scene.arrays import stretches
 from ringbalance.scene.models import Scene
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
-_VELOCITY: Final[Axis] = ("mean velocity in the tube", "m/s")
+_VELOCITY: Final[AxisLabel] = ("mean velocity in the tube", "m/s")
 _REGIME_LINES: Final[dict[str, Record]] = {
     "siphon": {"linestyle": "-"},
     "separated": {"linestyle": "-", "marker": "o", "markersize": 3.2, "markevery": 5},
@@ -49,19 +49,12 @@ _REGIME_LINES: Final[dict[str, Record]] = {
 
 
 def _tube(_own: Record, evidence: Record) -> Record:
-    tube, known = evidence["calibration"]["tube"], budgets_of(evidence)
-    velocity = abs(known["velocity"]["value"])
-    point = [(velocity, known["drag_coefficient"]["value"])] if velocity else []
-    return {
-        "drag": _drag(tube, point, evidence["paper"]["drag_coefficient"]),
-        "at": _nearest(tube, velocity),
-    }
-
-
-def _nearest(tube: Record, velocity: float) -> int:
-    """Place of the tabulated velocity nearest to the operating point's; the last where nothing flows."""
-    speeds = np.log(tube["velocity_m_s"])
-    return int(np.argmin(np.abs(speeds - (math.log(velocity) if velocity else speeds[-1]))))
+    tube, budgets = evidence["calibration"]["tube"], budgets_of(evidence)
+    velocity, speeds = abs(budgets["velocity"]["value"]), np.log(tube["velocity_m_s"])
+    point = [(velocity, budgets["drag_coefficient"]["value"])] if velocity else []
+    # The tabulated velocity nearest to the operating point's; the last where nothing flows.
+    distance = np.abs(speeds - (math.log(velocity) if velocity else speeds[-1]))
+    return {"drag": _drag(tube, point, evidence["paper"]["drag_coefficient"]), "at": int(np.argmin(distance))}
 
 
 def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Drawing:
@@ -72,13 +65,23 @@ def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Dra
     # 1-2-5 ticks of a few decades, decades alone beyond three.
     ticks = [step * 10.0**e for e in range(-3, 7) for step in ((1, 2, 5) if top < 1e3 * bottom else (1,))]
 
+    def scaled(factor: float) -> Callable[[ArrayLike], ArrayLike]:
+        return lambda values: np.asarray(values, dtype=np.float64) * factor
+
+    def reynolds_axis(axes: Axes) -> None:
+        per_velocity = tube["reynolds"][-1] / velocity[-1]
+        top = axes.secondary_xaxis("top", functions=(scaled(per_velocity), scaled(1 / per_velocity)))
+        top.set_xlabel("Reynolds number", color=MUTED)
+        top.xaxis.set_major_formatter(FuncFormatter(decade))
+        top.xaxis.set_minor_locator(NullLocator())
+
     def transition(axes: Axes) -> None:
         for state, part in stretches(tube["flow_state"]):
             if state == "transitional":
                 ends = velocity[part.start], velocity[part.stop - 1]
                 axes.axvspan(*ends, color=MUTED, alpha=0.13, linewidth=0, label=state)
 
-    speeds, coefficients = [u for u, _ in point], [each for _, each in point]
+    speeds, coefficients = [u for u, _ in point], [value for _, value in point]
     return draw(
         "drag",
         logarithmic("x", ticks=_VELOCITY_TICKS),
@@ -95,7 +98,7 @@ def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Dra
             color=INK,
             markersize=4.5,
         ),
-        _reynolds_axis(tube["reynolds"][-1] / velocity[-1]),
+        reynolds_axis,
         x=_VELOCITY,
         y=("loss coefficient k", "1"),
         xlim=(velocity[0], velocity[-1]),
@@ -106,35 +109,15 @@ def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Dra
     )
 
 
-def _reynolds_axis(per_velocity: float) -> Paint:
-    def scaled(factor: float) -> Callable[[ArrayLike], ArrayLike]:
-        return lambda values: np.asarray(values, dtype=np.float64) * factor
-
-    def paint(axes: Axes) -> None:
-        top = axes.secondary_xaxis("top", functions=(scaled(per_velocity), scaled(1 / per_velocity)))
-        top.set_xlabel("Reynolds number", color=MUTED)
-        top.xaxis.set_major_formatter(FuncFormatter(decade))
-        top.xaxis.set_minor_locator(NullLocator())
-
-    return paint
-
-
 def _law(_own: Record, evidence: Record) -> Record:
-    law = evidence["flow_law"]
-    return {"laws": [_flow_law(law, row) for row in range(len(law["gas_pressure_Pa"]))]}
-
-
-def _flow_law(law: Record, row: int) -> Drawing:
-    """Velocity over fill ratio at one gas pressure: the calibrated law with its regimes against Eq. 19."""
+    """Velocity over fill ratio at each gas pressure: the calibrated law with its regimes against Eq. 19."""
+    law, laws = evidence["flow_law"], []
     fill = np.asarray(law["fill_ratio"])
-    velocity, width = (np.asarray(law[key][row]) for key in ("velocity_m_s", "velocity_uncertainty"))
-    parts = list(stretches(list(law["regime"][row])))
-    first = dict(reversed(parts))
-    return draw(
-        f"flow-law-{row}",
-        curve(fill, law["velocity_paper_m_s"][row], "Eq. 19", **AS_PAPER),
-        curve(fill, velocity, band=width, color=FOUND, linewidth=0),
-        *(
+    for row, regimes in enumerate(law["regime"]):
+        velocity, width = (np.asarray(law[key][row]) for key in ("velocity_m_s", "velocity_uncertainty"))
+        parts = list(stretches(list(regimes)))
+        first = dict(reversed(parts))
+        branches = (
             curve(
                 fill[part],
                 velocity[part],
@@ -143,70 +126,74 @@ def _flow_law(law: Record, row: int) -> Drawing:
                 **_REGIME_LINES[regime],
             )
             for regime, part in parts
-        ),
-        x=("fill ratio of the driven chamber", "1"),
-        y=("velocity in the tube", "m/s"),
-        ylim=(0, None),
-        columns=3,
-    )
+        )
+        figure = draw(
+            f"flow-law-{row}",
+            curve(fill, law["velocity_paper_m_s"][row], "Eq. 19", **AS_PAPER),
+            curve(fill, velocity, band=width, color=FOUND, linewidth=0),
+            *branches,
+            x=("fill ratio of the driven chamber", "1"),
+            y=("velocity in the tube", "m/s"),
+            ylim=(0, None),
+            columns=3,
+        )
+        laws.append(figure)
+    return {"laws": laws}
 
 
-_POINTS: Final = 161
-_SHARES: Final = np.linspace(0.06, 0.94, 23)
-"""Fills at which a regime is looked for, as shares of the largest."""
-_FACTORS: Final = (1.0, 0.6, 0.3, 1.5, 2.0)
-"""Gas pressures at which it is looked for, over the scene's."""
-_ORDER: Final = (Regime.SIPHON, Regime.SEPARATED, Regime.BLOCKED, Regime.REVERSE)
+_PATH_POINTS: Final = 161
+_FILL_FRACTIONS: Final = np.linspace(0.06, 0.94, 23)
+"""Fills at which a regime is searched, over the largest."""
+_PRESSURE_FACTORS: Final = (1.0, 0.6, 0.3, 1.5, 2.0)
+"""Gas pressures at which a regime is searched, over the scene's."""
+_REGIMES: Final = (Regime.SIPHON, Regime.SEPARATED, Regime.BLOCKED, Regime.REVERSE)
 
 
 def _collect(work: Work) -> Record | None:
     """One operating state of every regime that this tube can be in, with its pressures along the path."""
-    law = work.calibration.flow_law
-    if work.ring.tube.hump_radius is None:
+    scene, law = work.ring, work.calibration.flow_law
+    if scene.tube.hump_radius is None:
         return None
-    found = [(regime, _state_in(regime, work.ring, law)) for regime in _ORDER]
-    return {
-        "hump_radius_m": work.ring.tube.hump_radius,
-        "states": [_record(work.calibration.scene, law, *state) for _, state in found if state is not None],
-        "absent": [regime.label for regime, state in found if state is None],
-    }
-
-
-def _state_in(regime: Regime, scene: Scene, law: CalibratedLaw) -> tuple[float, float, bool] | None:
-    """Fill, gas pressure and whether the tube is primed, of the first pressure with that regime."""
-    fills, primed = _SHARES * law.max_fill_ratio, regime is Regime.REVERSE
-    for pressure in (0.0,) if primed else tuple(f * scene.gas.pressure for f in _FACTORS):
-        flow = law.evaluate(fill_ratio=fills, gas_pressure=pressure, primed=primed)
-        there = np.flatnonzero(flow.regime == regime)
-        if there.size:
-            return float(fills[there[there.size // 2]]), pressure, primed
-    return None
+    states, absent = [], []
+    for regime in _REGIMES:
+        fills, primed = _FILL_FRACTIONS * law.max_fill_ratio, regime is Regime.REVERSE
+        # The middle of the fills at the first gas pressure with that regime.
+        for pressure in (0.0,) if primed else tuple(f * scene.gas.pressure for f in _PRESSURE_FACTORS):
+            flow = law.evaluate(fill_ratio=fills, gas_pressure=pressure, primed=primed)
+            rows = np.flatnonzero(flow.regime == regime)
+            if rows.size:
+                fill = float(fills[rows[rows.size // 2]])
+                states.append(_record(work.calibration.scene, law, fill, pressure, primed))
+                break
+        else:
+            absent.append(regime.label)
+    return {"hump_radius_m": scene.tube.hump_radius, "states": states, "absent": absent}
 
 
 def _record(scene: Scene, law: CalibratedLaw, fill: float, pressure: float, primed: bool) -> Record:
-    found: HumpProfile = HumpProfile.of(
-        scene=scene, law=law, fill_ratio=fill, gas_pressure=pressure, primed=primed, points=_POINTS
+    profile: HumpProfile = HumpProfile.of(
+        scene=scene, law=law, fill_ratio=fill, gas_pressure=pressure, primed=primed, points=_PATH_POINTS
     )
     return {
-        "regime": found.regime.label,
+        "regime": profile.regime.label,
         "fill_ratio": fill,
         "opposite_fill_ratio": law.max_fill_ratio - fill,
         "gas_pressure_Pa": pressure,
-        "velocity_m_s": found.velocity,
-        "path_m": found.path.tolist(),
-        "pressure_Pa": found.pressure.tolist(),
-        "full": found.full.astype(int).tolist(),
-        "hump_path_m": found.hump_path,
-        "hump_pressure_Pa": found.hump_pressure,
-        "cavity_pressure_Pa": found.cavity_pressure,
-        "margin_Pa": found.cavitation_margin,
-        "margin_uncertainty_Pa": found.cavitation_margin_uncertainty,
-        "column": _column_code(found.cavitation_margin, found.cavitation_margin_uncertainty),
+        "velocity_m_s": profile.velocity,
+        "path_m": profile.path.tolist(),
+        "pressure_Pa": profile.pressure.tolist(),
+        "full": profile.full.astype(int).tolist(),
+        "hump_path_m": profile.hump_path,
+        "hump_pressure_Pa": profile.hump_pressure,
+        "cavity_pressure_Pa": profile.cavity_pressure,
+        "margin_Pa": profile.cavitation_margin,
+        "margin_uncertainty_Pa": profile.cavitation_margin_uncertainty,
+        "column": _column_code(profile.cavitation_margin, profile.cavitation_margin_uncertainty),
     }
 
 
 def _column_code(margin: float | None, width: float | None) -> str:
-    """What a full column does, by its margin and half-width, Pa: none, undecided, holds or separates."""
+    """State of a full column by its margin and half-width, Pa: none, undecided, holds or separates."""
     if margin is None:
         return "none"
     if width is not None and abs(margin) <= width:
@@ -214,20 +201,27 @@ def _column_code(margin: float | None, width: float | None) -> str:
     return "holds" if margin > 0 else "separates"
 
 
-def _crest(found: Record, _evidence: Record) -> Record | None:
-    return {"figure": _path_figure(found["states"])} if found["states"] else None
-
-
-def _path_figure(states: list[Record]) -> Drawing:
+def _crest(record: Record, _evidence: Record) -> Record | None:
     """Gauge pressure along the path, one line a regime, dotted where the tube is not full."""
+    states = record["states"]
+    if not states:
+        return None
     first = states[0]
     crest, cavity, length = first["hump_path_m"], first["cavity_pressure_Pa"], first["path_m"][-1]
     pressures = [value for state in states for value in (*state["pressure_Pa"], cavity)]
     low, high = min(pressures), max(pressures)
     bottom, top = low - 0.09 * (high - low), high + 0.05 * (high - low)
-    return draw(
+    lines: list[Paint] = []
+    for state in states:
+        path, pressure = np.asarray(state["path_m"]), np.asarray(state["pressure_Pa"])
+        label: str | None = f"{state['regime']}, {given(state['gas_pressure_Pa'], 'Pa', digits=3)}"
+        for full, part in stretches(state["full"]):
+            look = {"color": REGIME_COLOURS[state["regime"]], "linestyle": "-" if full else (0, (1, 2))}
+            lines.append(curve(path[part], pressure[part], label if full else None, **look))
+            label = None if full else label
+    figure = draw(
         "hump-pressure",
-        *(part for state in states for part in _path(state)),
+        *lines,
         level(cavity, "cavity pressure", color=MUTED, linewidth=1, linestyle=(0, (5, 2))),
         upright(crest, color=MUTED, linewidth=0.8, linestyle=":"),
         note("siphon crest", (crest, top), (5, -9)),
@@ -239,17 +233,7 @@ def _path_figure(states: list[Record]) -> Drawing:
         wide=True,
         height=4.0,
     )
-
-
-def _path(state: Record) -> list[Paint]:
-    path, pressure = np.asarray(state["path_m"]), np.asarray(state["pressure_Pa"])
-    label: str | None = f"{state['regime']}, {given(state['gas_pressure_Pa'], 'Pa', digits=3)}"
-    parts = []
-    for full, part in stretches(state["full"]):
-        look = {"color": REGIME_COLOURS[state["regime"]], "linestyle": "-" if full else (0, (1, 2))}
-        parts.append(curve(path[part], pressure[part], label if full else None, **look))
-        label = None if full else label
-    return parts
+    return {"figure": figure}
 
 
 TUBE: Final = Section(name="tube", title="The connecting tube", show=_tube)

@@ -12,28 +12,37 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from matplotlib.tri import Triangulation
 
 from ringbalance.physics.tube.loss import FlowState, tube_loss
-from ringbalance.reports.figure import INK, MAP, MUTED, Axis, Drawing, Paint, draw, figure_of, plain_number
+from ringbalance.reports.figure import (
+    INK,
+    MAP,
+    MUTED,
+    AxisLabel,
+    Drawing,
+    Paint,
+    draw,
+    figure_of,
+    plain_number,
+)
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow_fields import FlowField, end_field, section_field
 from ringbalance.verification.navier_stokes.tube import End
 
-_LARGEST: Final = 500.0
+_MAX_REYNOLDS: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
 _DIGITS: Final = 4
-_SHARES: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
-_FLOW_THROUGH: Final = 1 / 8
+_STREAM_FRACTIONS: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
+_WALL_STREAM_FUNCTION: Final = 1 / 8
 """Stream function at the tube's wall, over U d^2."""
-_LINES: Final = _FLOW_THROUGH * np.linspace(0, 1, 7)[1:-1] ** 2
-_REACH: Final = 1.5
-"""Of the picture of an end about the axis of the tube, over d."""
+_STREAM_LINES: Final = _WALL_STREAM_FUNCTION * np.linspace(0, 1, 7)[1:-1] ** 2
+_PICTURE_HALF: Final = 1.5
+"""Half of the picture of an end, from the axis of the tube, over d."""
 _WINDOWS: Final[dict[End, tuple[float, float]]] = {"entrance": (-1.5, 3.5), "exit": (-1.5, 5.0)}
-_TITLE: Final = 0.4
-"""in, of a figure's height, for what stands above its colour bar."""
-_BESIDE: Final = 0.94 + _TITLE
-"""in, for its axis, its colour bar and that."""
-_ALONG: Final = 2.9
-"""in, of the longer side of what is drawn."""
+_TITLE_IN: Final = 0.4
+"""Height of the text above the colour bar."""
+_FRAME_IN: Final = 0.94 + _TITLE_IN
+"""Height of axis, colour bar and the text above it."""
+_FIELD_WIDTH_IN: Final = 2.9
 
 
 def _collect(work: Work) -> Record | None:
@@ -43,13 +52,15 @@ def _collect(work: Work) -> Record | None:
         return None
     loss = tube_loss(scene, speed)
     reynolds = float(loss.reynolds)
-    drawn = min(reynolds, _LARGEST)
-    section = section_field(reynolds=drawn, rotation_reynolds=loss.rotation_reynolds * drawn / reynolds)
-    ends = {name: end_field(name, reynolds=drawn) for name in _WINDOWS}
+    reynolds_drawn = min(reynolds, _MAX_REYNOLDS)
+    section = section_field(
+        reynolds=reynolds_drawn, rotation_reynolds=loss.rotation_reynolds * reynolds_drawn / reynolds
+    )
+    ends = {name: end_field(name, reynolds=reynolds_drawn) for name in _WINDOWS}
     drift, centre = section.velocity[:2], np.argmin(np.hypot(*section.points))
     laminar = bool(loss.flow_state == FlowState.LAMINAR)
     return {
-        "drawn": "not laminar" if not laminar else "as it is" if drawn == reynolds else "too fast",
+        "drawn": "not laminar" if not laminar else "as it is" if reynolds_drawn == reynolds else "too fast",
         "reynolds": reynolds,
         "rotation_reynolds": loss.rotation_reynolds,
         "laminar": laminar,
@@ -76,7 +87,7 @@ def _field(flow: FlowField, colour: FloatArray) -> Record:
 
 
 def _packed(values: npt.ArrayLike) -> str:
-    """Numbers as one line of text: a field of a thousand nodes is nothing to read number by number."""
+    """Numbers as one line of text: nobody reads a field of a thousand nodes number by number."""
     return " ".join(f"{value:.{_DIGITS}g}" for value in np.asarray(values).ravel())
 
 
@@ -84,8 +95,8 @@ def _unpacked(record: Record, name: str) -> FloatArray:
     return np.array(record[name].split(), dtype=np.float64)
 
 
-def _view(found: Record, _evidence: Record) -> Record:
-    return {"section": _section(found["section"])} | {name: _end(found[name], name) for name in _WINDOWS}
+def _view(record: Record, _evidence: Record) -> Record:
+    return {"section": _section(record["section"])} | {name: _end(record[name], name) for name in _WINDOWS}
 
 
 def _section(record: Record) -> Drawing:
@@ -93,7 +104,7 @@ def _section(record: Record) -> Drawing:
     y, z = _unpacked(record, "points").reshape(2, -1)
     psi, tip = _unpacked(record, "stream_function"), 0.17 * record["core_goes"]
     top = float(np.abs(psi).max())
-    lines = np.sort(np.outer((-top, top), _SHARES).ravel()) if top > 0 else None
+    lines = np.sort(np.outer((-top, top), _STREAM_FRACTIONS).ravel()) if top > 0 else None
 
     def paint(axes: Axes) -> None:
         _fill(axes, record, (z, y), lines, "axial velocity over the mean")
@@ -102,8 +113,8 @@ def _section(record: Record) -> Drawing:
             axes.annotate("", (0, tip), xytext=(0, -tip), arrowprops=arrow)
         axes.add_patch(Circle((0, 0), 0.5, fill=False, color=MUTED, linewidth=1.4))
 
-    along = ("z/d, along the axis of rotation", "1")
-    return _drawing("section", paint, (-0.53, 0.53), (-0.53, 0.53), along, ("y/d", "1"))
+    label = ("z/d, along the axis of rotation", "1")
+    return _drawing("section", paint, (-0.53, 0.53), (-0.53, 0.53), label, ("y/d", "1"))
 
 
 def _end(record: Record, name: End) -> Drawing:
@@ -114,18 +125,18 @@ def _end(record: Record, name: End) -> Drawing:
 
     def paint(axes: Axes) -> None:
         for side in (1.0, -1.0):
-            _fill(axes, record, (x, side * r), _LINES, "speed over the mean" if side > 0 else "")
-            corner = (start, 0.5 if side > 0 else -_REACH)
-            wall = Rectangle(corner, stop - start, _REACH - 0.5, color=MUTED, alpha=0.3, linewidth=0)
+            _fill(axes, record, (x, side * r), _STREAM_LINES, "speed over the mean" if side > 0 else "")
+            corner = (start, 0.5 if side > 0 else -_PICTURE_HALF)
+            wall = Rectangle(corner, stop - start, _PICTURE_HALF - 0.5, color=MUTED, alpha=0.3, linewidth=0)
             axes.add_patch(wall)
 
-    along = ("x/d, along the flow", "1")
-    return _drawing(name, paint, (left, right), (-_REACH, _REACH), along, ("r/d", "1"))
+    label = ("x/d, along the flow", "1")
+    return _drawing(name, paint, (left, right), (-_PICTURE_HALF, _PICTURE_HALF), label, ("r/d", "1"))
 
 
-def _fill(axes: Axes, record: Record, places: tuple[FloatArray, FloatArray], lines: Any, title: str) -> None:
-    """A field in colour with its bar above, and streamlines. Args: `title`: of the bar; empty: none."""
-    mesh = Triangulation(*places, _unpacked(record, "triangles").astype(np.int64).reshape(-1, 3))
+def _fill(axes: Axes, record: Record, points: tuple[FloatArray, FloatArray], lines: Any, title: str) -> None:
+    """Draw a field in colour with its bar above, and streamlines. Args: `title`: empty: no bar."""
+    mesh = Triangulation(*points, _unpacked(record, "triangles").astype(np.int64).reshape(-1, 3))
     colour = _unpacked(record, "colour")
     levels = np.linspace(0, MaxNLocator(4).tick_values(0, colour.max())[-1], len(MAP) + 1)
     filled = axes.tricontourf(mesh, colour, levels=levels, colors=list(MAP))
@@ -139,14 +150,14 @@ def _fill(axes: Axes, record: Record, places: tuple[FloatArray, FloatArray], lin
 
 
 def _drawing(
-    name: str, paint: Paint, xlim: tuple[float, float], ylim: tuple[float, float], x: Axis, y: Axis
+    name: str, paint: Paint, xlim: tuple[float, float], ylim: tuple[float, float], x: AxisLabel, y: AxisLabel
 ) -> Drawing:
     wide, tall = xlim[1] - xlim[0], ylim[1] - ylim[0]
-    height = _BESIDE + _ALONG * tall / wide
+    height = _FRAME_IN + _FIELD_WIDTH_IN * tall / wide
 
     def scaled(axes: Axes) -> None:
         box = axes.get_position()
-        axes.set_position((box.x0, box.y0, box.width, box.height - _TITLE / height))
+        axes.set_position((box.x0, box.y0, box.width, box.height - _TITLE_IN / height))
         paint(axes)
         axes.set(aspect="equal")
         axes.grid(visible=False)

@@ -4,7 +4,7 @@
 
 The job names the VTU files of the fields, the disc's dimensions in metres and the folder for the PNG files.
 VTK must find VTK_DEFAULT_OPENGL_WINDOW in the environment.  Standard input is a pipe that
-stays open: when it closes, whoever wanted the pictures is gone, and the drawing ends.
+stays open: when it closes, the process that wants the pictures has ended, and the drawing ends.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ PICTURE: Final = (1200, 800)
 """Pixels of a finished picture; drawn twice as large, so that lines are smooth."""
 _SCALE: Final = 2
 _DPI: Final = 100
-_POINTS: Final = 72 / _DPI
-"""pt of a pixel."""
-_FONT: Final = 34 * _POINTS
-_MILLIMETRES: Final = 1e3
-_OUTSIDE: Final = 1.002
-_SHARP: Final = 40.0
-"""Angle between faces of a chamber from which their edge is drawn, deg."""
-_STEPS: Final = 480
+_PT_PER_PIXEL: Final = 72 / _DPI
+_FONT_PT: Final = 34 * _PT_PER_PIXEL
+_MM_PER_M: Final = 1e3
+_WALL_SCALE: Final = 1.002
+"""Scale of walls, so that the liquid's sides do not lie in them."""
+_SHARP_EDGE_DEG: Final = 40.0
+"""Angle between faces of a chamber from which their edge is drawn."""
+_CIRCLE_STEPS: Final = 480
 _SURFACE: Final = "dataset_surface"
 _VIRIDIS: Final = colormaps["viridis"]
 _WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
@@ -59,18 +59,18 @@ class _Theme:
 
     name: str
     colours: dict[str, str]
-    """Of the page's figures."""
+    """Colours of the page's figures by CSS variable."""
     metal: str
     mark: str
 
     @property
     def ground(self) -> str:
-        """Of the page."""
+        """Background of the page."""
         return self.colours["--fig-surface"]
 
     @property
     def ink(self) -> str:
-        """Of the page's text."""
+        """Colour of the page's text."""
         return self.colours["--fig-ink"]
 
 
@@ -82,19 +82,19 @@ THEMES: Final = (
 
 @dataclass(frozen=True, kw_only=True)
 class _Label:
-    """A text beside a place of the scene."""
+    """A text beside a point of the picture."""
 
     text: str
-    place: FloatArray
+    point: FloatArray
     """mm, shape (3,)."""
     shift: tuple[float, float] = (0, 0)
-    """Of the text from the place, pixels right and up; a leader joins them where it is not zero."""
+    """Distance of the text from the point, pixels right and up; a leader joins them where it is not zero."""
     strong: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Lettering:
-    """What is written onto a picture: labels, and a colour bar from zero with its title."""
+    """Lettering of a picture: labels, and a colour bar from zero with its title."""
 
     labels: list[_Label]
     title: str
@@ -107,13 +107,18 @@ def main(arguments: list[str]) -> int:
     # Not through sys.stdin, whose lock would be held when the interpreter ends.
     end_with(partial(os.read, 0, 1))
     job = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
-    disc = {key: None if value is None else value * _MILLIMETRES for key, value in job["lengths"].items()}
-    chamber = job["fields"].get("chamber")
-    walls = (
-        _sector(disc, job["central_angle"])
-        if chamber is None
-        else _read(chamber).extract_surface(algorithm=_SURFACE)
-    )
+    disc: Record = {
+        key: None if value is None else value * _MM_PER_M for key, value in job["lengths"].items()
+    }
+    if (chamber := job["fields"].get("chamber")) is not None:
+        walls = _read(chamber).extract_surface(algorithm=_SURFACE)
+    else:
+        # The space of one chamber between its plates.
+        inner, outer, strip = disc["inner_radius"], disc["outer_radius"], disc["plate_thickness"]
+        half = [job["central_angle"] / 2 - math.asin(strip / radius) for radius in (inner, outer)]
+        angle = np.linspace(-1, 1, _CIRCLE_STEPS // 4)
+        line = np.concatenate([inner * np.exp(1j * half[0] * angle), outer * np.exp(-1j * half[1] * angle)])
+        walls = _prism(line, -disc["axial_width"] / 2, disc["axial_width"] / 2)
     # One window for all: the driver then compiles its shaders once.
     plotter: Any = pv.Plotter(
         off_screen=True, window_size=[_SCALE * side for side in PICTURE], lighting="light kit"
@@ -142,21 +147,12 @@ def _read(path: str) -> Any:
         grid = pv.UnstructuredGrid({pv.CellType.QUADRATIC_HEXAHEDRON: cells[:, :20]}, np.asarray(grid.points))
         grid.point_data.update(fields)
     grid = grid.tessellate()
-    grid.points = np.asarray(grid.points) * _MILLIMETRES
+    grid.points = np.asarray(grid.points) * _MM_PER_M
     return grid
 
 
-def _sector(disc: Record, central_angle: float) -> Any:
-    """Surface of the space of one chamber between its plates, mm."""
-    inner, outer = disc["inner_radius"], disc["outer_radius"]
-    half = [central_angle / 2 - math.asin(disc["plate_thickness"] / radius) for radius in (inner, outer)]
-    angle = np.linspace(-1, 1, _STEPS // 4)
-    line = np.concatenate([inner * np.exp(1j * half[0] * angle), outer * np.exp(-1j * half[1] * angle)])
-    return _prism(line, -disc["axial_width"] / 2, disc["axial_width"] / 2)
-
-
 def _prism(line: Any, bottom: float, top: float) -> Any:
-    """The solid between two planes across the shaft within a closed line, as complex places, mm."""
+    """The solid between two planes across the shaft within a closed line of complex points, mm."""
     points = np.c_[line.real, line.imag, np.full(line.size, bottom)]
     face = pv.PolyData(points, faces=[line.size, *range(line.size)]).triangulate()
     return face.extrude((0, 0, top - bottom), capping=True)
@@ -164,7 +160,7 @@ def _prism(line: Any, bottom: float, top: float) -> Any:
 
 def _ring(inner: float, outer: float, bottom: float, top: float) -> Any:
     """A closed ring of rectangular section about the shaft, mm."""
-    flat = pv.Disc(center=(0, 0, bottom), inner=inner, outer=outer, r_res=1, c_res=_STEPS)
+    flat = pv.Disc(center=(0, 0, bottom), inner=inner, outer=outer, r_res=1, c_res=_CIRCLE_STEPS)
     return flat.extrude((0, 0, top - bottom), capping=True)
 
 
@@ -175,7 +171,7 @@ def _polar(radius: float, angle: float, height: float) -> FloatArray:
 def _look(
     plotter: Any, bounds: tuple[float, ...], *, direction: Any, up: Any, zoom: float, lift: float
 ) -> None:
-    """Points the camera at a box; the box stands a little right, the colour bar has the left."""
+    """Point the camera at a box; the box stands a little right, the colour bar has the left."""
     middle = np.array(bounds).reshape(3, 2).mean(axis=1)
     plotter.camera_position = [tuple(middle + direction), tuple(middle), up]
     plotter.camera.view_angle = 18
@@ -196,7 +192,7 @@ def _draw_pressure(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Le
         _add_field(plotter, surface, "pressure", _VIRIDIS, high)
         lines = surface.contour(np.linspace(0, high, 9)[1:-1], scalars="pressure")
         plotter.add_mesh(lines, color="white", line_width=2.4, opacity=0.6)
-    edges = job["walls"].extract_feature_edges(_SHARP, boundary_edges=False, manifold_edges=False)
+    edges = job["walls"].extract_feature_edges(_SHARP_EDGE_DEG, boundary_edges=False, manifold_edges=False)
     plotter.add_mesh(edges, color=theme.colours["--fig-muted"], line_width=2.4)
     reach = outer * math.sin(min(half, math.pi / 2))
     low = min(inner * math.cos(half), outer * math.cos(half))
@@ -204,9 +200,9 @@ def _draw_pressure(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Le
     _look(plotter, bounds, direction=(75, -80, 150), up=(1, 0, 0), zoom=1.35, lift=0.11)
     shallow = float(np.hypot(liquid.points[:, 0], liquid.points[:, 1]).min())
     labels = [
-        _Label(text="outer wall", place=_polar(outer, 0.45 * half, 0.1 * width), shift=(48, 88)),
-        _Label(text="free surface", place=_polar(shallow, 0.55 * half, width / 2), shift=(-100, -120)),
-        _Label(text="gas", place=_polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
+        _Label(text="outer wall", point=_polar(outer, 0.45 * half, 0.1 * width), shift=(48, 88)),
+        _Label(text="free surface", point=_polar(shallow, 0.55 * half, width / 2), shift=(-100, -120)),
+        _Label(text="gas", point=_polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
     ]
     return _Lettering(labels=labels, title="pressure in MPa", colours=_VIRIDIS, high=high)
 
@@ -223,7 +219,7 @@ def _draw_disc(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Letter
     metal = {"smooth_shading": True, "split_sharp_edges": True, "ambient": 0.2, "diffuse": 0.8}
     for shape in _metal(job):
         plotter.add_mesh(shape, color=theme.metal, **metal)
-    depth = np.asarray(liquid.point_data["depth_m"]) * _MILLIMETRES
+    depth = np.asarray(liquid.point_data["depth_m"]) * _MM_PER_M
     liquid.point_data["depth"], high = depth, float(depth.max())
     surface = liquid.clip(normal="z", origin=(0, 0, 0.008 * back)).extract_surface(algorithm=_SURFACE)
     for index in range(count):
@@ -231,7 +227,7 @@ def _draw_disc(plotter: Any, job: Record, liquid: Any, theme: _Theme) -> _Letter
     rim = 1.2 * outer
     # Beside the middle of each chamber, where the tube does not run.
     letters = [
-        _Label(text=letter, place=_polar(0.62 * inner + 0.38 * outer, angle, 0.0), strong=True)
+        _Label(text=letter, point=_polar(0.62 * inner + 0.38 * outer, angle, 0.0), strong=True)
         for index, letter in enumerate(job["letters"])
         for angle in (2 * math.pi * index / count - 0.22 * job["central_angle"],)
     ]
@@ -254,7 +250,7 @@ def _metal(job: Record) -> list[Any]:
     ]
     if "chamber" in job["fields"]:
         # A little larger than the liquid, whose sides would else lie in its own.
-        body = job["walls"].scale(_OUTSIDE).clip(normal="z", origin=(0, 0, 0))
+        body = job["walls"].scale(_WALL_SCALE).clip(normal="z", origin=(0, 0, 0))
         return rings + [body.rotate_z(360.0 * index / count) for index in range(count)]
     radius = np.linspace((hub + inner) / 2, outer + wall / 2, 41)
     strip = np.arcsin(disc["plate_thickness"] / np.clip(radius, inner, outer))
@@ -272,7 +268,7 @@ def _add_arrow(plotter: Any, radius: float, theme: _Theme) -> _Label:
     cone = pv.Cone(**tip, height=7 * thick, radius=2.6 * thick, resolution=36)
     for shape in (pv.MultipleLines(points).tube(radius=thick, n_sides=24), cone):
         plotter.add_mesh(shape, color=theme.mark, ambient=0.4)
-    return _Label(text="rotation", place=_polar(1.16 * radius, math.radians(300), -0.1 * radius))
+    return _Label(text="rotation", point=_polar(1.16 * radius, math.radians(300), -0.1 * radius))
 
 
 def _add_tube(plotter: Any, disc: Record, theme: _Theme) -> list[_Label]:
@@ -284,12 +280,12 @@ def _add_tube(plotter: Any, disc: Record, theme: _Theme) -> list[_Label]:
     shine = {"smooth_shading": True, "ambient": 0.25, "specular": 0.3}
     plotter.add_mesh(tube, color=theme.colours["--fig-paper"], **shine)
     if crest is None:
-        return [_Label(text="connecting tube", place=np.array([0.0, 0.0, height]), shift=(120, -96))]
+        return [_Label(text="connecting tube", point=np.array([0.0, 0.0, height]), shift=(120, -96))]
     top = np.array([0.0, crest, height])
     plotter.add_mesh(pv.Sphere(radius=1.7 * radius, center=top), color=theme.mark, smooth_shading=True)
     return [
-        _Label(text=f"siphon crest at {crest:.4g} mm", place=top, shift=(-8, 88)),
-        _Label(text="connecting tube", place=path[len(path) // 4], shift=(200, 80)),
+        _Label(text=f"siphon crest at {crest:.4g} mm", point=top, shift=(-8, 88)),
+        _Label(text="connecting tube", point=path[len(path) // 4], shift=(200, 80)),
     ]
 
 
@@ -327,55 +323,44 @@ def _corner(before: FloatArray, corner: FloatArray, after: FloatArray, bend: flo
     return np.asarray((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)
 
 
-def _pixel(plotter: Any, place: FloatArray) -> tuple[float, float]:
-    """Where a place of the scene stands in the picture, from its lower left corner."""
-    width, height = PICTURE
-    matrix = pv.array_from_vtkmatrix(
-        plotter.camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)
-    )
-    x, y, _, w = matrix @ np.array([*place, 1.0])
-    return (x / w + 1) / 2 * width, (y / w + 1) / 2 * height
-
-
 def _save(plotter: Any, lettering: _Lettering, theme: _Theme, path: Path) -> None:
-    """Reduces the picture, letters it and writes it."""
+    """Reduce the picture, letter it and write it."""
     plotter.suppress_rendering = False
     plotter.render()
-    drawn = np.asarray(plotter.screenshot(return_img=True), dtype=np.float64)
+    pixels = np.asarray(plotter.screenshot(return_img=True), dtype=np.float64)
     width, height = PICTURE
-    reduced = drawn.reshape(height, _SCALE, width, _SCALE, 3).mean(axis=(1, 3)) / 255
+    reduced = pixels.reshape(height, _SCALE, width, _SCALE, 3).mean(axis=(1, 3)) / 255
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     figure.figimage(reduced, zorder=-1)
+    projection = plotter.camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)
+    matrix = pv.array_from_vtkmatrix(projection)
+    halo = [withStroke(linewidth=10 * _PT_PER_PIXEL, foreground=theme.ground)]
     for label in lettering.labels:
-        _write(figure, label, _pixel(plotter, label.place), theme)
+        x, y, _, w = matrix @ np.array([*label.point, 1.0])
+        x, y = (x / w + 1) / 2 * width, (y / w + 1) / 2 * height
+        right, up = label.shift
+        side = "center" if not up else "bottom" if up > 0 else "top"
+        look: Record = {"ha": "center", "va": side, "color": theme.ink, "zorder": 3, "path_effects": halo}
+        look |= {"fontsize": 43 * _PT_PER_PIXEL, "weight": "bold"} if label.strong else {"fontsize": _FONT_PT}
+        text = figure.text(0, (y + up) / height, label.text, **look)
+        # The text stays whole within the picture; its leader begins at its upper or lower edge.
+        half = text.get_window_extent().width / 2 + 5
+        text.set_x(min(max(x + right, half), width - half) / width)
+        if up:
+            leader: Record = {"color": theme.ink, "linewidth": 2 * _PT_PER_PIXEL, "path_effects": halo}
+            leader |= {"transform": None, "marker": "o", "markersize": 8 * _PT_PER_PIXEL, "markevery": [0]}
+            figure.add_artist(Line2D([x, x + right], [y, y + up], **leader))
     bar = figure.add_axes((32 / width, 0.18, 35 / width, 0.58))
-    bar.set_title(lettering.title, loc="left", color=theme.ink, fontsize=_FONT, pad=14)
+    bar.set_title(lettering.title, loc="left", color=theme.ink, fontsize=_FONT_PT, pad=14)
     scale = ScalarMappable(Normalize(0, lettering.high), lettering.colours)
     ticks = MaxNLocator(5, steps=[1, 2, 5, 10])
     drawn_bar = figure.colorbar(scale, cax=bar, ticks=ticks, format=FuncFormatter(plain_number))
     drawn_bar.outline.set_edgecolor(theme.ink)
-    bar.tick_params(color=theme.ink, labelcolor=theme.ink, labelsize=_FONT - 2)
+    bar.tick_params(color=theme.ink, labelcolor=theme.ink, labelsize=_FONT_PT - 2)
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     # Without the fourth channel a file is a tenth smaller.
     Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]).save(path, optimize=True)
-
-
-def _write(figure: Figure, label: _Label, place: tuple[float, float], theme: _Theme) -> None:
-    """A label, whole within the picture, with a leader from its upper or lower edge."""
-    (x, y), (right, up) = place, label.shift
-    halo = [withStroke(linewidth=10 * _POINTS, foreground=theme.ground)]
-    side = "center" if not up else "bottom" if up > 0 else "top"
-    look: Record = {"ha": "center", "va": side, "color": theme.ink, "zorder": 3, "path_effects": halo}
-    look |= {"fontsize": 43 * _POINTS, "weight": "bold"} if label.strong else {"fontsize": _FONT}
-    text = figure.text(0, (y + up) / PICTURE[1], label.text, **look)
-    half = text.get_window_extent().width / 2 + 5
-    middle = min(max(x + right, half), PICTURE[0] - half)
-    text.set_x(middle / PICTURE[0])
-    if up:
-        line: Record = {"transform": None, "color": theme.ink, "linewidth": 2 * _POINTS, "path_effects": halo}
-        dot: Record = {"marker": "o", "markersize": 8 * _POINTS, "markevery": [0]}
-        figure.add_artist(Line2D([x, x + right], [y, y + up], **line, **dot))
 
 
 if __name__ == "__main__":

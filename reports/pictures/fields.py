@@ -1,5 +1,5 @@
-"""The pressure field that a report shows, in three dimensions: of a sector, or of an imported chamber; and
-meshes with their boundary names and fields as VTU files.
+"""The pressure field of a sector or of an imported chamber in three dimensions, and VTU files of meshes with
+their boundary names and fields.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.pressure.solve import RotatingLiquid, quadratic_basis, solve_on, solve_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.files import draft_folder, write_whole
 
 Record = dict[str, Any]
-_RADII: Final = 17
-"""At which a profile is shown of an imported chamber."""
+_PROFILE_RADII: Final = 17
+"""Number of radii of an imported chamber's profile."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class _ChamberField:
     surface_radius: float
     """m."""
     mesh: Any
-    """Of scikit-fem, m."""
+    """Mesh of scikit-fem, m."""
     pressure: FloatArray
     """Pa, shape (nodes,)."""
     profile: tuple[FloatArray, FloatArray]
@@ -57,16 +57,16 @@ class _ChamberField:
         volume = self.fill_ratio * chamber_volume(disc=disc)
         implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
         radius, pressure = self.profile
-        drawn = np.linspace(implied, disc.outer_radius, radius.size)
+        paper_radius = np.linspace(implied, disc.outer_radius, radius.size)
         wall = paper.wall_pressure_paper(
             disc=disc, density=liquid.density, angular_velocity=speed, liquid_volume=volume
         )
-        below = liquid.density * speed**2 / 2 * (drawn[:-1] ** 2 - implied**2)
+        below = liquid.density * speed**2 / 2 * (paper_radius[:-1] ** 2 - implied**2)
         return {
             "fill_ratio": self.fill_ratio,
             "radius_m": radius.tolist(),
             "pressure_Pa": pressure.tolist(),
-            "paper_radius_m": drawn.tolist(),
+            "paper_radius_m": paper_radius.tolist(),
             "paper_pressure_Pa": [*below.tolist(), float(wall)],
         }
 
@@ -77,7 +77,7 @@ class _ChamberField:
 
 
 def shown_fill(scene: Scene) -> float:
-    """Fill ratio, positive, at which fields are shown: of the start, or equal ones where it is zero."""
+    """Fill ratio, positive, of the fields shown: that of the start, or equal fills where it is zero."""
     return scene.disc.initial_fill or scene.disc.max_fill_ratio / 2
 
 
@@ -87,57 +87,44 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> _ChamberField:
     Args: `fill_ratio`: x, within (0, 1).
     Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
     """
-    radius = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
-    liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
-    parts = (
-        _in_sector(scene, radius, liquid)
-        if scene.disc.geometry is None
-        else _in_imported(scene.disc.geometry, radius, liquid)
-    )
-    return _ChamberField(fill_ratio=fill_ratio, surface_radius=radius, **parts)
-
-
-def _in_sector(scene: Scene, surface: float, liquid: RotatingLiquid) -> Record:
-    """On a structured mesh; the profile along the middle of the chamber."""
     disc = scene.disc
-    chamber = chamber_mesh(disc=disc, surface_radius=surface, cells=default_cells(disc=disc, dimension=3))
-    solution = solve_pressure(chamber=chamber, problem=liquid.problem())
-    middle = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
-    jacobian, aspect = chamber.quality()
-    return {
-        "mesh": chamber.mesh.scaled(chamber.length_scale),
-        "pressure": solution.pressure,
-        "profile": (np.hypot(*chamber.places[:2, middle]), solution.pressure[middle]),
-        "record": {
+    mesh_record: Record
+    surface = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+    liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
+    if disc.geometry is None:
+        # A structured mesh; the profile along the middle of the chamber.
+        chamber = chamber_mesh(disc=disc, surface_radius=surface, cells=default_cells(disc=disc, dimension=3))
+        solution = solve_pressure(chamber=chamber, problem=liquid.problem())
+        mesh, pressure = chamber.mesh.scaled(chamber.length_scale), solution.pressure
+        middle = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
+        profile = (np.hypot(*chamber.places[:2, middle]), pressure[middle])
+        jacobian, aspect = chamber.quality()
+        mesh_record = {
             "cells": list(chamber.cells),
             "unknowns": chamber.grid.size,
             "minimum_scaled_jacobian": jacobian,
             "largest_aspect": aspect,
-            "relative_residual": solution.statistics.relative_residual,
-            "status": solution.status.text,
-        },
-    }
-
-
-def _in_imported(geometry: ChamberGeometry, surface: float, liquid: RotatingLiquid) -> Record:
-    """On the chamber's own mesh, cut along the free surface; the profile at nodes nearest to even radii."""
-    mesh = scikit_fem_mesh(liquid_body(tetrahedra(geometry), surface))
-    solution = solve_on(quadratic_basis(mesh), liquid.problem())
-    radius = np.hypot(*mesh.doflocs[:2])
-    order = np.argsort(radius)
-    even = np.linspace(radius[order[0]], radius[order[-1]], _RADII)
-    nearest = order[np.minimum(np.searchsorted(radius[order], even), radius.size - 1)]
-    return {
-        "mesh": mesh,
-        "pressure": solution.values,
-        "profile": (radius[nearest], solution.values[nearest]),
-        "record": {
-            "cells": [mesh.nelements],
-            "unknowns": solution.values.size,
-            "relative_residual": solution.statistics.relative_residual,
-            "status": solution.status.text,
-        },
-    }
+        }
+        residual, status = solution.statistics.relative_residual, solution.status
+    else:
+        # The chamber's own mesh, cut along the free surface; the profile at nodes nearest to even radii.
+        mesh = scikit_fem_mesh(liquid_body(tetrahedra(disc.geometry), surface))
+        solved = solve_on(quadratic_basis(mesh), liquid.problem())
+        radius, pressure = np.hypot(*mesh.doflocs[:2]), solved.values
+        order = np.argsort(radius)
+        even = np.linspace(radius[order[0]], radius[order[-1]], _PROFILE_RADII)
+        nearest = order[np.minimum(np.searchsorted(radius[order], even), radius.size - 1)]
+        profile = (radius[nearest], pressure[nearest])
+        mesh_record = {"cells": [mesh.nelements], "unknowns": pressure.size}
+        residual, status = solved.statistics.relative_residual, solved.status
+    return _ChamberField(
+        fill_ratio=fill_ratio,
+        surface_radius=surface,
+        mesh=mesh,
+        pressure=pressure,
+        profile=profile,
+        record={**mesh_record, "relative_residual": residual, "status": status.text},
+    )
 
 
 def _write_vtu(path: Path, *, mesh: Any, fields: Mapping[str, npt.ArrayLike] | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""Asks whether this machine can draw off-screen, before VTK is imported.
+"""Probe whether this machine can draw off-screen, before VTK is imported.
 
 Without an OpenGL library VTK ends in a segmentation fault, so the question is put with ctypes alone and in
 a process of its own: whatever a broken driver does there, the caller gets a sentence.  Only the standard
@@ -11,6 +11,7 @@ import ctypes
 import json
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,13 +23,13 @@ DEBIAN_PACKAGES: Final = "libegl1 libgl1 libgl1-mesa-dri libglu1-mesa"
 
 _EGL_PLATFORM_DEVICE: Final = 0x313F
 _EGL_OPENGL_API: Final = 0x30A2
-_MOST_DEVICES: Final = 16
-_PATIENCE: Final = 30.0
+_MAX_DEVICES: Final = 16
+_TIMEOUT_S: Final = 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenGL:
-    """Whether, and through which VTK window class, pictures can be drawn off-screen."""
+    """Result of the probe: VTK window class for pictures off-screen, or the reason why there are none."""
 
     available: bool
     window: str
@@ -46,50 +47,29 @@ def _entry_point(egl: ctypes.CDLL, name: str) -> ctypes._FuncPointer:
     return ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
 
 
-def _egl_devices(egl: ctypes.CDLL) -> list[int]:
-    """Handles of what EGL can draw on; Mesa's software renderer is one."""
-    handles = (ctypes.c_void_p * _MOST_DEVICES)()
-    count = ctypes.c_int(0)
-    _entry_point(egl, "eglQueryDevicesEXT")(_MOST_DEVICES, handles, ctypes.addressof(count))
-    return [handle for handle in handles[: count.value] if handle]
-
-
-def _initialises(egl: ctypes.CDLL, device: int) -> bool:
-    """True when a display on the device starts and speaks OpenGL."""
-    display = _entry_point(egl, "eglGetPlatformDisplayEXT")(_EGL_PLATFORM_DEVICE, device, None)
-    started = display and egl.eglInitialize(ctypes.c_void_p(display), None, None)
-    return bool(started) and bool(egl.eglBindAPI(_EGL_OPENGL_API))
-
-
-def _egl_fault(library: str) -> str:
-    """Empty when EGL draws, else why not."""
-    try:
-        egl = ctypes.CDLL(library)
-        devices = _egl_devices(egl)
-    except (OSError, AttributeError) as error:
-        return str(error)
-    if not any(_initialises(egl, device) for device in devices):
-        return f"none of the {len(devices)} devices of {library} starts"
-    return ""
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
-
-
 def probe(*, egl: str, osmesa: str) -> OpenGL:
-    """Tries EGL, then OSMesa, in this very process; a broken driver may end it.
+    """Try EGL, then OSMesa, in this very process; a broken driver may end it.
 
     Args: `egl`: file name of the EGL library. `osmesa`: file name of the OSMesa library.
     """
-    fault = _egl_fault(egl)
-    if not fault:
-        return OpenGL(available=True, window="vtkEGLRenderWindow", text="Off-screen OpenGL through EGL.")
-    if _loads(osmesa):
+    try:
+        library = ctypes.CDLL(egl)
+        # Handles of what EGL can draw on; Mesa's software renderer is one.
+        handles, count = (ctypes.c_void_p * _MAX_DEVICES)(), ctypes.c_int(0)
+        _entry_point(library, "eglQueryDevicesEXT")(_MAX_DEVICES, handles, ctypes.addressof(count))
+        devices = [handle for handle in handles[: count.value] if handle]
+        for device in devices:
+            display = _entry_point(library, "eglGetPlatformDisplayEXT")(_EGL_PLATFORM_DEVICE, device, None)
+            started = display and library.eglInitialize(ctypes.c_void_p(display), None, None)
+            if started and library.eglBindAPI(_EGL_OPENGL_API):
+                return OpenGL(
+                    available=True, window="vtkEGLRenderWindow", text="Off-screen OpenGL through EGL."
+                )
+        fault = f"none of the {len(devices)} devices of {egl} starts"
+    except (OSError, AttributeError) as error:
+        fault = str(error)
+    with suppress(OSError):
+        ctypes.CDLL(osmesa)
         return OpenGL(
             available=True, window="vtkOSOpenGLRenderWindow", text="Off-screen OpenGL through OSMesa."
         )
@@ -102,7 +82,7 @@ def _nothing(reason: str) -> OpenGL:
 
 
 def find_opengl(*, egl: str = EGL_LIBRARY, osmesa: str = OSMESA_LIBRARY) -> OpenGL:
-    """Whether pictures can be drawn off-screen: pyvista is there, and OpenGL answers in a child process.
+    """Check that pyvista is installed and that OpenGL answers in a child process.
 
     Args: `egl`: file name of the EGL library. `osmesa`: file name of the OSMesa library, tried second.
     """
@@ -111,9 +91,9 @@ def find_opengl(*, egl: str = EGL_LIBRARY, osmesa: str = OSMESA_LIBRARY) -> Open
         return OpenGL(available=False, window="", text=text)
     command = [sys.executable, str(Path(__file__).resolve()), egl, osmesa]
     try:
-        child = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_PATIENCE)
+        child = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        return _nothing(f"the OpenGL driver did not answer within {_PATIENCE:.0f} s")
+        return _nothing(f"the OpenGL driver did not answer within {_TIMEOUT_S:.0f} s")
     if child.returncode != 0:
         return _nothing(f"the OpenGL driver ended its process with code {child.returncode}")
     return OpenGL(**json.loads(child.stdout))

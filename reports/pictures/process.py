@@ -1,4 +1,4 @@
-"""The 3-D pictures: asked of a process of its own, so that a report outlives a driver that does not."""
+"""The 3-D pictures, drawn in a process of their own, so that a report survives a driver that crashes."""
 
 from __future__ import annotations
 
@@ -19,17 +19,13 @@ from ringbalance.scene import Scene
 
 Record = dict[str, Any]
 
-_PATIENCE: Final = 300.0
+_TIMEOUT_S: Final = 300.0
 _FIGURES: Final = "figures"
 _FIELDS: Final = "fields"
 FOLDERS: Final = (_FIGURES, _FIELDS)
-"""Of the files, in an output folder."""
-_WHOLE: Final = "chamber"
-"""Among the fields of a job: the space of an imported chamber, on which there is no field."""
-_SIZE: Final = (1200, 800)
-"""Of a picture, pixels, as it is drawn; what draws it is not loaded here."""
-NAMES: Final = ("disc", "pressure")
-"""Of the pictures; their captions are in templates."""
+_SIZE_PIXELS: Final = (1200, 800)
+"""Size of a picture, equal to that of the drawing module, which is not loaded here."""
+PICTURE_NAMES: Final = ("disc", "pressure")
 _JOB: Final = "drawing.json"
 _LOG: Final = "drawing.txt"
 
@@ -42,12 +38,19 @@ class _Drawing3D:
     text: str
     folder: Path
     shown: Record
-    """What the captions name, SI."""
+    """Numbers for the captions, SI."""
 
     def finish(self) -> Record:
         """Wait for the pictures and list them for the evidence."""
-        log = self.folder.parent / _LOG
-        fault = "" if self.process is None else _fault(self.process, log)
+        log, fault = self.folder.parent / _LOG, ""
+        if self.process is not None:
+            try:
+                if code := self.process.wait(_TIMEOUT_S):
+                    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+                    reason = lines[-1] if lines else "it said nothing"
+                    fault = f"The 3-D pictures were left out: drawing ended with code {code} ({reason})."
+            except subprocess.TimeoutExpired:
+                fault = f"The 3-D pictures were left out: drawing took longer than {_TIMEOUT_S:.0f} s."
         self.stop()
         for path in (log, log.with_name(_JOB)):
             path.unlink(missing_ok=True)
@@ -58,17 +61,17 @@ class _Drawing3D:
                 "name": name,
                 "light": f"{name}-light.png",
                 "dark": f"{name}-dark.png",
-                "width": _SIZE[0],
-                "height": _SIZE[1],
+                "width": _SIZE_PIXELS[0],
+                "height": _SIZE_PIXELS[1],
             }
-            for name in NAMES
+            for name in PICTURE_NAMES
         ]
         return {"drawn": True, "text": self.text, "files": files, "shown": self.shown}
 
     def stop(self) -> None:
         """End a drawing that nobody waits for any more."""
         if self.process is not None:
-            # All that is left of it: the pipe is closed, and the process waited for.
+            # This closes the pipe and waits for the process.
             self.process.kill()
             self.process.communicate()
 
@@ -85,16 +88,16 @@ def _write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
         for key, fill in fills.items()
     }
     geometry = scene.disc.geometry
-    if geometry is None:
-        return written
-    path = folder / _FIELDS / "chamber.vtu"
-    whole = write_cells(path, kind=geometry.kind, points=geometry.points, cells=geometry.cells)
-    return {**written, _WHOLE: whole}
+    if geometry is not None:
+        path = folder / _FIELDS / "chamber.vtu"
+        cells = write_cells(path, kind=geometry.kind, points=geometry.points, cells=geometry.cells)
+        written["chamber"] = cells
+    return written
 
 
 @contextmanager
 def drawn(scene: Scene, folder: Path, opengl: OpenGL | None = None) -> Iterator[Callable[[], Record]]:
-    """Fields and pictures of a scene, drawn while the body runs; what is given waits for their record.
+    """Draw fields and pictures of a scene while the body runs; the function yielded waits for their record.
 
     Raises: OSError: the folder cannot be written.
     """
@@ -113,7 +116,7 @@ def _start_drawing(
 
     Raises: OSError: the folder cannot be written.
     """
-    found = find_opengl() if opengl is None else opengl
+    machine = find_opengl() if opengl is None else opengl
     figures = folder / _FIGURES
     figures.mkdir(parents=True, exist_ok=True)
     shown = {
@@ -123,40 +126,13 @@ def _start_drawing(
         "crest_radius_m": scene.tube.hump_radius,
         "speed_rad_s": scene.rotor.speed,
     }
-    if not found.available:
-        return _Drawing3D(process=None, text=found.text, folder=figures, shown=shown)
+    if not machine.available:
+        return _Drawing3D(process=None, text=machine.text, folder=figures, shown=shown)
     job = folder / _JOB
-    job.write_text(json.dumps(_job(scene, fields, figures)), encoding="utf-8")
-    with open(folder / _LOG, "wb") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "ringbalance.reports.pictures.draw", str(job)],
-            env={**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": found.window, "OMP_NUM_THREADS": "1"},
-            # Never written to: it closes when this process ends, however it ends, and then the other ends.
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=log,
-        )
-    return _Drawing3D(process=process, text=found.text, folder=figures, shown=shown)
-
-
-def _fault(process: subprocess.Popen[bytes], log: Path) -> str:
-    """Empty when the process drew everything, else a sentence."""
-    try:
-        process.wait(_PATIENCE)
-    except subprocess.TimeoutExpired:
-        return f"The 3-D pictures were left out: drawing took longer than {_PATIENCE:.0f} s."
-    if process.returncode == 0:
-        return ""
-    told = log.read_text(encoding="utf-8", errors="replace").strip()
-    last = told.splitlines()[-1] if told else "it said nothing"
-    return f"The 3-D pictures were left out: drawing ended with code {process.returncode} ({last})."
-
-
-def _job(scene: Scene, fields: Mapping[str, Path], folder: Path) -> Record:
     disc, tube = scene.disc, scene.tube
-    return {
+    content = {
         "fields": {name: str(path) for name, path in fields.items()},
-        "folder": str(folder),
+        "folder": str(figures),
         "chambers": disc.chambers,
         "central_angle": disc.central_angle,
         "letters": list(chamber_letters(disc.chambers)),
@@ -170,3 +146,14 @@ def _job(scene: Scene, fields: Mapping[str, Path], folder: Path) -> Record:
             "hump_radius": tube.hump_radius,
         },
     }
+    job.write_text(json.dumps(content), encoding="utf-8")
+    with open(folder / _LOG, "wb") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "ringbalance.reports.pictures.draw", str(job)],
+            env={**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": machine.window, "OMP_NUM_THREADS": "1"},
+            # Never written to: it closes when this process ends, however it ends, and then the other ends.
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+        )
+    return _Drawing3D(process=process, text=machine.text, folder=figures, shown=shown)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from ringbalance.reports.page import render
-from ringbalance.reports.pages.cases import LONG, is_long, table_file
+from ringbalance.reports.pages.cases import MAX_PAGE_ROWS, is_long, table_file
 from ringbalance.reports.pages.standing import _symbols_and_sources, evidence_text
 from ringbalance.reports.report import _csv_tables
 from ringbalance.reports.saved import provenance
@@ -67,9 +67,10 @@ def test_provenance_names_neither_folder_nor_machine() -> None:
 
 
 def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
+    rows = MAX_PAGE_ROWS + 1
     table: Record = {
         "name": "Settled after, by period",
-        "columns": {"period": [0.1 * i for i in range(LONG + 1)], "ending": ["settled"] * (LONG + 1)},
+        "columns": {"period": [0.1 * i for i in range(rows)], "ending": ["settled"] * rows},
         "units": {"period": "s"},
     }
     short = {"name": "short", "columns": {"a": [1.0]}, "units": {}}

@@ -80,7 +80,7 @@ def test_every_section_is_there_and_says_something(folder: Path) -> None:
     pages = {place: (folder / f"{place}.html").read_text() for place in ("report", "annex")}
     for section in SECTIONS:
         # No claim was judged for this report, and the scene is not the paper's.
-        page = pages["annex" if section.of_paper else section.place]
+        page = pages["annex" if section.of_paper else section.document]
         # This scene was not fitted to measurements.
         assert (f'<section id="{section.name}"' in page) == (section.name != "measured")
     assert "nan" not in re.sub(r"<svg.*?</svg>", "", pages["report"], flags=re.DOTALL).lower().split()

@@ -52,7 +52,7 @@ def test_a_driver_that_crashes_is_reported(tmp_path: Path, monkeypatch: pytest.M
 @pytest.mark.skipif(os.name != "posix", reason="needs a shell")
 def test_a_driver_that_hangs_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, "exec sleep 60"))
-    monkeypatch.setattr(opengl, "_PATIENCE", 0.2)
+    monkeypatch.setattr(opengl, "_TIMEOUT_S", 0.2)
     found = find_opengl()
     assert not found.available
     assert "did not answer" in found.text

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reports.figure import NARROW, Drawing
+from ringbalance.reports.figure import NARROW_IN, Drawing
 from ringbalance.reports.pages.loop import LOOP
 from ringbalance.reports.pages.operation import SECTION, _disc_section, _letter_radius, _operating_map
 from ringbalance.reports.pages.standing import CONDITIONS
@@ -140,7 +140,7 @@ def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> Non
     drawing = _operating_map(collected)
     sizes = [float(size) for size in re.findall(r"font(?:-size)?: (?:bold )?([\d.]+)px", drawing.svg)]
     assert sizes
-    assert min(sizes) * COLUMN / (72 * NARROW) >= 8
+    assert min(sizes) * COLUMN / (72 * NARROW_IN) >= 8
 
 
 def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:

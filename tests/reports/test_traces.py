@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from check_traces import SAME, agrees, apart, printed, traces
 
-from ringbalance.reports.traced import _marked_up, evidence_at, marked, placed
+from ringbalance.reports.traced import evidence_at, finished, marked, placed
 from ringbalance.reports.traced import printed as traced
 from ringbalance.results.numbers import believed
 
@@ -61,7 +61,7 @@ def test_a_number_is_printed_with_its_place_and_markup_is_not_obeyed() -> None:
     value = placed({"a": [{"b_m": 2.5e-6}]})["a"][0]["b_m"]
     assert traced(value, 1e-7) == '<span data-from="a.0.b_m">(2.50\u00a0±\u00a00.10)\u202fµm</span>'
     assert marked("<3", value) == '<span data-from="a.0.b_m">&lt;3</span>'
-    assert _marked_up("3 um & <b> lambda") == "3 µm & <b> λ"
+    assert finished("3 um & <b> lambda") == "3 µm & <b> λ"
 
 
 def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said() -> None:

@@ -34,7 +34,7 @@ def said(request: pytest.FixtureRequest) -> Callable[[dict[str, Any], str], str]
         views = dict.fromkeys(sections_of(evidence["balancer"]))
         shown = {each: view_of(each, evidence) for each in (name, CASES_VIEW)}
         content = page_content(evidence, views={**views, **shown})
-        file = f"{content.context['sections'][0]['place']}.html"
+        file = f"{content.context['sections'][0]['document']}.html"
         return page_text(render_pages(content, documents=(file,))[file])
 
     return text

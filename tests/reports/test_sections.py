@@ -39,7 +39,7 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
 @pytest.mark.parametrize("name", ["report.html", "annex.html"])
 def test_the_contents_follow_the_list(pages: dict[str, str], whole: Record, name: str) -> None:
     links = re.findall(r'<li><a href="#(\w+)">', pages[name])
-    assert links == [e["name"] for e in numbered(whole, views_of(whole)) if f"{e['place']}.html" == name]
+    assert links == [e["name"] for e in numbered(whole, views_of(whole)) if f"{e['document']}.html" == name]
     assert links[0] == {"report.html": "summary", "annex.html": "disc"}[name]
     places = [pages[name].index(f'<section id="{link}"') for link in links]
     assert places == sorted(places)

@@ -19,7 +19,7 @@ from ringbalance.reports.page import DOCUMENTS, page_content, render_pages, term
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
-from ringbalance.reports.pictures.process import FOLDERS, drawn
+from ringbalance.reports.pictures.process import FOLDERS, drawing_beside
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record, ring_of
 from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of
@@ -103,7 +103,7 @@ def write_report(
         seldom_collected(),
         staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage,
         beside(workers, loading=paper_scene) as pool,
-        no_pictures if ring is None else drawn(ring, stage, opengl) as finish_pictures,
+        no_pictures if ring is None else drawing_beside(ring, stage, opengl) as finish_pictures,
     ):
         evidence = collect_evidence(
             scene, level=level, scene_text=scene_text, saved=saved, pool=pool, progress=report_progress

@@ -59,8 +59,7 @@ THREAD_COUNTS = (
 
 
 def _converted(hint: Any, tokens: Sequence[Token]) -> Any:
-    """As cyclopts converts an argument, but a whole number is not made of another one by rounding, nor a file
-    of a folder's name."""
+    """Convert as cyclopts does, but round no number to a whole one, and take no folder's name for a file."""
     kinds = {hint, *get_args(hint)}
     for text in (token.value for token in tokens):
         if int in kinds and "." in text:
@@ -102,16 +101,17 @@ def _shell_function(name: str, command: ShellCommand) -> Callable[..., int]:
     """The function from whose signature and docstring the shell's parser and `--help` of a command come."""
 
     def run(*arguments: Any, **options: Any) -> int:
-        given = shape.bind(*arguments, **options).arguments
-        result: int = registered("function", "run_command")(name, **given)
+        result: int = registered("function", "run_command")(
+            name, **shape.bind(*arguments, **options).arguments
+        )
         return result
 
     hints: dict[str, Any] = {}
     parameters = []
     for key, option in command.options.items():
-        own = not option.text or f"    {key}: " in command.text
-        shown: dict[str, Any] = {**option.parsing, **({} if own else {"help": option.text})}
-        hints[key] = Annotated[option.hint, Parameter(**shown)]
+        documented = not option.text or f"    {key}: " in command.text
+        help_text = {} if documented else {"help": option.text}
+        hints[key] = Annotated[option.hint, Parameter(**{**option.parsing, **help_text})]
         several = option.kind is SignatureParameter.VAR_POSITIONAL
         default = SignatureParameter.empty if several else option.default
         parameters.append(SignatureParameter(key, option.kind, default=default, annotation=hints[key]))
@@ -148,7 +148,15 @@ def _say(text: str) -> None:
 
 def _usage_fault(error: CycloptsError) -> str:
     if isinstance(error, MissingArgumentError) and error.argument is not None and error.argument.required:
-        return _missing(error)
+        required = [
+            parameter.name.upper()
+            for parameter in signature(error.target or _build_app).parameters.values()
+            if parameter.default is parameter.empty and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+        ]
+        missing = error.argument.field_info.names[0].upper()
+        command = " ".join(("ringbalance", *(error.command_chain or ())))
+        examples = " ".join(EXAMPLE_SCENES[: len(required)])
+        return f"{missing} is missing: {command} {' '.join(required)}, for example {command} {examples}."
     if not isinstance(error, UnknownCommandError) or not error.unused_tokens:
         return str(error)
     # cyclopts would import every command's module to say this.
@@ -158,37 +166,11 @@ def _usage_fault(error: CycloptsError) -> str:
     return f'unknown command "{word}"{guess} Commands: {", ".join(COMMANDS)}.'
 
 
-def _missing(error: MissingArgumentError) -> str:
-    required = [
-        parameter.name.upper()
-        for parameter in signature(error.target or _build_app).parameters.values()
-        if parameter.default is parameter.empty and parameter.kind is parameter.POSITIONAL_OR_KEYWORD
-    ]
-    missing = error.argument.field_info.names[0].upper() if error.argument else ""
-    command = " ".join(("ringbalance", *(error.command_chain or ())))
-    examples = " ".join(EXAMPLE_SCENES[: len(required)])
-    return f"{missing} is missing: {command} {' '.join(required)}, for example {command} {examples}."
-
-
-def _refusal(error: OSError) -> str:
-    if error.filename:
-        return f"{error.filename}: {error.strerror}"
-    if error.errno is None:
-        return str(error)
-    # The machine refused something that no file name stands for, such as a process or a full disk.
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{error.strerror} (in {frame.name}, {frame.filename}, line {frame.lineno})"
-
-
-def _run(arguments: Sequence[str] | None) -> int:
-    result = _build_app().meta(arguments, exit_on_error=False, print_error=False)
-    sys.stdout.flush()
-    return result if isinstance(result, int) else DONE
-
-
 def _run_guarded(arguments: Sequence[str] | None) -> int:
     try:
-        return _run(arguments)
+        result = _build_app().meta(arguments, exit_on_error=False, print_error=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else DONE
     except (BrokenPipeError, KeyboardInterrupt):
         raise
     except SystemExit as stop:
@@ -202,7 +184,15 @@ def _run_guarded(arguments: Sequence[str] | None) -> int:
     except ringbalance.SceneError as error:
         _say(str(error))
     except OSError as error:
-        _say(f"ringbalance: {_refusal(error)}")
+        if error.filename:
+            text = f"{error.filename}: {error.strerror}"
+        elif error.errno is None:
+            text = str(error)
+        else:
+            # The machine refused something that no file name stands for, such as a process or a full disk.
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            text = f"{error.strerror} (in {frame.name}, {frame.filename}, line {frame.lineno})"
+        _say(f"ringbalance: {text}")
     return BAD_INPUT
 
 

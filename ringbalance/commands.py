@@ -53,7 +53,7 @@ class ShellCommand(NamedTuple):
     """First text of the progress, where a function of the Python interface does the work; empty: the command
     has a function of its own, which takes the options and returns the exit code."""
     headline: bool = True
-    """See `Rows.view`."""
+    """True if the first finding stands above the numbers, see `Rows.view`."""
 
     @property
     def summary(self) -> str:

@@ -1,4 +1,4 @@
-"""Many designs as a Python user calls them: a sweep, and one as a function to optimise."""
+"""Many designs, for Python and as the command `sweep`: a sweep, and one design as a function to optimise."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def sweep(
         a text such as "0.5mm:2mm:30"; by a tuple of paths that move together, one of these for each; by the
         name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
         "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: drawn devices that
-        each point is run as at most, fewer where they decide. `intervals`: whether uncertain inputs are
-        followed through, which takes most of the time of static answers. `check`: rows of a liquid ring to
+        each point is run as at most, fewer where they decide. `intervals`: True to propagate uncertain
+        inputs, which takes most of the time of static answers. `check`: rows of a liquid ring to
         calibrate, which measures what the array core leaves out; none here, while the command takes three.
         `executor`: any `concurrent.futures.Executor`; its answers are those of this process to
-        the last bit. `workers`: processes of its own where there is none. `store`: folder in which answers
-        are kept, and from which an interrupted sweep goes on. `progress`: called with how far it is.
+        the last bit. `workers`: processes of its own where there is none. `store`: folder of
+        the answers, from which an interrupted sweep resumes. `progress`: called with the progress so far.
     Raises: SceneError: a scene or an axis that cannot be used; a point that is refused is a row with its
         finding.
 
@@ -100,8 +100,11 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
     """
     check_counts("sweep", runs=runs)
     (row,) = static_rows(scene, [dict(changes)], intervals=False)
-    if row["status"] == REFUSED and not all(_is_key(scene, path) for path in changes):
-        scene.with_values(changes)  # Says which.
+    if row["status"] == REFUSED:
+        schema = scene_kind(scene.balancer).schema
+        paths = [path.split(".") for path in changes]
+        if not all(tables and key in schema.keys_in(tables) for *tables, key in paths):
+            scene.with_values(changes)  # Names the path that is no key.
     driven = runs and row["sha256"]
     run = registered("function", "run_row")(scene, dict(changes), runs) if driven else EMPTY
     finding = row["finding"] or run["finding"]
@@ -114,23 +117,18 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
     }
 
 
-def _is_key(scene: AnyScene, path: str) -> bool:
-    *tables, key = path.split(".")
-    return key in scene_kind(scene.balancer).schema.keys_in(tables) if tables else False
-
-
 def sweep_file(options: SimpleNamespace) -> int:
     """Run the command `sweep`: write the table, its document, figures and the scenes of some rows."""
-    given = load_scene(options.scene)
+    scene = load_scene(options.scene)
     if options.tolerance is not None:
-        given = given.with_values({"accuracy.tolerance": read_tolerance(options.tolerance)})
+        scene = scene.with_values({"accuracy.tolerance": read_tolerance(options.tolerance)})
     if options.plan is None:
-        points = plan_of_texts(given, options.vary or [], sample=options.sample)
+        points = plan_of_texts(scene, options.vary or [], sample=options.sample)
     elif options.vary or options.sample:
         problem, allowed = "the plan has axes and sample", "either of them"
         raise SceneError.of_option(option="--plan", value=str(options.plan), problem=problem, allowed=allowed)
     else:
-        points = plan_of_file(given, options.plan)
+        points = plan_of_file(scene, options.plan)
     if options.write:
         check_rows(options.write, len(points.points()))
     table, summary = options.out / "table.csv", options.out / "sweep.json"
@@ -138,7 +136,7 @@ def sweep_file(options: SimpleNamespace) -> int:
         check_file(file)
     with activity("sweep", "points ...") as shown:
         result = run_sweep(
-            given,
+            scene,
             points,
             runs=options.runs,
             intervals=not options.no_intervals,

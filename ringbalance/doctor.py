@@ -1,4 +1,4 @@
-"""What this machine gives the program, from versions to processes, and what to do where something lacks."""
+"""Check of the machine, from versions to processes, with advice where something is missing."""
 
 from __future__ import annotations
 
@@ -33,76 +33,55 @@ class MachineCheck(NamedTuple):
     """`absent` costs a picture, time or an extra; with `broken` a command fails or repeats its work."""
     text: str
     advice: str = ""
-    """What to do; empty where nothing is to be done."""
+    """Remedy; empty: none needed."""
 
 
 def checks() -> Iterator[MachineCheck]:
-    """Look at everything; takes a second or two, since it asks the graphics driver."""
-    yield MachineCheck(
-        "ringbalance", "ok", f"{ringbalance.__version__} at {os.path.dirname(ringbalance.__file__)}"
-    )
-    yield MachineCheck(
-        "Python", "ok", f"{platform.python_version()}, {platform.system()} {platform.machine()}"
-    )
-    yield from _packages()
-    yield _pictures()
-    yield _compiler()
+    """Check everything; takes a second or two, since it asks the graphics driver."""
+    folder = os.path.dirname(ringbalance.__file__)
+    yield MachineCheck("ringbalance", "ok", f"{ringbalance.__version__} at {folder}")
+    system = f"{platform.system()} {platform.machine()}"
+    yield MachineCheck("Python", "ok", f"{platform.python_version()}, {system}")
+    for line in requires("ringbalance") or ():
+        requirement, _, marker = line.partition(";")
+        name = re.split(r"[^A-Za-z0-9._-]", requirement.strip(), maxsplit=1)[0]
+        extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)", marker)
+        try:
+            yield MachineCheck(name, "ok", version(name))
+        except PackageNotFoundError:
+            if extra is None:
+                advice = "install ringbalance again: pip install ringbalance"
+                yield MachineCheck(name, "broken", "not installed", advice)
+            else:
+                advice = f'pip install "ringbalance[{extra[1]}]"'
+                yield MachineCheck(name, "absent", f"of the extra {extra[1]}", advice)
+    opengl = find_opengl()
+    yield MachineCheck("off-screen pictures", "ok" if opengl.available else "absent", opengl.text)
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        yield MachineCheck("C compiler", "absent", "none found; only what is exported to C needs one")
+    else:
+        yield MachineCheck("C compiler", "ok", compiler)
     yield _kept_code()
     yield _processes()
 
 
 def doctor(options: SimpleNamespace) -> int:
     """Run the command `doctor`. Returns: Exit code: 1 where something is broken."""
-    made = list(checks())
+    results = list(checks())
     if options.json:
-        print(json_format.dumps({"checks": [check._asdict() for check in made]}))
+        print(json_format.dumps({"checks": [check._asdict() for check in results]}))
     else:
-        _print(made)
-    return int(any(check.state == "broken" for check in made))
-
-
-def _print(made: list[MachineCheck]) -> None:
-    table = Table("", "", "", box=None, show_header=False, padding=(0, 2, 0, 0))
-    for check in made:
-        text = f"{check.text}\n{check.advice}" if check.advice else check.text
-        table.add_row(_WORDS[check.state], check.name, escape(text))
-    results_console().print(table, highlight=False)
-
-
-def _packages() -> Iterator[MachineCheck]:
-    """The packages that the program asks for, each with its version, those of extras included."""
-    for asked in requires("ringbalance") or ():
-        requirement, _, marker = asked.partition(";")
-        name = re.split(r"[^A-Za-z0-9._-]", requirement.strip(), maxsplit=1)[0]
-        extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)", marker)
-        try:
-            yield MachineCheck(name, "ok", version(name))
-        except PackageNotFoundError:
-            yield _missing(name, extra.group(1) if extra else None)
-
-
-def _missing(name: str, extra: str | None) -> MachineCheck:
-    if extra is None:
-        return MachineCheck(
-            name, "broken", "not installed", "install ringbalance again: pip install ringbalance"
-        )
-    return MachineCheck(name, "absent", f"of the extra {extra}", f'pip install "ringbalance[{extra}]"')
-
-
-def _pictures() -> MachineCheck:
-    opengl = find_opengl()
-    return MachineCheck("off-screen pictures", "ok" if opengl.available else "absent", opengl.text)
-
-
-def _compiler() -> MachineCheck:
-    path = shutil.which(os.environ.get("CC", "cc"))
-    if path is None:
-        return MachineCheck("C compiler", "absent", "none found; only what is exported to C needs one")
-    return MachineCheck("C compiler", "ok", path)
+        table = Table("", "", "", box=None, show_header=False, padding=(0, 2, 0, 0))
+        for check in results:
+            text = f"{check.text}\n{check.advice}" if check.advice else check.text
+            table.add_row(_WORDS[check.state], check.name, escape(text))
+        results_console().print(table, highlight=False)
+    return int(any(check.state == "broken" for check in results))
 
 
 def _kept_code() -> MachineCheck:
-    """Compiled code is kept between runs where this user alone can write."""
+    """Check the folder of compiled code, which is used only if no other user can write to it."""
     folder = code_root()
     if folder.exists() and not trusted(folder):
         advice = "remove the folder, or set XDG_CACHE_HOME to one of your own"
@@ -116,7 +95,7 @@ def _kept_code() -> MachineCheck:
 
 
 def _processes() -> MachineCheck:
-    """Whether processes can share work: that takes semaphores, which some containers lack."""
+    """Check that processes can share work, which takes semaphores; some containers lack them."""
     count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     try:
         get_context("spawn").Semaphore()

@@ -1,4 +1,4 @@
-"""What a Python user calls: each function refuses a scene that was changed without its checks."""
+"""Simulation, comparison and tuning, for Python and as commands; unchecked changes of a scene are refused."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ringbalance.scene.registry import registered
 
 
 class GivesVelocities(Protocol):
-    """The least that a flow law of one's own has."""
+    """The methods that a user's own flow law must have."""
 
     @property
     def evaluate(self) -> Callable[..., Flow]:
@@ -89,7 +89,7 @@ def simulate(
             your own; what that lacks is the calibrated law's, and the status says so. Default the calibrated
             law.
         controller: an algorithm of your own, see `Controller`; default that of the scene.
-        sensor: what the controller sees, called with the time, s, and the vibration, m, complex; default the
+        sensor: measured vibration, called with the time, s, and the vibration, m, complex; default the
             scene's noise from the scene's seed.
         progress: called with the simulated time and the time limit, s.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
@@ -111,10 +111,10 @@ def simulate(
 
 def simulate_file(options: SimpleNamespace) -> int:
     """Run the command `simulate`. Returns: Exit code: 0 settled, with all that the scene requires."""
-    given = opened(options.scene, options.tolerance)
+    scene = opened(options.scene, options.tolerance)
     if options.seed is not None:
-        given = replace(given, run=replace(given.run, seed=options.seed))
-    balancer = balancer_of(given, flow_law=law_for(given, options.law))
+        scene = replace(scene, run=replace(scene.run, seed=options.seed))
+    balancer = balancer_of(scene, flow_law=law_for(scene, options.law))
     with activity("simulate", "closed loop ...") as shown:
 
         def show(time: float, limit: float) -> None:
@@ -126,7 +126,7 @@ def simulate_file(options: SimpleNamespace) -> int:
         sheet = ""
         if options.plot is not None:
             # Loading what draws takes as long as a short run.
-            sheet = registered("function", "sheet")(registered("function", "figures_of")(given, run))
+            sheet = registered("function", "sheet")(registered("function", "figures_of")(scene, run))
     if options.csv is not None:
         write_whole(options.csv, csv_text(balancer.history(run)))
     if options.plot is not None:
@@ -142,7 +142,7 @@ def simulate_file(options: SimpleNamespace) -> int:
 def compare(
     first: AnyScene, second: AnyScene, *, rotor: Literal["first", "second"] | None = None
 ) -> Comparison:
-    """Put two balancers on one rotor, and let each balance it; liquid rings under their calibrated laws.
+    """Compare two balancers on one rotor; liquid rings under their calibrated laws.
 
     Args: `rotor`: the scene whose rotor, vibration sensor and limit hold for both; default that of both.
     Raises: SceneError: the scenes describe two rotors and none is named, or a balancer cannot work on it.
@@ -165,10 +165,10 @@ def compare_under(
     progress: Callable[[str], None],
 ) -> Comparison:
     """Compare as the command does: under a law for each balancer that has one."""
-    one, other = (
+    balancers = [
         balancer_of(scene, flow_law=law if takes(scene, "flow_law") else None) for scene in (first, second)
-    )
-    return run_comparison(one, other, rotor=rotor, progress=progress)
+    ]
+    return run_comparison(*balancers, rotor=rotor, progress=progress)
 
 
 @checked
@@ -182,9 +182,9 @@ def tune(
 ) -> Tuning:
     """Recommend settings of the controller, chosen by runs of drawn devices and judged on others.
 
-    Args: `flow_law`: as in `simulate`. `pressure`: whether the gas pressure is searched even where that of
-        the scene meets what is required. `remedies`: whether changes of the scene are tried where it is not
-        met, and valves that can be bought where it gives none; None: the former alone. `progress`: called
+    Args: `flow_law`: as in `simulate`. `pressure`: True to search the gas pressure even where that of the
+        scene meets the requirement. `remedies`: True to try changes of the scene where it is not met, and
+        valves that can be bought where it gives none; None: the former alone. `progress`: called
         with what is being done.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.

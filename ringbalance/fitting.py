@@ -54,22 +54,22 @@ class Fit(Result):
 
     @property
     def parameters(self) -> tuple[FittedParameter, ...]:
-        """Each with its value and its interval (95 %), SI, and whether the data identify it."""
+        """Parameters with value and interval (95 %), SI, and whether the data identify them."""
         return self.result.parameters
 
     @property
     def succeeded(self) -> bool:
-        """Whether the fit describes the data, as they are read."""
+        """True if the fit describes the data."""
         return self.review.describes
 
     def to_dict(self) -> dict[str, Any]:
-        """What `ringbalance fit --json` prints."""
+        """Document that `ringbalance fit --json` prints."""
         return fit_document(
             self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
         )
 
     def rows(self) -> Rows:
-        """Each parameter, whether the fit describes the data, and what else they say."""
+        """Parameters, tests of the fit, and further findings."""
         return fit_rows(
             self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
         )
@@ -109,7 +109,7 @@ def _fit(
     next: str | None,
     option: str = "next",
 ) -> Fit:
-    """Read, fit, judge and look ahead. Args: `option`: name of `next` in a message."""
+    """Read, fit, test the fit, find the next measurement. Args: `option`: name of `next` in a message."""
     observations = read_observations(files, scene=scene)
     try:
         names = [each.name for each in problem_of(scene, observations, parameters).parameters]
@@ -147,7 +147,7 @@ def fit_files(options: SimpleNamespace) -> int:
     if options.scene.suffix.lower() == ".csv":
         problem = "this looks like a file of measurements, and the scene comes first"
         raise SceneError.of_file(str(options.scene), f"{problem}: {_USAGE}")
-    given, names = load_scene(options.scene), None
+    scene, names = load_scene(options.scene), None
     if options.parameters is not None:
         names = [name.strip() for name in options.parameters.split(",")]
         if not all(names) or len(set(names)) < len(names):
@@ -157,11 +157,11 @@ def fit_files(options: SimpleNamespace) -> int:
                 option="--parameters", value=options.parameters, problem=problem, allowed=allowed
             )
     with activity("fit", "several starts, profiles of the likelihood ..."):
-        result = _fit(given, options.data, names, options.loss, options.next, option="--next")
+        result = _fit(scene, options.data, names, options.loss, options.next, option="--next")
     print_result(result, json=options.json, headline=False)
     if options.save is not None:
-        said = result.review.text
-        save_result(options.save, scene=given, result=result.result, data=result.data, said=said)
+        text = result.review.text
+        save_result(options.save, scene=scene, result=result.result, data=result.data, said=text)
         print_message(f"fitted scene written to {options.save}")
     if options.plot is not None:
         result.plot(options.plot)

@@ -31,10 +31,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*args: P.args, **options: P.kwargs) -> R:
-        given: dict[str, Any] = {**dict(zip(names, args, strict=False)), **options}
+        arguments: dict[str, Any] = {**dict(zip(names, args, strict=False)), **options}
         for name in SCENES:
-            if name in given:
-                checked_scene(given[name])
+            if name in arguments:
+                checked_scene(arguments[name])
         return function(*args, **options)
 
     return call

@@ -23,7 +23,7 @@ from ringbalance.scene.platform.terminal import activity, print_message, since_s
 from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.evidence import Level
 
-_MOST_WORKERS: Final = 2
+_MAX_WORKERS: Final = 2
 
 
 @checked
@@ -81,11 +81,11 @@ def write_report(
 
 def report(options: SimpleNamespace) -> int:
     """Run the command `report`. Returns: Exit code: 1 when a check of the program failed."""
-    given, text = read_scene(options.scene)
-    workers = min(_MOST_WORKERS, os.cpu_count() or 1)
+    scene, text = read_scene(options.scene)
+    workers = min(_MAX_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
         finished = write_scene_report(
-            with_tolerance(given, options.tolerance),
+            with_tolerance(scene, options.tolerance),
             options.out,
             level=options.level,
             scene_text=text,
@@ -106,9 +106,9 @@ def _load() -> bool:
 
 def plot_file(options: SimpleNamespace) -> int:
     """Run the command `plot`. Returns: Exit code: 1 when this machine cannot draw."""
-    given = liquid_ring_scene(load_scene(options.scene))
+    scene = liquid_ring_scene(load_scene(options.scene))
     with activity("plot", "pressure fields") as shown:
-        pictures = _draw(given, options.out, progress=shown.show)
+        pictures = _draw(scene, options.out, progress=shown.show)
     if not pictures["drawn"]:
         print_message(pictures["text"])
     print(options.out)
@@ -120,6 +120,6 @@ def _draw(scene: Scene, out: Path, *, progress: Callable[[str], None] = lambda _
 
     Returns: `drawn`, and `text` with the reason where this machine cannot draw.
     """
-    with staged(out, folders=process.FOLDERS) as stage, process.drawn(scene, stage) as pictures:
+    with staged(out, folders=process.FOLDERS) as stage, process.drawing_beside(scene, stage) as pictures:
         progress("pictures")
         return pictures()

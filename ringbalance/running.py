@@ -35,10 +35,10 @@ TARGETS: Final = {
 """Module and function of each command, imported when it runs."""
 
 
-def run_command(name: str, /, **given: Any) -> int:
-    """Run a command; an option that is not given has its default. Returns: Exit code."""
+def run_command(name: str, /, **settings: Any) -> int:
+    """Run a command; options without a setting have their defaults. Returns: Exit code."""
     command = COMMANDS[name]
-    options = {key: each.default for key, each in command.options.items()} | given
+    options = {key: each.default for key, each in command.options.items()} | settings
     _check_options(command.options, options)
     target = imported(TARGETS[name])
     if not command.begin:

@@ -1,4 +1,4 @@
-"""The search for a design as a Python user calls it."""
+"""The search for a design, for Python and as a command."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def find_design(
     """Design what a scene's table [design] leaves open: the smallest disc that meets [requirement].
 
     Args: `executor`: any `concurrent.futures.Executor`; default `workers` processes of its own. `progress`:
-        told what is done.
-    Returns: The design, judged on drawn devices as `tune` judges; where none meets what is required, that
-        which comes nearest, and what stands against it.
+        called with the present step.
+    Returns: The design, judged on drawn devices as `tune` judges; where none meets the requirement, the
+        nearest one, and the reasons.
     Raises: SceneError: a scene that cannot be used, or that leaves nothing to choose.
 
     Example:

@@ -1,4 +1,4 @@
-"""How a run is asked to end: SIGTERM is an interrupt like Ctrl-C, and a repeated one is the same request."""
+"""Requests to end a run: SIGTERM is an interrupt like Ctrl-C, and a repeated signal is the same request."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import Final
 
 _REQUESTS: Final = (signal.SIGINT, signal.SIGTERM)
 _USUAL: Final = (signal.default_int_handler, signal.SIG_DFL)
-_SAME: Final = 1.0
-"""s within which another signal is taken for the same request: `timeout` sends two."""
-_AGAIN: Final = 0.01
-"""s after which a request that was lost, or would be, is made again."""
-_WHOLE: Final = ("importlib._bootstrap", "multiprocessing.popen_")
-"""How the modules begin in which Python loads a module or starts a process."""
+_SAME_REQUEST_S: Final = 1.0
+"""Time within which another signal is the same request: `timeout` sends two."""
+_RETRY_S: Final = 0.01
+"""Time after which a request that was lost, or would be, is repeated."""
+_UNINTERRUPTED_MODULES: Final = ("importlib._bootstrap", "multiprocessing.popen_")
+"""Prefixes of the modules in which Python loads a module or starts a process."""
 
 
 class _Interrupt:
@@ -33,16 +33,19 @@ class _Interrupt:
     """
 
     def __init__(self) -> None:
-        self._last = -_SAME
+        self._last = -_SAME_REQUEST_S
         self._number = int(signal.SIGINT)
         self._usual_hook = sys.unraisablehook
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        if _is_amid(_WHOLE, frame):
-            self._repeat(number)
-            return
+        caller = frame
+        while caller is not None:
+            if caller.f_globals.get("__name__", "").startswith(_UNINTERRUPTED_MODULES):
+                self._repeat(number)
+                return
+            caller = caller.f_back
         now = time.monotonic()
-        if now - self._last >= _SAME:
+        if now - self._last >= _SAME_REQUEST_S:
             self._last, self._number = now, number
             signal.default_int_handler(number, frame)
 
@@ -51,21 +54,13 @@ class _Interrupt:
         if not issubclass(dropped.exc_type, KeyboardInterrupt):
             self._usual_hook(dropped)
             return
-        self._last = -_SAME
+        self._last = -_SAME_REQUEST_S
         self._repeat(self._number)
 
     def _repeat(self, number: int) -> None:
-        again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
+        again = threading.Timer(_RETRY_S, os.kill, (os.getpid(), number))
         again.daemon = True
         again.start()
-
-
-def _is_amid(modules: tuple[str, ...], frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_globals.get("__name__", "").startswith(modules):
-            return True
-        frame = frame.f_back
-    return False
 
 
 @contextmanager

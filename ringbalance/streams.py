@@ -113,14 +113,14 @@ def _greek(character: str) -> str:
 def _in_context(text: str, at: int) -> str:
     """The equivalent, with ^ or _ before a raised or lowered part and spaces around the name of a letter."""
     before, character, after = text[at - 1 : at] if at else "", text[at], text[at + 1 : at + 2]
-    found = _equivalent(character)
+    ascii_text = _equivalent(character)
     mark = _mark(character)
     if mark:
-        return found if _mark(before) == mark else mark + found
-    if not _greek(character) or found == _EQUIVALENTS.get(character):
-        return found
+        return ascii_text if _mark(before) == mark else mark + ascii_text
+    if not _greek(character) or ascii_text == _EQUIVALENTS.get(character):
+        return ascii_text
     lead = " " if before.isascii() and before.isalpha() else ""
-    return lead + found + (" " if after.isalnum() and not _mark(after) else "")
+    return lead + ascii_text + (" " if after.isalnum() and not _mark(after) else "")
 
 
 def _mark(character: str) -> str:
@@ -133,8 +133,8 @@ if TYPE_CHECKING:
 
 _LAST_STANDARD: Final = 2
 _WITHOUT_DOCSTRINGS: Final = 2
-_NARROWEST: Final = 20
-WIDEST: Final = 10_000
+_MIN_COLUMNS: Final = 20
+MAX_COLUMNS: Final = 10_000
 
 
 class _NamedFile(io.FileIO):
@@ -160,10 +160,15 @@ class _NamedFile(io.FileIO):
 def prepare_streams() -> str:
     """Make standard output and error safe to write to, whatever the shell made of them.
 
-    Returns: Why results could not be written; empty when they can.
+    Returns: Reason why results cannot be written; empty: they can.
     """
     closed = sys.stdout is None
-    _occupy_closed_descriptors()
+    # The null device takes the place of a closed standard stream: no file opened later takes its number.
+    descriptor = os.open(os.devnull, os.O_RDWR)
+    while descriptor <= _LAST_STANDARD:
+        os.set_inheritable(descriptor, True)
+        descriptor = os.open(os.devnull, os.O_RDWR)
+    os.close(descriptor)
     codecs.register_error(ERRORS, in_ascii)
     sys.stdout = _tolerant(sys.stdout, "standard output")
     sys.stderr = _tolerant(sys.stderr, "standard error")
@@ -171,7 +176,7 @@ def prepare_streams() -> str:
 
 
 def interpreter_error() -> str:
-    """Why this interpreter cannot run the commands. Returns: One sentence; empty when it can."""
+    """Reason why this interpreter cannot run the commands; empty: it can."""
     if sys.flags.optimize < _WITHOUT_DOCSTRINGS:
         return ""
     return "needs docstrings, which PYTHONOPTIMIZE=2 (python -OO) removes: unset it or set it to 1"
@@ -183,9 +188,9 @@ def drop_unusable_size(environment: MutableMapping[str, str]) -> None:
     Args: `environment`: of the process; COLUMNS below 20 and LINES below 1 are removed, and what is no
         number.
     """
-    for name, least in (("COLUMNS", _NARROWEST), ("LINES", 1)):
+    for name, least in (("COLUMNS", _MIN_COLUMNS), ("LINES", 1)):
         value = environment.get(name, "")
-        if not (re.fullmatch("[0-9]{1,6}", value) and least <= int(value) <= WIDEST):
+        if not (re.fullmatch("[0-9]{1,6}", value) and least <= int(value) <= MAX_COLUMNS):
             environment.pop(name, None)
 
 
@@ -195,16 +200,9 @@ def discard_unwritten() -> None:
         try:
             stream.flush()
         except OSError:
-            _redirect_to_nowhere(stream)
-
-
-def _occupy_closed_descriptors() -> None:
-    """Put the null device where a standard stream is closed: no file opened later takes its number."""
-    descriptor = os.open(os.devnull, os.O_RDWR)
-    while descriptor <= _LAST_STANDARD:
-        os.set_inheritable(descriptor, True)
-        descriptor = os.open(os.devnull, os.O_RDWR)
-    os.close(descriptor)
+            null_device = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null_device, stream.fileno())
+            os.close(null_device)
 
 
 def _tolerant(stream: TextIO | None, title: str) -> TextIO:
@@ -215,22 +213,12 @@ def _tolerant(stream: TextIO | None, title: str) -> TextIO:
         stream.reconfigure(errors=ERRORS)
         # With PYTHONUNBUFFERED there is no buffer in between.
         if type(getattr(stream.buffer, "raw", stream.buffer)) is io.FileIO:
-            return _over_named_file(stream, title)
+            named = _NamedFile(stream.fileno(), title)
+            return io.TextIOWrapper(
+                cast(BinaryIO, named if isinstance(stream.buffer, io.FileIO) else io.BufferedWriter(named)),
+                encoding=stream.encoding,
+                errors=stream.errors,
+                line_buffering=stream.line_buffering,
+                write_through=stream.write_through,
+            )
     return stream
-
-
-def _over_named_file(stream: io.TextIOWrapper, title: str) -> TextIO:
-    named = _NamedFile(stream.fileno(), title)
-    return io.TextIOWrapper(
-        cast(BinaryIO, named if isinstance(stream.buffer, io.FileIO) else io.BufferedWriter(named)),
-        encoding=stream.encoding,
-        errors=stream.errors,
-        line_buffering=stream.line_buffering,
-        write_through=stream.write_through,
-    )
-
-
-def _redirect_to_nowhere(stream: TextIO) -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)

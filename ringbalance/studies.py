@@ -1,4 +1,4 @@
-"""Verification as a Python user calls it, and the commands of its studies: trade, extremes and cases."""
+"""Verification for Python, and the commands of its studies: trade, extremes and cases."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def trade(
 
 def trade_file(options: SimpleNamespace) -> int:
     """Run the command `trade`."""
-    given = liquid_ring_scene(opened(options.scene, options.tolerance))
+    scene = liquid_ring_scene(opened(options.scene, options.tolerance))
     file = options.out and options.out / "trade.json"
     if file is not None:
         check_file(file)
     with activity("trade", "models ...") as shown:
-        study = trade_study(given, level=options.level, progress=lambda title: shown.show(f"{title} ..."))
+        study = trade_study(scene, level=options.level, progress=lambda title: shown.show(f"{title} ..."))
     print_result(study, json=options.json, headline=False)
     if file is not None:
         write_whole(file, dumps(study.to_dict(), allow_nan=False) + "\n")
@@ -64,7 +64,8 @@ def extremes(
     workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Extremes:
-    """Find where results of a scene stop, what is said beyond, and whether the invariants hold inside.
+    """Find the limits of validity of a scene: where results stop, what is reported beyond, and whether the
+    invariants hold inside.
 
     Args: `level`: "heavy" judges thousands of points. `workers`: processes. `progress`: called with what is
         being done, the points done and their number.
@@ -76,18 +77,17 @@ def extremes(
         >>> study.to_dict()["violations"]
         []
     """
-    given = liquid_ring_scene(scene)
-    return find_extremes(given, size=SIZES[level], workers=workers, progress=progress)
+    return find_extremes(liquid_ring_scene(scene), size=SIZES[level], workers=workers, progress=progress)
 
 
 def extremes_file(options: SimpleNamespace) -> int:
     """Run the command `extremes`. Returns: Exit code: 1 when an invariant was violated."""
-    given = liquid_ring_scene(load_scene(options.scene))
-    check_sector(given)
+    scene = liquid_ring_scene(load_scene(options.scene))
+    check_sector(scene)
     with nullcontext() if options.out is None else staged(options.out, files=(_EXTREMES,)) as stage:
         with activity("extremes", "axes") as shown:
             study = find_extremes(
-                given,
+                scene,
                 size=SIZES[options.level],
                 workers=options.workers or min(2, os.cpu_count() or 1),
                 progress=lambda what, done, number: shown.show(
@@ -113,7 +113,7 @@ def run_cases(
     workers: int = 1,
     progress: Callable[[CaseResult], None] | None = None,
 ) -> tuple[CaseResult, ...]:
-    """Run several verification cases, or all, and return their results in the order asked for.
+    """Run several verification cases, or all, and return their results in the order of `case_ids`.
 
     Args: `level`: "light" leaves heavy cases `not run`. `mutations`: also with each case's mutations.
         `workers`: processes, this one included. `progress`: called with each result, in order.

@@ -96,7 +96,9 @@ def _write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
 
 
 @contextmanager
-def drawn(scene: Scene, folder: Path, opengl: OpenGL | None = None) -> Iterator[Callable[[], Record]]:
+def drawing_beside(
+    scene: Scene, folder: Path, opengl: OpenGL | None = None
+) -> Iterator[Callable[[], Record]]:
     """Draw fields and pictures of a scene while the body runs; the function yielded waits for their record.
 
     Raises: OSError: the folder cannot be written.

@@ -1,7 +1,7 @@
-"""What every command answers with, and how it is written.
+"""Results of all commands, and how they are written.
 
-`rows`: a quantity with its interval, and a finding: something to say, with a code, a severity, its
-numbers and the change of the scene that would mend it; the sentences are in `sentences.toml`.
+`rows`: a quantity with its interval, and a finding with its code, severity, numbers, sentence and the change
+of the scene that mends it; the sentences are in `sentences.toml`.
 `numbers`: values with their uncertainties as text.
 `result`: the base of all results, texts in rows and columns, and how both are written in a terminal, a
 notebook, a CSV file and JSON.

@@ -1,5 +1,5 @@
-"""Numbers and quantities as a reader should meet them: SI on the way in, the units that engineers of this
-field read on the way out, no more digits than the uncertainty leaves standing.
+"""Numbers and quantities as text: from SI to the units that engineers of this field read, with no more digits
+than the uncertainty supports.
 
 Texts are typographic (thin spaces, a true minus sign, µm); `plain` writes them for a terminal or a CSV file.
 """
@@ -18,20 +18,20 @@ PLUS_MINUS: Final = "\u00a0±\u00a0"
 MISSING: Final = "–"
 
 _SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_MOST_DIGITS: Final = 7
+_MAX_DIGITS: Final = 7
 _TABLE_DIGITS: Final = 9
 _UNSTATED_DIGITS: Final = 4
 _INPUT_ROUNDING: Final = 5e-4
 """Relative half-width of an input of three digits, the fewest that scene files have."""
-_EXACT: Final = 1e-6
+_ROUND_OFF: Final = 1e-6
 """Relative half-width that is round-off, or of a closed form of inputs that are taken as exact."""
-_LOPSIDED: Final = 0.1
-"""By which the two sides of an interval differ, of the larger, before they are printed apart."""
+_LOPSIDED_FRACTION: Final = 0.1
+"""Difference of the two sides of an interval, over the larger, from which both are printed."""
 _TYPEWRITER: Final = str.maketrans({"\u202f": " ", "\u00a0": " ", "\u2212": "-", "µ": "u"})
 _POWER: Final = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
 _TYPED_POWER: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_SMALLEST_PLAIN: Final = -4
-_LARGEST_PLAIN: Final = 6
+_MIN_PLAIN_EXPONENT: Final = -4
+_MAX_PLAIN_EXPONENT: Final = 6
 
 
 def power_of_ten(exponent: int) -> str:
@@ -53,47 +53,47 @@ def last_place(total: float) -> int:
 
 
 def believed(value: float | None, total: float | None, *, stated: bool) -> float | None:
-    """A value's total uncertainty; None without a value, of round-off, and where it is finer than inputs of
-    which the scene says nothing.
+    """A value's total uncertainty; None without a value, for round-off, and below the rounding of inputs
+    whose uncertainty is not stated.
 
-    Args: `stated`: whether the scene states the uncertainty of any input.
+    Args: `stated`: True if the scene states the uncertainty of any input.
     """
     if value is None or total is None:
         return None
-    fine = 0.0 < total <= (_EXACT if stated else _INPUT_ROUNDING) * abs(value)
+    fine = 0.0 < total <= (_ROUND_OFF if stated else _INPUT_ROUNDING) * abs(value)
     return None if fine else total
 
 
 def rounded(value: float, total: float | None) -> str:
     """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
 
-    Nine digits of the value at most, and that many where the uncertainty is zero; four where it is None, as
-    `believed` has it. An exact zero has none.
+    Nine digits of the value at most, and as many where the uncertainty is zero; four where it is None (see
+    `believed`). An exact zero has none.
     """
     if total is None:
         total = 10.0 ** (Decimal(f"{value:.{_UNSTATED_DIGITS - 1}e}").adjusted() + 2 - _UNSTATED_DIGITS)
     if not total > 0 or value == 0:
         return f"{value + 0.0:.{_TABLE_DIGITS}g}"
     exact = Decimal(repr(float(value)))
-    place = max(last_place(total), exact.adjusted() - _TABLE_DIGITS + 1)
-    shown = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
+    exponent = max(last_place(total), exact.adjusted() - _TABLE_DIGITS + 1)
+    shown = exact.quantize(Decimal(1).scaleb(exponent), rounding=ROUND_HALF_EVEN)
     plain = shown if shown else abs(shown)
-    return f"{plain:f}" if place > -_TABLE_DIGITS else f"{plain:e}"
+    return f"{plain:f}" if exponent > -_TABLE_DIGITS else f"{plain:e}"
 
 
 def _leading_exponent(value: Decimal) -> int:
     return value.adjusted() if value else 0
 
 
-def _quantized(value: Decimal, place: int) -> Decimal:
-    return value.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
+def _quantized(value: Decimal, exponent: int) -> Decimal:
+    return value.quantize(Decimal(1).scaleb(exponent), rounding=ROUND_HALF_EVEN)
 
 
 def _plain(value: Decimal, decimals: int) -> str:
     """Fixed-point text with a true minus sign and thin spaces between thousands (from five digits up)."""
     rounded = _quantized(value, -decimals)
-    whole, _, fraction = f"{abs(rounded):f}".partition(".")
-    grouped = f"{int(whole):,}".replace(",", THIN_SPACE) if len(whole) > 4 else whole
+    integer, _, fraction = f"{abs(rounded):f}".partition(".")
+    grouped = f"{int(integer):,}".replace(",", THIN_SPACE) if len(integer) > 4 else integer
     sign = MINUS if rounded < 0 else ""
     return f"{sign}{grouped}.{fraction}" if fraction else f"{sign}{grouped}"
 
@@ -116,7 +116,7 @@ def number(value: float | None, *, digits: int = 4) -> str:
         return "0"
     rounded = _quantized(exact, _leading_exponent(exact) - digits + 1)
     exponent = _leading_exponent(rounded)
-    if _SMALLEST_PLAIN < exponent < _LARGEST_PLAIN:
+    if _MIN_PLAIN_EXPONENT < exponent < _MAX_PLAIN_EXPONENT:
         return _plain(rounded, max(digits - 1 - exponent, 0))
     mantissa = _plain(rounded.scaleb(-exponent), digits - 1)
     return f"{mantissa}{THIN_SPACE}×{THIN_SPACE}{power_of_ten(exponent)}"
@@ -147,7 +147,7 @@ Width = float | tuple[float, float] | None
 def measured(value: float | None, width: Width, *, digits: int = 4) -> str:
     """Value with its uncertainty, without unit: 72.043 ± 0.032, (1.20 ± 0.05) × 10⁻⁶ or 0.419 −0.003/+0.012.
 
-    All have the digits that the (larger) uncertainty leaves standing; without one the value has `digits`.
+    All have the digits that the (larger) uncertainty supports; without one the value has `digits`.
     Raises: ValueError: a number that is not finite, but for a side without an end, or a negative uncertainty.
     """
     below, above = width if isinstance(width, tuple) else (float(_exact(width or 0.0)),) * 2
@@ -157,17 +157,17 @@ def measured(value: float | None, width: Width, *, digits: int = 4) -> str:
     widest = max(ends, default=0.0)
     if value is None or not widest:
         return number(value, digits=digits)
-    exact, place = _exact(value), last_place(widest)
-    top = max(_leading_exponent(exact), place)
-    if top - place + 1 > _MOST_DIGITS:
-        return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(widest, digits=2)}"
-    plain_power = top < _LARGEST_PLAIN and (place > 0 or top > _SMALLEST_PLAIN)
-    power, decimals = (0, -place) if plain_power else (top, top - place)
+    exact, exponent = _exact(value), last_place(widest)
+    top = max(_leading_exponent(exact), exponent)
+    if top - exponent + 1 > _MAX_DIGITS:
+        return f"{number(value, digits=_MAX_DIGITS)}{PLUS_MINUS}{number(widest, digits=2)}"
+    plain_power = top < _MAX_PLAIN_EXPONENT and (exponent > 0 or top > _MIN_PLAIN_EXPONENT)
+    power, decimals = (0, -exponent) if plain_power else (top, top - exponent)
 
     def text(part: float) -> str:
         return _plain(_exact(part).scaleb(-power), decimals) if math.isfinite(part) else "∞"
 
-    if len(ends) == 2 and abs(above - below) <= _LOPSIDED * widest:
+    if len(ends) == 2 and abs(above - below) <= _LOPSIDED_FRACTION * widest:
         body = f"{text(value)}{PLUS_MINUS}{text(widest)}"
     else:
         body = f"{text(value)}\u00a0{MINUS}{text(below)}/+{text(above)}"

@@ -1,4 +1,4 @@
-"""Verdicts on what is required; a fraction of drawn devices with its bounds, and two of the same devices."""
+"""Verdicts on requirements; a fraction of drawn devices with its bounds, and paired fractions."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Proportion:
 
     @classmethod
     def where(cls, met: BoolArray) -> Proportion:
-        """Of the devices for which `met`, shape (n,), is true."""
+        """Fraction of the devices for which `met`, shape (n,), is true."""
         return cls(count=int(met.sum()), of=met.size)
 
     @property
     def value(self) -> float:
-        """Fraction; not a number where none was drawn."""
+        """Fraction; not a number without devices."""
         return self.count / self.of if self.of else math.nan
 
     @property
@@ -51,16 +51,16 @@ class Proportion:
         """Upper 95 % bound."""
         return self._ends()[1]
 
-    def verdict(self, asked: float, *, deviations: float = _NORMAL_95) -> str:
-        """`MET` where the lower bound is at least the fraction asked for, `MISSED` where the upper bound is
+    def verdict(self, required: float, *, deviations: float = _NORMAL_95) -> str:
+        """`MET` where the lower bound is at least the required fraction, `MISSED` where the upper bound is
         below it, else `OPEN`.
 
-        Args: `deviations`: half the width of the interval, in standard deviations; default that of 95 %.
+        Args: `deviations`: half-width of the interval, in standard deviations; default that of 95 %.
         """
         low, high = self._ends(deviations)
-        if low >= asked:
+        if low >= required:
             return MET
-        return MISSED if high < asked else OPEN
+        return MISSED if high < required else OPEN
 
     def _ends(self, deviations: float = _NORMAL_95) -> tuple[float, float]:
         if self.of == 0:
@@ -77,7 +77,7 @@ class Proportion:
 
 @dataclass(frozen=True, kw_only=True)
 class Paired:
-    """Numbers of devices that meet something under the first of two, the second, both or neither."""
+    """Numbers of devices that meet a requirement under one of two settings, under both or under neither."""
 
     both: int
     first_alone: int
@@ -86,7 +86,7 @@ class Paired:
 
     @classmethod
     def of(cls, first: BoolArray, second: BoolArray) -> Paired:
-        """Args: `first`, `second`: of each device, shape (n,)."""
+        """Count devices. Args: `first`, `second`: True for devices that meet the requirement, shape (n,)."""
         return cls(
             both=int((first & second).sum()),
             first_alone=int((first & ~second).sum()),
@@ -106,7 +106,7 @@ class Paired:
 
     @property
     def difference(self) -> tuple[float, float]:
-        """Fraction of the devices by which the first does better, and half its 95 % interval.
+        """Fraction of the devices by which the first is better, and its half-width (95 %).
 
         Source: Wald's interval of the difference of paired proportions, Agresti, "Categorical Data Analysis"
             (2002), section 10.1.
@@ -116,7 +116,7 @@ class Paired:
         return change / n, _NORMAL_95 * math.sqrt(differ - change**2 / n) / n
 
     def better(self, level: float) -> int | None:
-        """0 or 1, the one under which more devices do; None: no difference is shown at a level."""
+        """0 or 1, the setting under which more devices meet it; None: no difference is significant."""
         if self.p_value > level:
             return None
         return 0 if self.first_alone > self.second_alone else 1

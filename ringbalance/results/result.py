@@ -1,4 +1,4 @@
-"""What every answer is: rows, written for a terminal, a notebook, a CSV file and JSON."""
+"""Results as rows, written for a terminal, a notebook, a CSV file and JSON."""
 
 from __future__ import annotations
 
@@ -31,20 +31,15 @@ Facts = Sequence[tuple[str, str]]
 """Names and texts."""
 
 _STYLES: Final = {"info": "green", "warning": "yellow", "error": "red"}
-_NAME: Final = 28
-"""Characters of names that stand in one line."""
-_MAIN: Final = 3
-"""Quantities in a short text."""
-_MOST: Final = 10
-"""In a notebook."""
+_UNBROKEN_NAME_CHARACTERS: Final = 28
+_MAIN_QUANTITIES: Final = 3
+_NOTEBOOK_QUANTITIES: Final = 10
 _COLUMNS: Final = ("name", "symbol", "value", "lower", "upper", "unit", "origin", "status")
 _EXTRA: Final = "this needs the package {0}: pip install {0}, or ringbalance[sweep-tables] with all of them"
 _NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
 """A text that begins like a number, behind tags."""
-
-
 _FORMULA: Final = re.compile(r"(?![+-]?[\d.]+(?:e[+-]?\d+)?\Z)[=+\-@\t\r]")
-"""With which a formula begins in a spreadsheet, unless the whole is a number."""
+"""Beginning of a formula in a spreadsheet, unless the whole text is a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +57,7 @@ class Table:
 
     @property
     def numeric(self) -> list[bool]:
-        """By column: whether it is set as numbers, as most of its cells begin like one."""
+        """True for each column that is set as numbers: most of its cells begin like one."""
         columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
         filled = ([cell for cell in column if cell.strip(MISSING)] for column in columns)
         return [2 * sum(bool(_NUMBER.match(cell)) for cell in cells) > len(cells) for cells in filled]
@@ -88,8 +83,8 @@ class _TermUsed(Protocol):
         """Relative to the result; None: unknown."""
 
 
-_LEAST_SHOWN: Final = 0.1
-"""Contribution of a term over the tolerance below which it leaves the printed table."""
+_MIN_CONTRIBUTION: Final = 0.1
+"""Contribution of a term over the tolerance below which the printed table omits it."""
 
 
 def models_table(models_used: Iterable[_TermUsed], *, tolerance: float) -> Table:
@@ -97,7 +92,7 @@ def models_table(models_used: Iterable[_TermUsed], *, tolerance: float) -> Table
     rows = [
         (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)
         for each in models_used
-        if each.estimated_contribution is None or each.estimated_contribution >= _LEAST_SHOWN * tolerance
+        if each.estimated_contribution is None or each.estimated_contribution >= _MIN_CONTRIBUTION * tolerance
     ]
     return Table(caption="Models used", heads=("term", "model", "contribution", "why"), rows=rows)
 
@@ -108,33 +103,28 @@ def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
     A text that a spreadsheet would take for a formula, which a number is not, stands behind an apostrophe; a
     carriage return, which would end the line, becomes a line feed.
     """
+
+    def escaped(cell: Any) -> Any:
+        if not isinstance(cell, str):
+            return cell
+        return (f"'{cell}" if _FORMULA.match(cell) else cell).replace("\r", "\n")
+
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     rows: tuple[Iterable[Any], ...] = (columns, *zip(*columns.values(), strict=True))
     for row in rows:
-        writer.writerow([_text_cell(cell) if isinstance(cell, str) else cell for cell in row])
+        writer.writerow([escaped(cell) for cell in row])
     return text.getvalue()
-
-
-def _text_cell(text: str) -> str:
-    return (f"'{text}" if _FORMULA.match(text) else text).replace("\r", "\n")
 
 
 def _findings_text(findings: Iterable[Finding], *, headline: bool) -> Group:
     """One sentence a finding; the first may be a headline."""
     texts = []
-    for place, each in enumerate(findings):
-        first = headline and place == 0
+    for number, each in enumerate(findings):
+        first = headline and number == 0
         colour = "" if each.severity == "info" and not first else _STYLES[each.severity]
         texts.append(Text(each.text, style=f"{'bold ' if first else ''}{colour}"))
     return Group(*texts)
-
-
-def _quantity_facts(quantities: Iterable[Quantity]) -> Iterator[tuple[str, str]]:
-    """Name and text of each, with its status where it is limited."""
-    for each in quantities:
-        limited = "" if each.status == "ok" else f" ({each.status.replace('_', ' ')})"
-        yield each.name, plain(each.text) + limited
 
 
 def _two_columns(rows: Iterable[tuple[str, str]]) -> RichTable:
@@ -160,9 +150,11 @@ def _terminal_table(table: Table) -> RichTable:
         padding=0,
         pad_edge=False,
     )
-    for place, (head, numeric) in enumerate(zip(table.heads, table.numeric, strict=True)):
+    for number, (head, numeric) in enumerate(zip(table.heads, table.numeric, strict=True)):
         # A name that is cut short is no use; anything else is broken into lines.
-        name = place == 0 and max((len(row[0]) for row in table.rows), default=0) <= _NAME
+        name = (
+            number == 0 and max((len(row[0]) for row in table.rows), default=0) <= _UNBROKEN_NAME_CHARACTERS
+        )
         side: Literal["right", "left"] = "right" if numeric else "left"
         shown.add_column(Text(plain(head)), justify=side, no_wrap=name, overflow="fold")
     for row in table.rows:
@@ -170,54 +162,42 @@ def _terminal_table(table: Table) -> RichTable:
     return shown
 
 
-def _html_table(table: Table) -> str:
-    """A table for a notebook."""
-    sides = ["right" if numeric else "left" for numeric in table.numeric]
-    heads = "".join(f"<th>{escape(head)}</th>" for head in table.heads)
-    rows = "".join(
-        "<tr>"
-        + "".join(
-            f'<td style="text-align:{side}">{escape(cell)}</td>'
-            for side, cell in zip(sides, row, strict=True)
-        )
-        + "</tr>"
-        for row in table.rows
-    )
-    return f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Rows:
     """A result as every output shows it."""
 
     title: str
-    """What was computed for which scene."""
+    """Name of the computation and of the scene."""
     quantities: tuple[Quantity, ...]
-    """The main ones first, each key once."""
+    """Quantities with different keys, the main ones first."""
     findings: tuple[Finding, ...] = ()
-    """The verdict first."""
+    """Findings, the verdict first."""
     facts: Facts = ()
-    """Names and texts that are no quantities, for a terminal."""
+    """Names and texts other than quantities, for a terminal."""
     tables: tuple[Table, ...] = ()
-    """For a terminal; those without rows are left out."""
-    main: int = _MAIN
-    """How many quantities a short text has."""
+    """Tables for a terminal; those without rows are left out."""
+    main: int = _MAIN_QUANTITIES
+    """Number of quantities in a short text."""
     listed: int | None = None
-    """How many quantities a terminal lists, where its tables have the others; None: all."""
+    """Number of quantities that a terminal lists, where its tables have the others; None: all."""
 
     def document(self) -> dict[str, Any]:
-        """What the JSON of every command has of them."""
+        """Part of the JSON that all commands have in common."""
         return {
             "quantities": [each.document() for each in self.quantities],
             "findings": [each.document() for each in self.findings],
         }
 
     def view(self, *more: RenderableType, headline: bool = True) -> RenderableType:
-        """What a command prints: findings as sentences, quantities, then `more`, then the tables.
+        """Text for a terminal: findings as sentences, quantities, then `more`, then the tables.
 
-        Args: `headline`: whether the first finding is one; otherwise the title is, and findings come later.
+        Args: `headline`: True to begin with the first finding; else with the title, findings later.
         """
-        numbers = _two_columns([*self.facts, *_quantity_facts(self.quantities[: self.listed])])
+        facts = list(self.facts)
+        for each in self.quantities[: self.listed]:
+            limited = "" if each.status == "ok" else f" ({each.status.replace('_', ' ')})"
+            facts.append((each.name, plain(each.text) + limited))
+        numbers = _two_columns(facts)
         tables = iter([_terminal_table(table) for table in self.tables if table.rows])
         if headline:
             return Group(_findings_text(self.findings, headline=True), numbers, *more, *tables)
@@ -227,7 +207,7 @@ class Rows:
         return Group(Text(self.title, style="bold"), *first, *more, sentences, *tables)
 
     def lines(self) -> Iterator[str]:
-        """About five lines: what it is, its main numbers with units, the verdict, and a warning behind it."""
+        """About five lines: title, main numbers with units, verdict, and a warning behind it."""
         yield self.title
         for each in self.quantities[: self.main]:
             yield f"{each.name} {plain(each.text)}"
@@ -236,11 +216,22 @@ class Rows:
             yield finding.text
 
     def html(self) -> str:
-        """For a notebook."""
+        """Element for a notebook."""
         sentences = "".join(f"<p>{escape(each.sentence())}</p>" for each in self.findings)
-        rows = [(each.name, each.symbol, each.text) for each in self.quantities[:_MOST]]
-        table = Table(heads=("quantity", "symbol", "value (95 %)"), rows=rows)
-        return f"<div><strong>{escape(self.title)}</strong>{sentences}{_html_table(table)}</div>"
+        quantities = self.quantities[:_NOTEBOOK_QUANTITIES]
+        table = Table(
+            heads=("quantity", "symbol", "value (95 %)"),
+            rows=[(each.name, each.symbol, each.text) for each in quantities],
+        )
+        sides = ["right" if numeric else "left" for numeric in table.numeric]
+        heads = "".join(f"<th>{escape(head)}</th>" for head in table.heads)
+        body = ""
+        for row in table.rows:
+            cells = zip(sides, row, strict=True)
+            texts = (f'<td style="text-align:{side}">{escape(cell)}</td>' for side, cell in cells)
+            body += f"<tr>{''.join(texts)}</tr>"
+        html = f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
+        return f"<div><strong>{escape(self.title)}</strong>{sentences}{html}</div>"
 
 
 def print_rows(rows: Rows, *, headline: bool = True) -> None:
@@ -264,7 +255,7 @@ def extra(package: str, name: str) -> Any:
 
 
 class Result:
-    """Base of what the commands, and the functions of the same names, answer with."""
+    """Base of the results of the commands and of the functions of the same names."""
 
     @abstractmethod
     def rows(self) -> Rows:
@@ -279,15 +270,15 @@ class Result:
         return summary_text(self.rows().lines())
 
     def _repr_html_(self) -> str:
-        """For a notebook."""
+        """Element for a notebook."""
         return self.rows().html()
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Draw the result in the report's style.
 
-        Args: `path`: an SVG file to write; None: none.
+        Args: `path`: an SVG file to write; None: no file.
         Returns: Figures that a notebook shows; `svg()` has them as text.
-        Raises: TypeError: there is nothing to draw of such a result. OSError: the file cannot be written.
+        Raises: TypeError: a result of this type has no figure. OSError: the file cannot be written.
         """
         figures = registered("function", "figures_of_result")(self)
         if path is not None:
@@ -322,7 +313,7 @@ class Result:
 
 @dataclass(frozen=True, kw_only=True)
 class Presentation:
-    """Functions that lay a result out; they import what they describe, so who makes a result gives them."""
+    """Functions that lay out a result; the caller that makes the result passes them, since they import it."""
 
     document: Callable[[Any], dict[str, Any]]
     rows: Callable[[Any], Rows]

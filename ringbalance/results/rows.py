@@ -1,4 +1,4 @@
-"""A quantity and a finding, each as one record: what every output is made of.
+"""A quantity and a finding, each as one record: the parts of every output.
 
 A finding is a code with its severity, numbers, sentence, and the change of the scene that mends it.  A
 sentence stands in `sentences.toml` under its code, with its numbers in braces: {limit:m} is the value "limit"
@@ -42,27 +42,27 @@ class Quantity:
     """A number with its name, unit and interval; SI throughout."""
 
     key: str
-    """Stable, such as "stall_pressure"."""
+    """Stable key, such as "stall_pressure"."""
     name: str
-    """As a reader knows it, such as "pressure to empty a chamber"."""
+    """Name for readers, such as "pressure to empty a chamber"."""
     value: float | None
-    """None: there is none, as `status` says."""
+    """Value, SI; None: no value, for the reason in `status`."""
     unit: str = "1"
-    """SI."""
+    """SI unit."""
     symbol: str = ""
     lower: float | None = None
     upper: float | None = None
     """Ends of the 95 % interval; None: not known, or no end on this side."""
     parts: Parts | None = None
     causes: Mapping[str, float] = field(default_factory=dict)
-    """Expanded uncertainties (95 %) of the parts `input` and `model`: by path in the scene file, "fitted" for
-    all that were fitted together, by error of a model such as "model: ends"; SI."""
+    """Expanded uncertainties (95 %) of the parts `input` and `model` by cause, SI: path in the scene file,
+    "fitted" for all inputs that were fitted together, or error of a model such as "model: ends"."""
     origin: str = "computed"
     """ "computed", "simulated", "fitted", "given", "inferred", "assumed", "measured" or "default"."""
     status: str = "ok"
     """ "ok" or the code of the finding that limits it."""
     digits: int = 4
-    """Of the value as text, where no uncertainty is known."""
+    """Significant digits of the value as text without an uncertainty."""
 
     @classmethod
     def of_fraction(cls, fraction: Proportion, *, key: str, name: str) -> Quantity:
@@ -110,25 +110,25 @@ class Quantity:
 
 def around(value: float, total: float | None, *, stated: bool = True) -> tuple[float | None, float | None]:
     """Ends of an interval as wide on both sides; none without an uncertainty that is `believed`."""
-    known = believed(value, total, stated=stated)
-    return (value - known, value + known) if known else (None, None)
+    width = believed(value, total, stated=stated)
+    return (value - width, value + width) if width else (None, None)
 
 
 Severity = Literal["info", "warning", "error"]
 Value = float | str | Quantity | Sequence[str] | None
 Mark = Callable[[str, str], str]
-"""Name and text of a value to the text that goes into a sentence, such as one with its trace."""
+"""Function of a value's name and text: the text for the sentence, such as one with its trace."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """Its code is stable and documented, its sentence is not."""
+    """A statement about a result; its code is stable and documented, its sentence is not."""
 
     code: str
     values: Mapping[str, Value] = field(default_factory=dict)
-    """SI, by the names in the sentence."""
+    """Values, SI, by the names in the sentence."""
     change: Mapping[str, float | str] = field(default_factory=dict)
-    """By path of a key of the scene: its new value, SI, in place of what the code says in general."""
+    """New values, SI, by path of a key of the scene; they replace the general ones of the code."""
 
     @property
     def severity(self) -> Severity:
@@ -137,7 +137,7 @@ class Finding:
 
     @property
     def changes(self) -> dict[str, float | str]:
-        """By path of a key in the scene: "raise", "lower", "set", or the value, SI."""
+        """Changes by path of a key in the scene: "raise", "lower", "set", or the value, SI."""
         return {**sentences()[self.code].change, **self.change}
 
     @property
@@ -151,7 +151,7 @@ class Finding:
         return Formatter().vformat(sentences()[self.code].text, (), values)
 
     def document(self) -> dict[str, Any]:
-        """For JSON; a quantity stands in it by its value."""
+        """Record for JSON; a quantity is written as its value."""
         values = {name: v.value if isinstance(v, Quantity) else v for name, v in self.values.items()}
         return {
             "code": self.code,
@@ -193,35 +193,31 @@ def series(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
 
 
-def _value_text(value: Value, unit: str = "", *, digits: int = 4) -> str:
-    """The one filter for numbers in sentences and templates.
-
-    A quantity has its own unit and as many digits as its uncertainty leaves; another number is as short as
-    `digits` significant digits allow, in the unit that suits it; names become "a, b and c".
-    Args: `unit`: SI; "%" for a fraction; empty for a text or a number without one.
-    """
-    if value is None:
-        return MISSING
-    if isinstance(value, Quantity):
-        return value.text
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Sequence):
-        return series(value)
-    if unit == "%":
-        return percent(value, digits=digits)
-    exact = len(str(value)) if isinstance(value, int) else digits
-    return given(value, unit or "1", digits=max(digits, exact))
-
-
 @dataclass(frozen=True)
 class _Filled:
-    """A value in a sentence; the format after its name is a unit, perhaps with digits: {gain:s/m;3}."""
+    """A value in a sentence; the format after its name is a unit, perhaps with digits: {gain:s/m;3}.
+
+    A quantity has its own unit and as many digits as its uncertainty supports; another number is as short as
+    its significant digits (four by default) allow, in the unit that suits it; names become "a, b and c".
+    """
 
     name: str
     value: Value
     mark: Mark
 
     def __format__(self, spec: str) -> str:
-        unit, _, digits = spec.partition(";")
-        return self.mark(self.name, _value_text(self.value, unit, digits=int(digits or 4)))
+        value, (unit, _, digits) = self.value, spec.partition(";")
+        if value is None:
+            text = MISSING
+        elif isinstance(value, Quantity):
+            text = value.text
+        elif isinstance(value, str):
+            text = value
+        elif isinstance(value, Sequence):
+            text = series(value)
+        elif unit == "%":
+            text = percent(value, digits=int(digits or 4))
+        else:
+            exact = len(str(value)) if isinstance(value, int) else 0
+            text = given(value, unit or "1", digits=max(int(digits or 4), exact))
+        return self.mark(self.name, text)

@@ -265,7 +265,7 @@ def test_what_is_kept_is_heavy_and_dated(evidence: Record) -> None:
 def test_a_damaged_evidence_file_is_reported_before_the_work(
     content: bytes, told: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report_module, "drawn", lambda *_: pytest.fail("begun"))
+    monkeypatch.setattr(report_module, "drawing_beside", lambda *_: pytest.fail("begun"))
     (tmp_path / "evidence.json").write_bytes(content)
     with pytest.raises(OSError, match="move it away or choose another folder") as caught:
         write(tmp_path)
@@ -278,7 +278,7 @@ def test_a_damaged_evidence_file_is_reported_before_the_work(
 def test_what_is_in_the_way_of_a_report_is_reported_before_the_work(
     name: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report_module, "drawn", lambda *_: pytest.fail("begun"))
+    monkeypatch.setattr(report_module, "drawing_beside", lambda *_: pytest.fail("begun"))
     (tmp_path / name).touch() if name != "report.html" else (tmp_path / name).mkdir()
     with pytest.raises(OSError, match=f"{name} is a f"):
         write(tmp_path)

@@ -93,7 +93,7 @@ def extremes_file(options: SimpleNamespace) -> int:
                 progress=lambda what, done, number: shown.show(
                     f"{what}: {done} of {number} points", done=done, total=number
                 ),
-                kept=None if options.out is None else options.out / "store",
+                folder=None if options.out is None else options.out / "store",
             )
         if stage is not None:
             write_whole(stage / _EXTREMES, dumps(study.to_dict(), allow_nan=False) + "\n")

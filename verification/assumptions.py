@@ -89,17 +89,17 @@ def widened(
         return evidence
 
     def errors(of: Any) -> Mapping[str, float]:
-        return {name: found.error for name, found in at(of).found.items()}
+        return {name: found.error for name, found in at(of).quantities.items()}
 
     here = errors(scene)
     paths = [one.path for one in assumptions]
     corners = itertools.product(*((one.low, one.high) for one in assumptions))
     moved = [errors(overridden(scene, dict(zip(paths, corner, strict=True)))) for corner in corners]
-    found = dict(evidence.found)
+    found = dict(evidence.quantities)
     for name, error in here.items():
         changes = [one[name] - error for one in moved]
         found[name] = found[name].moved(min(changes), max(changes))
-    return dataclasses.replace(evidence, found=found)
+    return dataclasses.replace(evidence, quantities=found)
 
 
 def _range(one: RestsOn, scene: Any, value: float, origin: str) -> tuple[float, float, str]:

@@ -123,7 +123,7 @@ class _LeftOut:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantity:
+class JudgedQuantity:
     """One judged number: its limit and the limit's reason stand before the result."""
 
     name: Identifier
@@ -204,7 +204,7 @@ class CaseDefinition:
     """Of a validation: what the sources have and no verdict rests on."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
-    quantity: tuple[Quantity, ...]
+    quantity: tuple[JudgedQuantity, ...]
     must_fail: tuple[Mutation, ...]
 
     @classmethod
@@ -251,7 +251,7 @@ class CaseDefinition:
         for text in self.prose:
             placeholders(text)
 
-    def _check_quantity(self, quantity: Quantity) -> None:
+    def _check_quantity(self, quantity: JudgedQuantity) -> None:
         if quantity.metric == "validation" and self.kind not in ("claim", "validation"):
             raise ValueError(
                 f'{quantity.name}: metric "validation" is for claims and validation; use "within_uncertainty"'

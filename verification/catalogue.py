@@ -150,18 +150,18 @@ class _Code:
         arguments = (scene, level, defect) if self.takes_defect else (scene, level)
         result = self._called(self.module.compute, *arguments)
         if isinstance(result, Mapping):
-            result = Evidence(found=self._records("compute", result, Found))
+            result = Evidence(quantities=self._records("compute", result, Found))
         if not isinstance(result, Evidence):
             raise CaseError(
                 f"{self.path}: compute gives {_kind(result)}, not an Evidence or numbers by quantity"
             )
-        self._check_names("compute", result.found, complete=True)
+        self._check_names("compute", result.quantities, complete=True)
         against = self._references(scene)
         found = {
             name: found.against(against[name]) if name in against else found
-            for name, found in result.found.items()
+            for name, found in result.quantities.items()
         }
-        return dataclasses.replace(result, found=found)
+        return dataclasses.replace(result, quantities=found)
 
     def _references(self, scene: Any) -> Mapping[str, Reference]:
         """What judged quantities are compared with, by name; nothing where the case has none."""

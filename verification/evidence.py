@@ -79,7 +79,7 @@ def printed(value: float, *, last_digit: float) -> Reference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class Deviation:
     """A found number S against a reference D."""
 
     error: float
@@ -132,7 +132,7 @@ class Found:
         exact = reference if isinstance(reference, Reference) else Reference(value=float(reference))
         return dataclasses.replace(self, reference=exact)
 
-    def compared(self, reference: Reference) -> Comparison:
+    def compared(self, reference: Reference) -> Deviation:
         """E = S - D with u_val = sqrt(u_num^2 + u_input^2 + u_D^2).
 
         A few units in the last place of the larger number are added for round-off.
@@ -140,7 +140,7 @@ class Found:
         """
         round_off = 4 * math.ulp(max(abs(self.value), abs(reference.value)))
         u_val = math.hypot(self.numerical, self.input, reference.uncertainty, round_off)
-        return Comparison(error=self.value - reference.value, half_width=COVERAGE_FACTOR * u_val)
+        return Deviation(error=self.value - reference.value, half_width=COVERAGE_FACTOR * u_val)
 
     def moved(self, low: float, high: float) -> Found:
         """The number with more inputs that move it: reaches add, as an assumption is no random error."""
@@ -169,7 +169,7 @@ def as_found(**values: Found | SupportsFloat) -> dict[str, Found]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
+class FigureAxis:
     """Values along one direction of a figure."""
 
     name: str
@@ -194,7 +194,7 @@ class Series:
     """One figure of a case."""
 
     name: str
-    x: Axis
+    x: FigureAxis
     y: Sequence[Curve]
     log: bool = False
     """Both axes logarithmic."""
@@ -203,7 +203,7 @@ class Series:
 def figure(name: str, x: tuple[str, str, npt.ArrayLike], *curves: Curve, log: bool = False) -> Series:
     """A figure of curves over one axis, given by its name, unit and values."""
     title, unit, values = x
-    axis = Axis(name=title, unit=unit, values=np.asarray(values, dtype=np.float64))
+    axis = FigureAxis(name=title, unit=unit, values=np.asarray(values, dtype=np.float64))
     return Series(name=name, x=axis, y=curves, log=log)
 
 
@@ -286,7 +286,7 @@ def order_figure(studies: Mapping[str, Convergence]) -> Series:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class CaseTable:
     """A table of a case: columns of equal length, each with its unit."""
 
     name: str
@@ -298,13 +298,13 @@ class Table:
 class Evidence:
     """All that one computation of a case found."""
 
-    found: Mapping[str, Found]
+    quantities: Mapping[str, Found]
     """By the names of the case's quantities."""
     numbers: Mapping[str, Any] = field(default_factory=dict)
     """Further numbers, SI, for the placeholders of the case's text; kept as floats."""
     series: Sequence[Series] = ()
     convergence: Sequence[Convergence] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[CaseTable] = ()
     status: Status = field(default_factory=Status)
 
     def __post_init__(self) -> None:

@@ -126,13 +126,13 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
 
 
 @contextmanager
-def mutated_force(*, along: float = 1.0, across: float = 1.0) -> Iterator[None]:
+def mutated_force(*, x_factor: float = 1.0, y_factor: float = 1.0) -> Iterator[None]:
     """Multiply the body force of every liquid solved inside, along the chamber's middle and across it."""
     true = RotatingLiquid.body_force
 
     def body_force(liquid: RotatingLiquid, places: FloatArray) -> FloatArray:
         force = true(liquid, places)
-        force[:2] *= np.array([along, across]).reshape(2, *[1] * (force.ndim - 1))
+        force[:2] *= np.array([x_factor, y_factor]).reshape(2, *[1] * (force.ndim - 1))
         return force
 
     with patch.object(RotatingLiquid, "body_force", body_force):

@@ -21,7 +21,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Found, Series, Table, figure
+from ringbalance.verification.evidence import CaseTable, Curve, Found, Series, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
 """Of the initial vibration, the four cases of Fig. 6."""
@@ -157,11 +157,11 @@ def runs_table(
     *,
     shown: Sequence[str] = ("settled after", "misadjustments"),
     units: Mapping[str, str],
-) -> Table:
+) -> CaseTable:
     """What became of groups of runs, each at one value of every setting: the worst of a group."""
     columns = {what: [_SHOWN[what](runs) for runs in groups] for what in shown}
     times = {"settled after": "s"} if "settled after" in shown else {}
-    return Table(name=name, columns={**settings, **columns}, units={**units, **times})
+    return CaseTable(name=name, columns={**settings, **columns}, units={**units, **times})
 
 
 def over_period(numbers: Sequence[float]) -> Found:

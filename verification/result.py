@@ -9,13 +9,12 @@ from typing import Any, Final, Self
 
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Result, Rows, Table
-from ringbalance.results.rows import Finding
-from ringbalance.results.rows import Quantity as Row
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.verification.assumptions import Assumption
-from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition, Quantity, fill
+from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition, JudgedQuantity, fill
 from ringbalance.verification.evidence import (
     COVERAGE_FACTOR,
-    Comparison,
+    Deviation,
     Evidence,
     Found,
     Level,
@@ -46,23 +45,23 @@ _DIGITS: Final = 6
 class QuantityResult:
     """One judged quantity; its numbers are None when the case was not run."""
 
-    quantity: Quantity
+    quantity: JudgedQuantity
     verdict: Verdict
-    found: Found | None = None
-    comparison: Comparison | None = None
+    number: Found | None = None
+    comparison: Deviation | None = None
 
     @classmethod
-    def of(cls, kind: Kind, quantity: Quantity, found: Found) -> Self:
+    def of(cls, kind: Kind, quantity: JudgedQuantity, found: Found) -> Self:
         """Judge what a case found."""
         verdict, comparison = judge_quantity(
-            kind=kind, metric=quantity.metric, limit=quantity.limit, found=found
+            kind=kind, metric=quantity.metric, limit=quantity.limit, number=found
         )
-        return cls(quantity=quantity, verdict=verdict, found=found, comparison=comparison)
+        return cls(quantity=quantity, verdict=verdict, number=found, comparison=comparison)
 
     @property
     def reference(self) -> Reference | None:
         """What the number is compared with, or beside which it is shown."""
-        return None if self.found is None else self.found.reference
+        return None if self.number is None else self.number.reference
 
     @property
     def half_width(self) -> float | None:
@@ -70,7 +69,7 @@ class QuantityResult:
 
         Zero where nothing uncertain entered; None where the case was not run.
         """
-        found, comparison = self.found, self.comparison
+        found, comparison = self.number, self.comparison
         if found is None or comparison is None:
             return None
         reach = max(map(abs, found.reach))
@@ -80,7 +79,7 @@ class QuantityResult:
 
     def to_dict(self) -> Document:
         """The quantity as its case's JSON has it."""
-        found, reference = self.found, self.reference
+        found, reference = self.number, self.reference
         return {
             **vars(self.quantity),
             "value": None if found is None else found.value,
@@ -91,14 +90,14 @@ class QuantityResult:
             "verdict": self.verdict.value,
         }
 
-    def row(self) -> Row:
+    def row(self) -> Quantity:
         """The found number with its interval."""
-        quantity, document = self.quantity, _found(self.found)
+        quantity, document = self.quantity, _found(self.number)
         exact = not document["value_uncertainty"]
-        return Row(
+        return Quantity(
             key=quantity.name,
             name=quantity.title,
-            value=None if self.found is None else self.found.value,
+            value=None if self.number is None else self.number.value,
             unit=quantity.unit,
             lower=None if exact else document["value_low"],
             upper=None if exact else document["value_high"],
@@ -248,7 +247,7 @@ class CaseResult(Result):
 
 
 def _named_numbers(result: QuantityResult) -> dict[str, float]:
-    name, found, comparison = result.quantity.name, result.found, result.comparison
+    name, found, comparison = result.quantity.name, result.number, result.comparison
     if found is None or comparison is None:
         return {}
     low, high = found.reach

@@ -149,10 +149,10 @@ def _evidence_at(
 def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
     """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
     names = {quantity.name for quantity in definition.quantity}
-    if set(evidence.found) != names:
-        raise ValueError(f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}")
+    if set(evidence.quantities) != names:
+        raise ValueError(f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.quantities)}")
     return tuple(
-        QuantityResult.of(definition.kind, quantity, evidence.found[quantity.name])
+        QuantityResult.of(definition.kind, quantity, evidence.quantities[quantity.name])
         for quantity in definition.quantity
     )
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import Literal
 
-from ringbalance.verification.evidence import Comparison, Found, Reference
+from ringbalance.verification.evidence import Deviation, Found, Reference
 
 Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
 Metric = Literal["validation", "within_uncertainty", "relative", "absolute", "at_most", "at_least"]
@@ -43,7 +43,7 @@ VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
 """Verdicts of each kind of case, the one that decides the case first."""
 
 
-def judge_quantity(*, kind: Kind, metric: Metric, limit: float, found: Found) -> tuple[Verdict, Comparison]:
+def judge_quantity(*, kind: Kind, metric: Metric, limit: float, number: Found) -> tuple[Verdict, Deviation]:
     """Judge one quantity by its metric and limit, compared with its reference, or with the limit as a bound.
 
     `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val, without what assumed inputs
@@ -54,19 +54,19 @@ def judge_quantity(*, kind: Kind, metric: Metric, limit: float, found: Found) ->
     Raises: ValueError: a metric that needs a reference, without one.
     """
     bound = metric in ("at_most", "at_least")
-    reference = Reference(value=limit) if bound else found.reference
+    reference = Reference(value=limit) if bound else number.reference
     if reference is None:
         raise ValueError(f'metric "{metric}" needs a reference')
-    comparison = found.compared(reference)
-    if not found.conclusive:
+    comparison = number.compared(reference)
+    if not number.conclusive:
         return Verdict.INCONCLUSIVE, comparison
     if bound:
-        verdict = _by_bound(kind, metric, found, comparison)
+        verdict = _by_bound(kind, metric, number, comparison)
     elif metric in ("relative", "absolute"):
         scale = abs(reference.value) if metric == "relative" else 1.0
         verdict = _yes_or_no(kind, abs(comparison.error) <= limit * scale)
     else:
-        verdict = _by_uncertainty(kind, limit, found, reference, comparison)
+        verdict = _by_uncertainty(kind, limit, number, reference, comparison)
     return verdict, comparison
 
 
@@ -77,7 +77,7 @@ def _yes_or_no(kind: Kind, holds: bool) -> Verdict:
 
 
 def _by_uncertainty(
-    kind: Kind, limit: float, found: Found, reference: Reference, comparison: Comparison
+    kind: Kind, limit: float, found: Found, reference: Reference, comparison: Deviation
 ) -> Verdict:
     widest = limit * (abs(reference.value) or 1.0)
     low, high = (comparison.error + reach for reach in found.reach)
@@ -92,7 +92,7 @@ def _by_uncertainty(
     return _yes_or_no(kind, False)
 
 
-def _by_bound(kind: Kind, metric: Metric, found: Found, comparison: Comparison) -> Verdict:
+def _by_bound(kind: Kind, metric: Metric, found: Found, comparison: Deviation) -> Verdict:
     """By the error against the limit; what is exact may lie on the limit."""
     low, high = found.reach
     uncertain = found.numerical > 0 or found.input > 0 or low < 0 or high > 0

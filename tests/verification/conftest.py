@@ -75,7 +75,7 @@ class MadeUpCode:
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         thicker = scene.disc.plate_thickness == 0.004
         found = Found(value=20.0) if thicker else self.defect(self.found, defect, scene)
-        return Evidence(found={"answer": found.against(10.0)}, numbers={"doubt": 0.0123})
+        return Evidence(quantities={"answer": found.against(10.0)}, numbers={"doubt": 0.0123})
 
 
 @pytest.fixture

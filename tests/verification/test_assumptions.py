@@ -72,7 +72,7 @@ class Thick:
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         found = Found(value=10.0 + self.offset + self._more(scene))
         reference = 10.0 + (self._more(scene) if self.shared else 0.0)
-        return Evidence(found={"answer": found.against(reference)}, numbers={"doubt": 0.0})
+        return Evidence(quantities={"answer": found.against(reference)}, numbers={"doubt": 0.0})
 
 
 RESTS = (
@@ -132,7 +132,7 @@ def test_widening_an_assumption_only_weakens(
         found = Found(value=value, input=known, corrected=corrected)
         found = found.moved(-factor * reach[0], factor * reach[1])
         reference = Reference(value=10.0, uncertainty=0.1)
-        return judge_quantity(kind="claim", metric=metric, limit=0.5, found=found.against(reference))[0]
+        return judge_quantity(kind="claim", metric=metric, limit=0.5, number=found.against(reference))[0]
 
     assert verdict(wider) in (verdict(1.0), Verdict.INCONCLUSIVE)
     assert verdict(1.0) in (verdict(0.0), Verdict.INCONCLUSIVE)
@@ -176,9 +176,9 @@ def test_no_verdict_rests_on_an_assumption_that_it_does_not_name(paper_scene: Sc
     errors = []
     for scene in (paper_scene, changed):
         evidence = code.compute(scene, "light")
-        errors.append({name: found.error for name, found in evidence.found.items()})
+        errors.append({name: found.error for name, found in evidence.quantities.items()})
     for quantity in definition.quantity:
-        against = evidence.found[quantity.name].reference
+        against = evidence.quantities[quantity.name].reference
         passes = quantity.limit * (1.0 if against is None else against.value)
         moved = errors[1][quantity.name] - errors[0][quantity.name]
         assert abs(moved) <= 0.01 * abs(passes) + 1e-9, quantity.name
@@ -200,4 +200,4 @@ def test_an_assumed_range_reaches_both_ways(
         assumptions_of([thickness], scene),
         at=lambda moved: code.compute(moved, "light"),
     )
-    assert wider.found["answer"].reach == pytest.approx(reach, abs=1e-9)
+    assert wider.quantities["answer"].reach == pytest.approx(reach, abs=1e-9)

@@ -72,7 +72,7 @@ def test_code_is_verified_and_every_case_is_judged(results: Mapping[str, CaseRes
     assert result.evidence is not None, result.status
     expected = Verdict.CONFIRMED if result.definition.kind == "validation" else Verdict.PASSED
     if result.definition.kind != "claim":
-        assert result.verdict is expected, [(q.quantity.name, q.found, q.verdict) for q in result.quantities]
+        assert result.verdict is expected, [(q.quantity.name, q.number, q.verdict) for q in result.quantities]
 
 
 @pytest.mark.parametrize("case", LIGHT)
@@ -120,7 +120,7 @@ def test_every_departure_has_a_cause_and_every_correction_shows_its_own(
             continue
         assert result.verdict is Verdict.CONFIRMED or result.definition.cause, case
         for quantity in result.quantities:
-            found = quantity.found
+            found = quantity.number
             assert found is not None
             assert (found.corrected is not None) == bool(quantity.quantity.correction), case
             if quantity.verdict is Verdict.CORRECTED:
@@ -146,14 +146,14 @@ def test_ten_times_the_range_of_what_was_assumed_only_weakens_a_verdict(
     assert result.assumptions
     judged, roles = [], [quantity.quantity.judges for quantity in result.quantities]
     for quantity in result.quantities:
-        found = quantity.found
+        found = quantity.number
         assert found is not None
         low, high = found.reach
         verdict, _ = judge_quantity(
             kind="claim",
             metric=quantity.quantity.metric,
             limit=quantity.quantity.limit,
-            found=found.moved(9 * low, 9 * high),
+            number=found.moved(9 * low, 9 * high),
         )
         judged.append(verdict)
     verdict = combine(kind="claim", verdicts=judged, roles=roles)

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.verification.evidence import Comparison, Found, Reference, printed
+from ringbalance.verification.evidence import Deviation, Found, Reference, printed
 
 SMALL = st.floats(min_value=0, max_value=1e6)
 ANY = st.floats(min_value=-1e6, max_value=1e6)
 
 
-def compare(found: Found, reference: float, uncertainty: float = 0.0) -> Comparison:
+def compare(found: Found, reference: float, uncertainty: float = 0.0) -> Deviation:
     return found.compared(Reference(value=reference, uncertainty=uncertainty))
 
 

@@ -11,9 +11,9 @@ import pytest
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import (
-    Axis,
     Curve,
     Evidence,
+    FigureAxis,
     Found,
     Level,
     NotRunError,
@@ -65,9 +65,9 @@ def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) 
     class Gappy:
         def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
             curve = Curve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
-            axis = Axis(name="x", unit="s", values=np.array([0.0, 1.0]))
+            axis = FigureAxis(name="x", unit="s", values=np.array([0.0, 1.0]))
             return Evidence(
-                found={"answer": Found(value=10.0).against(10.0)},
+                quantities={"answer": Found(value=10.0).against(10.0)},
                 numbers={"doubt": 1.0},
                 series=(Series(name="s", x=axis, y=(curve,)),),
             )

@@ -16,9 +16,9 @@ from ringbalance.scene import Scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.verification.extremes import point as extremes_point
 from ringbalance.verification.extremes import study
-from ringbalance.verification.extremes.axes import AXES, Axis, Point, designed_set, scene_at
-from ringbalance.verification.extremes.point import Ending, Judgement, judged
-from ringbalance.verification.extremes.study import Size, Sweep, find_extremes
+from ringbalance.verification.extremes.axes import AXES, InputAxis, Point, designed_set, scene_at
+from ringbalance.verification.extremes.point import Ending, PointJudgement, judged
+from ringbalance.verification.extremes.study import AxisSweep, Size, find_extremes
 from ringbalance.verification.reference.chambers import exact_moment
 
 SHORT = b"""
@@ -41,8 +41,8 @@ speed = "10000 rpm"
 """Little more than a disc: tables that a file leaves out, no crest, no bends, a unit close to its number."""
 
 
-def at(scene: Scene, point: Point, **mutation: float) -> Judgement:
-    return Judgement.of_record(judged(scene, point, **mutation))
+def at(scene: Scene, point: Point, **mutation: float) -> PointJudgement:
+    return PointJudgement.of_record(judged(scene, point, **mutation))
 
 
 def test_the_designed_set_is_reproducible_and_grows_at_its_end() -> None:
@@ -117,7 +117,9 @@ def short() -> Scene:
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
-def test_a_scene_of_little_more_than_a_disc_can_be_varied_along_every_axis(short: Scene, axis: Axis) -> None:
+def test_a_scene_of_little_more_than_a_disc_can_be_varied_along_every_axis(
+    short: Scene, axis: InputAxis
+) -> None:
     found = at(short, {axis.name: float(axis.at(0.5))})
     assert found.violations == ()
     assert found.loop
@@ -215,11 +217,11 @@ def test_an_interrupted_study_resumes_where_it_stopped(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        find_extremes(paper_scene, size=SMALL, kept=tmp_path, progress=stop)
+        find_extremes(paper_scene, size=SMALL, folder=tmp_path, progress=stop)
     assert len(counting) == 17
-    assert find_extremes(paper_scene, size=SMALL, kept=tmp_path).to_dict() == whole
+    assert find_extremes(paper_scene, size=SMALL, folder=tmp_path).to_dict() == whole
     assert len(counting) == whole["judged"]
-    find_extremes(paper_scene.with_values({"tube.bore": "1.6 mm"}), size=SMALL, kept=tmp_path)
+    find_extremes(paper_scene.with_values({"tube.bore": "1.6 mm"}), size=SMALL, folder=tmp_path)
     assert len(counting) == 2 * whole["judged"]
 
 
@@ -248,8 +250,10 @@ def test_a_sweep_finds_where_answers_end(paper_scene: Scene) -> None:
 
 def test_a_stretch_has_the_message_next_to_the_answers() -> None:
     texts = ("far", "near", "", "", "beyond", "further")
-    ends = tuple(Judgement(ending=Ending.REFUSED if text else Ending.SOLVED, text=text) for text in texts)
-    sweep = Sweep(axis=AXES[-1], shares=np.arange(1.0, 7.0) / 2, judgements=ends)
+    ends = tuple(
+        PointJudgement(ending=Ending.REFUSED if text else Ending.SOLVED, text=text) for text in texts
+    )
+    sweep = AxisSweep(axis=AXES[-1], shares=np.arange(1.0, 7.0) / 2, judgements=ends)
     spans = [(span["low"], span["high"], span["text"]) for span in sweep.spans()]
     assert spans == [(1, 2, "near"), (3, 4, ""), (5, 6, "beyond")]
 

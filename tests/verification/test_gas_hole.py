@@ -11,7 +11,7 @@ from ringbalance.verification.cases.gas_line import gas_hole
 
 
 def safe_fill(scene: Scene, state: str) -> float:
-    return gas_hole(scene, "light").found[f"margin_{state}"].value + scene.disc.max_fill_ratio
+    return gas_hole(scene, "light").quantities[f"margin_{state}"].value + scene.disc.max_fill_ratio
 
 
 def test_a_nearly_rectangular_chamber_is_safe_up_to_one_half(paper_scene: Scene) -> None:

@@ -110,7 +110,7 @@ def test_a_solve_that_did_not_succeed_cannot_confirm(claim: CaseDefinition, pape
             status = Status(code=StatusCode.NOT_CONVERGED, text="refine the mesh")
             value = 20.0 if defect else 10.0
             return Evidence(
-                found={"answer": Found(value=value).against(10.0)},
+                quantities={"answer": Found(value=value).against(10.0)},
                 numbers={"doubt": 0.0},
                 status=status,
             )
@@ -123,7 +123,7 @@ def test_a_solve_that_did_not_succeed_cannot_confirm(claim: CaseDefinition, pape
 def test_evidence_must_name_what_is_judged(claim: CaseDefinition, paper_scene: Scene) -> None:
     class Other:
         def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
-            return Evidence(found={"another": Found(value=1.0)})
+            return Evidence(quantities={"another": Found(value=1.0)})
 
     result = run_definition(claim, Other(), scene=paper_scene)
     assert result.verdict is Verdict.INCONCLUSIVE

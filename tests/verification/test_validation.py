@@ -31,7 +31,7 @@ from ringbalance.verification.navier_stokes.tube import (
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation.comparison import (
-    Comparison,
+    Predictions,
     _ModelStatistics,
     compare,
     friction,
@@ -62,7 +62,7 @@ def _synthetic(
     series = np.repeat(np.array([f"rig {i}" for i in range(20)]), count // 20)
     measured = true * np.exp(0.01 * rng.standard_normal(count))
     predicted = true * (1 + bias) * np.exp(scatter * rng.standard_normal(count))
-    return Comparison(
+    return Predictions(
         predicted=predicted,
         measured=measured,
         series=series,
@@ -98,7 +98,7 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
     series = np.repeat(np.array([f"rig {i}" for i in range(8)]), 50)
     for _ in range(400):
         measured = np.exp(np.repeat(0.02 * rng.standard_normal(8), 50) + 0.005 * rng.standard_normal(400))
-        found = Comparison(
+        found = Predictions(
             predicted=np.ones(400),
             measured=measured,
             series=series,

@@ -10,7 +10,7 @@ from ringbalance.verification.verdicts import Kind, Metric, Role, Verdict, combi
 
 def verdict(kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None) -> Verdict:
     found = found if reference is None else found.against(reference)
-    return judge_quantity(kind=kind, metric=metric, limit=limit, found=found)[0]
+    return judge_quantity(kind=kind, metric=metric, limit=limit, number=found)[0]
 
 
 TEN = Reference(value=10.0, uncertainty=0.1)

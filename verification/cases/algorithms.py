@@ -18,11 +18,11 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
+    CaseTable,
     Evidence,
     Found,
     Level,
     Reference,
-    Table,
     as_found,
     from_range,
     printed,
@@ -94,7 +94,7 @@ def trial_algorithm(scene: Scene, level: Level, defect: str | None = None) -> Ev
         units=dict.fromkeys(_STEP_NAMES, "s"),
     )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             settling_time=Found(value=own, reference=_ABOUT).moved(fastest - own, latest - own),
             phases_settled=max(sum(run.settled for run in runs) for runs in sets),
             misadjustments=min(counts),
@@ -137,7 +137,7 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
     )
     shown = {f"{a * 1e6:.0f} um": run for a, run in zip(AMPLITUDES, runs[0.5], strict=True)}
     return Evidence(
-        found={"settling_time": over_period(slowest), "misadjustments": over_period(rises)},
+        quantities={"settling_time": over_period(slowest), "misadjustments": over_period(rises)},
         numbers={
             "fastest": slowest[0],
             "middle": slowest[1],
@@ -159,7 +159,7 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     judged = [_compared(scene, *pair) for pair in runs.values()]
     periods, phases = zip(*itertools.product(PERIODS, PHASES), strict=True)
     targets, trials = ([[run] for both in runs.values() for run in both[i]] for i in (0, 1))
-    table = Table(
+    table = CaseTable(
         name="settling times of both algorithms",
         columns={
             "period": periods,
@@ -173,7 +173,7 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     first_phase = {name: runs[PERIODS[1]][i][0] for i, name in enumerate(("target vector", "trial"))}
     return Evidence(
-        found={name: over_period([one[name] for one in judged]) for name in judged[0]},
+        quantities={name: over_period([one[name] for one in judged]) for name in judged[0]},
         numbers={
             "periods": len(PERIODS),
             "trial_misadjustments": min(map(worst, trials)),
@@ -221,7 +221,7 @@ _DERIVATIVES: Final = (0.0, 0.06, 0.6, 6.0)
 
 def proportional_gain_ends(scene: Scene) -> Evidence:
     """The onset alone."""
-    return Evidence(found=as_found(onset=_onset(scene)))
+    return Evidence(quantities=as_found(onset=_onset(scene)))
 
 
 def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -244,7 +244,7 @@ def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> 
     )
     named = {f"Kp = {gain * 1e-6:.2f} s/um": run for gain, run in runs.items()}
     return Evidence(
-        found={
+        quantities={
             "onset": Found(value=onset, reference=_PRINTED_ONSET),
             "overshoot_turn": _turn(scene).against(math.pi),
         },
@@ -305,13 +305,13 @@ def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
     times = np.array([[slowest_within(scene, [run]) for run in group] for group in groups])
     raised = times[: len(_RAISED)]
     periods = [f"period {period:g} s" for period in PERIODS]
-    table = Table(
+    table = CaseTable(
         name="settling time, proportional part alone, 10 micrometres at 90 degrees",
         columns={"Kp": GAINS, **dict(zip(periods, times.T.tolist(), strict=True))},
         units={"Kp": "s/m", **dict.fromkeys(periods, "s")},
     )
     return Evidence(
-        found=as_found(least_ratio=np.min(raised[:-1] / raised[1:])),
+        quantities=as_found(least_ratio=np.min(raised[:-1] / raised[1:])),
         numbers={"periods": len(PERIODS), "beyond": np.max(times[-1] / times[-2])},
         tables=(table,),
     )
@@ -320,7 +320,7 @@ def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
 def integral_time_ends(scene: Scene) -> Evidence:
     """Without the integral times that are shown alone."""
     small, paper = (overshooting(_integrating(scene, time)) for time in (_SMALL, _INTEGRAL))
-    return Evidence(found=as_found(fraction_small=small, fraction_set=paper))
+    return Evidence(quantities=as_found(fraction_small=small, fraction_set=paper))
 
 
 def integral_time(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -335,7 +335,9 @@ def integral_time(scene: Scene, level: Level, defect: str | None = None) -> Evid
         units={"integral time": "s"},
     )
     return Evidence(
-        found=as_found(fraction_small=overshooting(runs[small]), fraction_set=overshooting(runs[_INTEGRAL])),
+        quantities=as_found(
+            fraction_small=overshooting(runs[small]), fraction_set=overshooting(runs[_INTEGRAL])
+        ),
         numbers={
             "runs": len(runs[_INTEGRAL]),
             "periods": len(PERIODS),
@@ -370,7 +372,7 @@ def derivative_time(scene: Scene, level: Level, defect: str | None = None) -> Ev
     without, own, tenfold, hundredfold = fractions = list(map(overshooting, groups))
     longest = [slowest_within(scene, group) for group in groups]
     last = tenfold if defect == "hundredfold_left_out" else hundredfold
-    table = Table(
+    table = CaseTable(
         name="overshoots over the derivative time, Kp = 0.08 s/um",
         columns={
             "derivative time": _DERIVATIVES,
@@ -380,7 +382,7 @@ def derivative_time(scene: Scene, level: Level, defect: str | None = None) -> Ev
         units={"derivative time": "s", "longest settling time": "s"},
     )
     return Evidence(
-        found=as_found(extra_tenfold=tenfold - without, extra_hundredfold=last - without),
+        quantities=as_found(extra_tenfold=tenfold - without, extra_hundredfold=last - without),
         numbers={
             "runs": len(groups[0]),
             "without": without,

@@ -14,12 +14,12 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
+    CaseTable,
     Convergence,
     Curve,
     Evidence,
     Found,
     Level,
-    Table,
     figure,
 )
 from ringbalance.verification.navier_stokes.tube import SectionMesh
@@ -153,7 +153,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
         "bends as curvature added to rotation": terms["shift"],
     }
     return Evidence(
-        found={
+        quantities={
             "straight": Found(value=_straight(flow, scene)).against(1.0),
             "explained": Found(value=found / explained, numerical=half_width / explained / 2).against(1.0),
             "convergence": Found(value=half_width / found),
@@ -173,7 +173,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
         convergence=convergence,
         series=(shown,),
         tables=(
-            Table(
+            CaseTable(
                 name="what the loss coefficient of the bent tube is made of",
                 columns={"term": list(rows), "K": list(rows.values())},
             ),

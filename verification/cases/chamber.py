@@ -16,12 +16,12 @@ from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
     COVERAGE_FACTOR,
+    CaseTable,
     Curve,
     Evidence,
     Found,
     Level,
     Reference,
-    Table,
     as_found,
     figure,
     from_half_width,
@@ -86,7 +86,7 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     }
     by_eq_4 = chamber_volume(disc=disc)
     flat_strip = abs(paper.chamber_volume_paper(disc=disc) / by_eq_4 - 1)
-    table = Table(
+    table = CaseTable(
         name="the chamber's volume by each printed number that contains the plates",
         columns={
             "from": ["Eq. 4, with the plates inferred from it", "R1'min = 34.9 mm", "departure 45.6 %"],
@@ -97,7 +97,7 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     half_width = COVERAGE_FACTOR * rounded_radius(partial(_plate_from_radius, disc))
     return Evidence(
-        found=found | as_found(flat_strip=flat_strip),
+        quantities=found | as_found(flat_strip=flat_strip),
         numbers={
             "plate_thickness": disc.plate_thickness,
             "plate_from_radius": _plate_from_radius(disc, RING_RADIUS.value),
@@ -143,7 +143,7 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
         Curve("no plates", "m", surface_radius(disc=bare, fill_ratio=x), style="reference"),
     )
     return Evidence(
-        found={
+        quantities={
             "ring_radius": Found(value=_half_full_radius(disc), reference=RING_RADIUS),
             "max_liquid": Found(value=0.5 * whole, reference=MAX_LIQUID_VOLUME),
             "initial_liquid": Found(value=0.25 * whole, reference=INITIAL_LIQUID_VOLUME),
@@ -155,7 +155,7 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
 
 def moment_ends(scene: Scene) -> Evidence:
     """The moment alone: Eq. 7 knows no plates."""
-    return Evidence(found={"moment": chamber_moment(at_paper_density(scene), density=DENSITY)})
+    return Evidence(quantities={"moment": chamber_moment(at_paper_density(scene), density=DENSITY)})
 
 
 def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -179,7 +179,7 @@ def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         ),
     )
     return Evidence(
-        found={
+        quantities={
             "moment": found.against(CHAMBER_MOMENT),
             "arithmetic": Found(
                 value=unrounded, input=rounded_radius(partial(_eq_7, disc)), reference=CHAMBER_MOMENT
@@ -229,7 +229,7 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
     )
     rounding = CHAMBER_MOMENT.uncertainty * math.sqrt(2)
     return Evidence(
-        found={
+        quantities={
             "capacity": both.against(DISC_MOMENT),
             "arithmetic": Found(value=printed, input=rounding, reference=DISC_MOMENT),
         },
@@ -250,7 +250,7 @@ def density(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ratio = 1.0 if defect == "density_without_effect" else above.value / below.value
     oil = liquid_at(name="perfluorinated oil GPL 101", temperature=293.15).density
     return Evidence(
-        found={
+        quantities={
             "ratio": Found(value=ratio, numerical=ratio * below.numerical / below.value).against(2.0),
             "dense_capacity": capacity.against(DENSE_DISC_MOMENT),
         },
@@ -261,7 +261,7 @@ def density(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def lever_ends(scene: Scene) -> Evidence:
     """lambda at the centre by the closed form."""
-    return Evidence(found=as_found(central=central_lambda(disc=scene.disc)))
+    return Evidence(quantities=as_found(central=central_lambda(disc=scene.disc)))
 
 
 def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -284,7 +284,7 @@ def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         Curve("72 mm within 0.7 %", "m", claimed, style="paper", uncertainty=LAMBDA_TOLERANCE * claimed),
     )
     return Evidence(
-        found={
+        quantities={
             "central": dataclasses.replace(central, corrected=bare, reference=_PRINTED_LAMBDA),
             "variation": Found(value=float(np.ptp(curve)) / central.value),
         },
@@ -305,7 +305,7 @@ def correction(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
         for other in (0.0, mass)
     )
     exact = float(exact_moment(disc=scene.disc, density=DENSITY, fill_ratio=full))
-    table = Table(
+    table = CaseTable(
         name="balancing ability by each route",
         columns={
             "route": ["Eqs. 7 and 8", "Eqs. 21 and 22, literally", "per transferred mass", "exact"],
@@ -316,7 +316,7 @@ def correction(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
     )
     spread = _PRINTED_LAMBDA.uncertainty / _PRINTED_LAMBDA.value
     return Evidence(
-        found={
+        quantities={
             "chamber": Found(value=chamber, input=spread * chamber, reference=CHAMBER_MOMENT),
             "disc": Found(value=both, input=spread * both, reference=DISC_MOMENT),
         },

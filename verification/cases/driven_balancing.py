@@ -65,7 +65,7 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     peak = largest if defect else float(np.max(balanced.amplitude[balanced.time >= begins]))
     runs = {"locked": locked, "balanced at 100 rpm": balanced}
     return Evidence(
-        found={
+        quantities={
             "critical": Found(value=critical, corrected=without, reference=_CRITICAL),
             "peak": Found(value=peak / largest),
         },
@@ -156,7 +156,7 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
     )
     arrived = [stage.end for run in runs for stage in run.stages if stage.name == "positioning"]
     return Evidence(
-        found=as_found(ratio=np.max(found.positioned / found.before)),
+        quantities=as_found(ratio=np.max(found.positioned / found.before)),
         numbers={
             "before": found.before[0],
             "first": found.positioned[0],
@@ -173,7 +173,7 @@ def fine_tuning(scene: EccentricScene, level: Level, defect: str | None = None) 
     found = _balanced_at_constant_speed(_beside_the_targets(scene), time_limit=time_limit)
     settled = [run.settling_time or run.time[-1] for run in found.runs.values()]
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             left=np.min(found.positioned / found.before), ended=np.max(found.after / found.before)
         ),
         numbers={
@@ -199,7 +199,7 @@ def bound(scene: EccentricScene, level: Level, defect: str | None = None) -> Evi
     runs = _balanced_at_constant_speed(scene, time_limit=30.0).runs.values()
     largest = max(run.worst_amplitude for run in runs)
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             force_ratio=judged.printed_force / judged.force, amplitude_ratio=largest / turning.amplitude
         ),
         numbers={"bound": turning.amplitude, "largest": largest},
@@ -290,7 +290,7 @@ class _FigureFour(NamedTuple):
 
 def imbalance_ends(scene: EccentricScene) -> Evidence:
     """With honest covariances alone."""
-    return Evidence(found=_judged(_figure_four(scene, scales=(1.0,))))
+    return Evidence(quantities=_judged(_figure_four(scene, scales=(1.0,))))
 
 
 def _judged(found: _FigureFour, time: float | None = None) -> dict[str, Found]:
@@ -313,7 +313,7 @@ def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) ->
         log=True,
     )
     return Evidence(
-        found=_judged(found, None if defect is None else float(found.scaled_time[-1])),
+        quantities=_judged(found, None if defect is None else float(found.scaled_time[-1])),
         numbers={"printed": _PRINTED, "scale": float(scale)},
         series=(_estimates(found), over_scale),
     )
@@ -409,7 +409,7 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
     )
     axis = ("time since the masses started", "s", when)
     return Evidence(
-        found=as_found(error=max(errors), slowest=slowest),
+        quantities=as_found(error=max(errors), slowest=slowest),
         series=(figure("friction arm, estimated", axis, *estimated, *printed),),
     )
 

@@ -66,7 +66,7 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     )
     judged, short = (float(grown[name if defect is None else "without"].min()) for name in ("exact", "short"))
     return Evidence(
-        found={"exact": Found(value=judged).moved(0.0, short - judged)},
+        quantities={"exact": Found(value=judged).moved(0.0, short - judged)},
         numbers={
             "without": grown["without"].min(),
             "without_most": grown["without"].max(),
@@ -85,7 +85,7 @@ def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     over_mass = {name: each[0] / each[1] for name, each in found.items()}
     exact, short = ("exact", "short") if defect is None else ("without", "without")
     return Evidence(
-        found={
+        quantities={
             name: Found(value=float(grown[exact].max())).moved(
                 0.0, float(grown[short].max() - grown[exact].max())
             )
@@ -197,7 +197,7 @@ def stability(scene: EccentricScene, level: Level, defect: str | None = None) ->
     )
     friction = law.track.moment * speed**2
     return Evidence(
-        found={"rest": Found(value=rest, corrected=exact), "decay": Found(value=decay)},
+        quantities={"rest": Found(value=rest, corrected=exact), "decay": Found(value=decay)},
         numbers={
             "band": (1 - _KNOWN) * arm * friction / abs(law.position_gain),
             "exact": exact,
@@ -226,7 +226,7 @@ def collision(scene: EccentricScene, level: Level, defect: str | None = None) ->
         "unequal_pace": _nearer(start, printed, faster=_FASTER),
     }
     return Evidence(
-        found=as_found(nearer=fractions[defect or "printed"]),
+        quantities=as_found(nearer=fractions[defect or "printed"]),
         numbers={
             "cases": _CASES,
             "other": fractions["other_assignment"],

@@ -22,7 +22,7 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.platform.files import cache_folder, packaged_rows
-from ringbalance.verification.evidence import Evidence, Level, Table, as_found
+from ringbalance.verification.evidence import CaseTable, Evidence, Level, as_found
 from ringbalance.verification.extremes.point import Ending
 from ringbalance.verification.extremes.study import SIZES, Size, find_extremes
 from ringbalance.verification.finite_elements import found_of, mesh_table, mutated_force, ring_of
@@ -92,7 +92,7 @@ def gci_celik2008(scene: Scene, level: Level, defect: str | None = None) -> Evid
     }
     wrong = sum(result.verdict is not expected for result, expected in zip(found, _PUBLISHED, strict=True))
     printed = [one.printed for one in examples.values()]
-    table = Table(
+    table = CaseTable(
         name="published examples, printed and found",
         columns={
             "example": list(examples),
@@ -106,7 +106,7 @@ def gci_celik2008(scene: Scene, level: Level, defect: str | None = None) -> Evid
         },
     )
     return Evidence(
-        found=as_found(**digits, wrong_verdicts=wrong),
+        quantities=as_found(**digits, wrong_verdicts=wrong),
         numbers={"worst": max(digits.values())},
         tables=(table,),
     )
@@ -158,7 +158,7 @@ def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evid
             formal_order=50.0 if defect == "cap_removed" else _FORMAL_ORDER,
         )
     results = judged.values()
-    table = Table(
+    table = CaseTable(
         name="made-up sequences, all with the limit 1",
         columns={
             "sequence": list(judged),
@@ -169,7 +169,7 @@ def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evid
         },
     )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             wrong_verdicts=sum(judged[name].verdict not in rest for name, (_, rest) in sequences.items()),
             capped_order=judged["faster than formal"].order,
             missed_limits=sum(
@@ -205,7 +205,7 @@ def coverage(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """
     ratios = _error_ratios(_COUNT, _SEED) / _WIDTHS[defect]
     fared = {name: _how_fared(column) for name, column in zip(_QUANTITIES, ratios.T, strict=True)}
-    table = Table(
+    table = CaseTable(
         name=f"{_COUNT} random discs, seed {_SEED}",
         columns={
             "quantity": [total.replace("_", " ") for total in _QUANTITIES.values()],
@@ -216,7 +216,7 @@ def coverage(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
     )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             **{f"{name}_share": one.share for name, one in fared.items()},
             **{f"{name}_tightness": one.tightness for name, one in fared.items()},
         ),
@@ -306,13 +306,13 @@ def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         scene,
         size=SIZES[level] if defect is None else _FEW,
         workers=_WORKERS,
-        kept=cache_folder() / _KEPT if level == "heavy" and defect is None else None,
+        folder=cache_folder() / _KEPT if level == "heavy" and defect is None else None,
         mutation=_MUTATIONS[defect],
     )
     document, named = result.to_dict(), (Ending.SOLVED, Ending.WIDE, Ending.STATUS, Ending.REFUSED)
     worst = document["worst_error_over_half_width"]
     return Evidence(
-        found=as_found(broken=result.broken(), worst=worst),
+        quantities=as_found(broken=result.broken(), worst=worst),
         numbers={
             "judged": document["judged"],
             "points": document["points"],
@@ -320,7 +320,7 @@ def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "worst": worst,
             **{ending.name.lower(): float(document["endings"][str(ending)]) for ending in named},
         },
-        tables=(Table(name="axes", columns=result.axes_table()),),
+        tables=(CaseTable(name="axes", columns=result.axes_table()),),
     )
 
 
@@ -338,7 +338,7 @@ def conservation(scene: Scene, level: Level, defect: str | None = None) -> Evide
         "weight_balance": _weight_balance(scene, fill, (radial // 2, angular // 2, 4)),
         "volume_drawn": abs(drawn / (fill * chamber_volume(disc=scene.disc)) - 1),
     }
-    return Evidence(found=as_found(**found))
+    return Evidence(quantities=as_found(**found))
 
 
 def _section_balance(
@@ -346,7 +346,7 @@ def _section_balance(
 ) -> dict[str, float]:
     """Relative residuals of one two-dimensional solution."""
     true = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="horizontal")
-    with mutated_force(across=1.01 if defect == "force_across_off_by_a_percent" else 1.0):
+    with mutated_force(y_factor=1.01 if defect == "force_across_off_by_a_percent" else 1.0):
         solution = _solved(scene, true, fill, cells)
     loads = liquid_integrals(solution=solution, density=true.density, axial_width=scene.disc.axial_width)
     forces = dict(loads.force)
@@ -412,7 +412,7 @@ def independent_routes(scene: Scene, level: Level, defect: str | None = None) ->
     found["lambda_2d"] = centre.scaled(2 / scene.liquid.density).against(exact["lambda"])
     moment = found["moment_2d"]
     return Evidence(
-        found=found,
+        quantities=found,
         numbers={"moment_share": abs(moment.value - exact["moment"]) / (2 * moment.numerical)},
         convergence=tuple(mesh_table(rings[2], name, unit, 0) for name, unit in _SCALARS.items()),
         status=rings[2].status,
@@ -422,7 +422,7 @@ def independent_routes(scene: Scene, level: Level, defect: str | None = None) ->
 def _ring(scene: Scene, dimension: int, defect: str | None, share: float = 1.0) -> RingQuantities:
     disc = with_plate(scene.disc, 0.0) if defect == "plates_left_out" else scene.disc
     factor = 1.00001 if defect == "force_off" else 1.0
-    with mutated_force(along=factor, across=factor):
+    with mutated_force(x_factor=factor, y_factor=factor):
         return ring_quantities(
             disc=disc,
             density=scene.liquid.density,

@@ -73,7 +73,7 @@ def gas_hole_ends(scene: Scene) -> Evidence:
     cells = _cells(disc, *_GRIDS[0])
     safe = _safe_fills(scene, cells, _hole(disc, _safest_radius(disc, cells, angles)), angles)
     return Evidence(
-        found=as_found(**{f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED})
+        quantities=as_found(**{f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED})
     )
 
 
@@ -92,7 +92,7 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     rough, safe = (_safe_fills(scene, cells, hole, angles) for cells in (coarse, fine))
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
-        found={
+        quantities={
             f"margin_{state}": Found.within(
                 safe[state] - disc.max_fill_ratio, abs(safe[state] - rough[state])
             )
@@ -303,7 +303,7 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     bare, exact = (_exact(scene, radius, fills) for radius in (0.0, _RADIUS))
     hole = gas_hole(with_tube, level).numbers
     return Evidence(
-        found={
+        quantities={
             name: Found.within(value, (share + 1e-8) * abs(value)).against(exact[name])
             for name, (value, share) in values.items()
         },

@@ -63,7 +63,7 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
         Curve("stall by Eq. 19", "Pa", np.full(radius.shape, stall), style="reference"),
     )
     return Evidence(
-        found={
+        quantities={
             "by_eq_19": Found(value=stall, reference=LOWEST_PRESSURE),
             "by_priming": Found(value=priming(crest), reference=LOWEST_PRESSURE),
         },
@@ -79,7 +79,7 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
 def denser_liquid_ends(scene: Scene) -> Evidence:
     """The gains alone."""
     laws = [_law(scene, density) for density in (scene.liquid.density, 2 * scene.liquid.density)]
-    return Evidence(found=as_found(gain=_gain(scene, laws), gain_raised=_gain(scene, laws, raised=2)))
+    return Evidence(quantities=as_found(gain=_gain(scene, laws), gain_raised=_gain(scene, laws, raised=2)))
 
 
 def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -96,7 +96,7 @@ def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evid
     ]
     return Evidence(
         # Twice the density, twice the ability.
-        found={
+        quantities={
             "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised).against(2.0),
             "gain_raised": Found(value=raised, numerical=_STANDARD).against(2.0),
         },

@@ -42,6 +42,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Bend, Scene, Tube
 from ringbalance.verification.evidence import (
+    CaseTable,
     Curve,
     Evidence,
     Found,
@@ -49,7 +50,6 @@ from ringbalance.verification.evidence import (
     NotRunError,
     Reference,
     Series,
-    Table,
     figure,
     from_range,
 )
@@ -192,7 +192,7 @@ def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     }
     turning = replace(scene, tube=tube)
     return Evidence(
-        found=found,
+        quantities=found,
         numbers=_numbers(turning, slowest, without),
         series=(_figure(turning, without),),
         tables=(_over_velocity(turning, without), _methods(tube, float(at_rest.reynolds[-1]), departs)),
@@ -292,7 +292,7 @@ def _figure(scene: Scene, without: frozenset[str]) -> Series:
     )
 
 
-def _over_velocity(scene: Scene, without: frozenset[str]) -> Table:
+def _over_velocity(scene: Scene, without: frozenset[str]) -> CaseTable:
     loss = tube_loss(scene, np.array(_SHOWN))
     low, high = _spread(scene, loss.reynolds, without)
     columns = {
@@ -305,7 +305,7 @@ def _over_velocity(scene: Scene, without: frozenset[str]) -> Table:
         "half-width": loss.k.uncertainty,
     }
     elements = "finite elements"
-    return Table(
+    return CaseTable(
         name="loss coefficient over velocity; below Re = 10,000 no measured bend stands behind the library's",
         columns={
             **{name: values.tolist() for name, values in columns.items()},
@@ -315,7 +315,7 @@ def _over_velocity(scene: Scene, without: frozenset[str]) -> Table:
     )
 
 
-def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> Table:
+def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> CaseTable:
     """Every method of the library at one Re, those left out with the reason."""
     parts, rough = by_fluids(tube, reynolds, without=frozenset(departs)), tube.roughness / tube.bore
     rows: list[tuple[str, str, float | str, str]] = [
@@ -336,7 +336,7 @@ def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> Table
             why = "left out: beyond the angles, radii or Re of its source" if name in _BENDS else steel
             rows.append(("bends", name, MISSING, why))
     heads = ("part", "method", "share of k", "remark")
-    return Table(
+    return CaseTable(
         name=f"methods of fluids at Re = {reynolds:,.0f}",
         columns=dict(zip(heads, map(list, zip(*rows, strict=True)), strict=True)),
     )

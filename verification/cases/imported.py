@@ -77,7 +77,7 @@ def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         ring.wall_pressure.value, ring.wall_pressure.uncertainty, conclusive=ring.status.ok
     )
     return Evidence(
-        found={name: each.against(exact[name]) for name, each in found.items()},
+        quantities={name: each.against(exact[name]) for name, each in found.items()},
         numbers={"cells": float(len(records[0].cells))},
     )
 
@@ -112,7 +112,7 @@ def pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     total = np.sum([load.force.value for load in curved.loads.values()], axis=0)
     centrifugal = omega**2 * curved.first_moment * np.array([1.0, 1.0, 0.0])
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             field_order=field.settled_order,
             field_error=field.finest_error,
             wall_error=wall.finest_error,
@@ -210,7 +210,8 @@ def round_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evid
         )
     }
     return Evidence(
-        found=orders_found(studies) | as_found(tilted_error=quadratic[-1, 2], lever_error=quadratic[-1, 1]),
+        quantities=orders_found(studies)
+        | as_found(tilted_error=quadratic[-1, 2], lever_error=quadratic[-1, 1]),
         numbers={"facets": 4.0 * cells[-1]},
         convergence=tuple(studies.values()),
     )

@@ -187,7 +187,7 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         log=True,
     )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             moved_fill=Found.within(limit, abs(limit - moved[-1]) / 2).against(exact),
             order=study.settled_order,
             finest_error=study.finest_error,
@@ -235,7 +235,7 @@ def orders(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     path, _ = replace(used, law=kinked).marched(tube, t)
     stalled, longest, drawn = _stall_study(low, law, spoiled=defect == "stall_rate_off")
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             march_error=np.max(np.abs(used.marched(tube, fine)[0] - long.exact(fine))),
             stall_error=1.0 if stalls is None else abs(stalls / low.end - 1),
             kinked_difference=_off_in_fill(replace(long, law=kinked), t, path),

@@ -48,7 +48,10 @@ _SQUARE: Final = ((0.5, 2000.0, 8e-6, 0.06), (1.0, 1000.0, 1e-5, 0.06), (1.0, 20
 _FAST: Final = (3.3, 1810.0, 4e-6, 0.03)
 """S = omega d/U, Re, step and time over d^2/nu; the last is the end of the correlated simulations."""
 _TUBE: Final = (0.5, 2000.0, 5e-6, 0.05)
-_CELLS: Final = {"light": DuctMesh(across=16, along=10), "heavy": DuctMesh(across=24, along=16)}
+_CELLS: Final = {
+    "light": DuctMesh(across_axis=16, along_axis=10),
+    "heavy": DuctMesh(across_axis=24, along_axis=16),
+}
 _WASHER: Final = 12.4e-6
 """Unbalance of a washer, kg m."""
 _WASHER_UNCERTAINTY: Final = 0.5e-6
@@ -78,7 +81,7 @@ def smooth_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evide
     for name, part in parts.items():
         numbers |= {f"{name}_{key}": value for key, value in part.statistics.numbers().items()}
     return Evidence(
-        found=as_found(share_within=whole.share_within, bias=abs(numbers["turbulent_bias"])),
+        quantities=as_found(share_within=whole.share_within, bias=abs(numbers["turbulent_bias"])),
         numbers=numbers,
         series=(parts["turbulent"].over_reynolds("smooth tubes"),),
     )
@@ -101,7 +104,7 @@ def rough_tubes(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     grain = points.columns["reynolds"] * np.sqrt(points.measured / 8) * wall
     rough = points.where(grain > _FULLY_ROUGH).statistics
     return Evidence(
-        found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
+        quantities=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
             **statistics.numbers(),
             **beside_judged(points),
@@ -132,7 +135,7 @@ def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         for part in (narrow, narrow.where(reynolds < _LAMINAR), narrow.where(reynolds >= _TURBULENT))
     )
     return Evidence(
-        found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
+        quantities=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
         numbers={
             **whole.numbers(),
             "laminar_points": laminar.points,
@@ -188,7 +191,7 @@ def rotating_duct(scene: Scene, level: Level, defect: str | None = None) -> Evid
         log=True,
     )
     return Evidence(
-        found=as_found(bias=abs(np.mean(deviation)), worst=np.max(np.abs(deviation))),
+        quantities=as_found(bias=abs(np.mean(deviation)), worst=np.max(np.abs(deviation))),
         numbers={"signed_bias": float(np.mean(deviation))} | ({} if defect else _tube()),
         series=(shown,),
     )
@@ -228,7 +231,7 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         Curve("measured", "m", np.array(amplitudes), style="points"),
     )
     return Evidence(
-        found={
+        quantities={
             # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
             f"washers_{count}": Found(
                 value=float(predicted[count]),

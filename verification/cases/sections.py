@@ -38,12 +38,12 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
+    CaseTable,
     Convergence,
     Curve,
     Evidence,
     Found,
     Level,
-    Table,
     as_found,
     figure,
     order_figure,
@@ -133,7 +133,7 @@ def rotating_section(scene: Scene, level: Level, defect: str | None = None) -> E
     )
     return Evidence(
         # Against exact limits.
-        found={
+        quantities={
             "at_rest": Found(value=abs(rest - 1)),
             "slow": Found(value=slow).against(1.0),
             "inertia": Found(value=inertia).against(1.0),
@@ -201,7 +201,7 @@ def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> 
         for name, order, error in (("velocity", 3.0, _velocity_error), ("pressure", 2.0, _pressure_error))
     }
     return Evidence(
-        found=orders_found(studies),
+        quantities=orders_found(studies),
         numbers={"unknowns": float(unknowns[-1])},
         series=(order_figure(studies),),
         convergence=tuple(studies.values()),
@@ -253,7 +253,7 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
     lengths = [_decay_length(coarse, *point) for point in points]
     bounds = [_length_bound(*point) for point in points]
     shares = np.divide(lengths, bounds)
-    table = Table(
+    table = CaseTable(
         name="way on which a disturbance falls by e",
         columns={
             "Re": [re for re, _ in points],
@@ -264,7 +264,7 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
         units={"found": "d", "bound": "d"},
     )
     return Evidence(
-        found={
+        quantities={
             "creeping": Found(value=float(np.min(np.abs(rates + exact)) / abs(exact))),
             "fast": Found(value=(fast[1] * step - fast[0]) / (step - 1)).against(_GEOSTROPHIC),
             "bound": Found(value=float(shares.max())),
@@ -390,7 +390,7 @@ def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         log=True,
     )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             laminar=np.max(np.abs(friction_of(laminar) * laminar / 64 - 1)),
             jump=np.max(np.abs(np.diff(curve) / curve[:-1])),
             head_slope=np.min(np.diff(np.log(curve * sweep**2)) / np.log(_STEP)),

@@ -23,13 +23,13 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.liquids import liquid_at, liquids_at_room_temperature
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
+    CaseTable,
     Curve,
     Evidence,
     Found,
     Level,
     Reference,
     Series,
-    Table,
     as_found,
     figure,
     from_half_width,
@@ -85,7 +85,7 @@ def _under_gas(scene: Scene) -> TubeLoss:
 
 def bernoulli_ends(scene: Scene) -> Evidence:
     """Without the exit's share, which is the same at all values."""
-    return Evidence(found={"one_k": _one_k(scene)} | as_found(siphon_share=_siphon_share(scene)))
+    return Evidence(quantities={"one_k": _one_k(scene)} | as_found(siphon_share=_siphon_share(scene)))
 
 
 def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -105,7 +105,7 @@ def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence
     # Half the exit's share of k + 1 beyond '+1' is its effect on the velocity.
     by_exit = as_found(exit_velocity=abs(exit_loss) / (2 * (k + 1)))
     return Evidence(
-        found={**bernoulli_ends(scene).found, **by_exit},
+        quantities={**bernoulli_ends(scene).quantities, **by_exit},
         numbers={"exit_excess": exit_loss, "bare_bore": bare.tube.bore, "share_bare": _siphon_share(bare)},
         series=(shown,),
     )
@@ -138,7 +138,7 @@ def drag_coefficient_ends(scene: Scene) -> Evidence:
     spread = float(fills.value[high] - fills.value[low])
     both = math.hypot(fills.uncertainty[low], fills.uncertainty[high]) if spread > 0 else 0.0
     return Evidence(
-        found={
+        quantities={
             "k_scene": Found(
                 value=float(middle.k.value[0]),
                 input=from_half_width(float(middle.k.uncertainty[0])),
@@ -161,7 +161,7 @@ def drag_coefficient(scene: Scene, level: Level, defect: str | None = None) -> E
     table, differences = _over_liquids(liquids), _differences(printed, bare)
     of_liquids = [float(run.k.value[0]) for run in liquids.values()]
     return Evidence(
-        found=drag_coefficient_ends(scene).found,
+        quantities=drag_coefficient_ends(scene).quantities,
         numbers={
             "gas": scene.gas.pressure,
             "velocity": middle.velocity[0],
@@ -219,9 +219,9 @@ def _over_velocity(scene: Scene) -> Series:
     )
 
 
-def _over_liquids(liquids: dict[str, TubeLoss]) -> Table:
+def _over_liquids(liquids: dict[str, TubeLoss]) -> CaseTable:
     runs = liquids.values()
-    return Table(
+    return CaseTable(
         name="k of the scene's tube with each known liquid, equal fills, the scene's gas pressure",
         columns={
             "liquid": list(liquids),
@@ -235,7 +235,7 @@ def _over_liquids(liquids: dict[str, TubeLoss]) -> Table:
     )
 
 
-def _differences(scene: Scene, bare: Scene) -> Table:
+def _differences(scene: Scene, bare: Scene) -> CaseTable:
     """Velocities of both laws over those at equal fills, each on the disc that meets Fig. 7 under it."""
     full, gas = scene.disc.max_fill_ratio, scene.gas.pressure
     rows = {
@@ -259,13 +259,13 @@ def _differences(scene: Scene, bare: Scene) -> Table:
             for law, (_, fill, pressure) in zip(laws, rows.values(), strict=True)
         ]
         columns[name] = [velocity / velocities[0] for velocity in velocities]
-    return Table(
+    return CaseTable(
         name="what differs between the laws once both meet Fig. 7: velocity over that at equal fills",
         columns=columns,
     )
 
 
-def _numbers(differences: Table) -> dict[str, float]:
+def _numbers(differences: CaseTable) -> dict[str, float]:
     """The rows of the table that the text names, by law."""
     rows = {"pressure": 2, "empty": 4, "warm": 5, "oil": 6}
     _, *laws = differences.columns.values()

@@ -14,12 +14,12 @@ from ringbalance.reduced_model import paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
+    CaseTable,
     Curve,
     Evidence,
     Found,
     Level,
     Series,
-    Table,
     as_found,
     figure,
 )
@@ -57,7 +57,7 @@ def wall_pressure_ends(scene: Scene) -> Evidence:
     pressure = wall_pressure_of(scene, _SHARES * scene.disc.max_fill_ratio)
     by_eq_12 = _eq_12(scene, scene.disc, _SHARES * scene.disc.max_fill_ratio)
     return Evidence(
-        found={
+        quantities={
             name: Found(value=float(pressure[index])).against(by_eq_12[index])
             for name, index in _JUDGED.items()
         }
@@ -87,7 +87,7 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
         Curve("Eq. 12", "Pa", by_eq_12, style="paper"),
     )
     return Evidence(
-        found={
+        quantities={
             name: dataclasses.replace(
                 found_of(ring, "wall_pressure", index), corrected=float(corrected[index])
             ).against(by_eq_12[index])
@@ -135,7 +135,7 @@ def _over_plates(scene: Scene) -> Series:
     )
 
 
-def _gravity_table(scene: Scene) -> Table:
+def _gravity_table(scene: Scene) -> CaseTable:
     """Mean wall pressure over a turn with gravity, relative to that without, at falling speeds."""
     speeds = [share * scene.rotor.speed for share in _SPEEDS]
     middle = scene.disc.max_fill_ratio / 2
@@ -153,7 +153,7 @@ def _gravity_table(scene: Scene) -> Table:
     plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEEDS)
     mean, closed = np.array([(ring.wall_pressure.value[0], ring.solved[0]) for ring in rings]).T
     ripple = np.array([ring.ripple["wall_pressure"][0] for ring in rings])
-    return Table(
+    return CaseTable(
         name="gravity across the shaft: change of the mean wall pressure, and its ripple over a turn",
         columns={
             "speed": speeds,
@@ -167,7 +167,7 @@ def _gravity_table(scene: Scene) -> Table:
 
 def velocity_departure_ends(scene: Scene) -> Evidence:
     """The falls under the true wall pressure: Eq. 19's arithmetic knows no plates."""
-    return Evidence(found=_departures(at_paper_density(scene)))
+    return Evidence(quantities=_departures(at_paper_density(scene)))
 
 
 def velocity_departure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -188,7 +188,7 @@ def velocity_departure(scene: Scene, level: Level, defect: str | None = None) ->
     fall = _relative_velocity(given, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share)
     laws = {name: _law_velocity(given, pressure, share) for name, pressure in _PRESSURES.items()}
     return Evidence(
-        found={**physics, **arithmetic, **as_found(slope=np.min(np.diff(fall)) * (_POINTS - 1))},
+        quantities={**physics, **arithmetic, **as_found(slope=np.min(np.diff(fall)) * (_POINTS - 1))},
         numbers={
             **{f"rounded_{name}": _eq_19(given, p, RING_RADIUS.value) for name, p in _PRESSURES.items()},
             "shortfall": 1 - _stall_by_eq_12(given) / _full_pressure(given),
@@ -276,7 +276,7 @@ def rectangular_element(scene: Scene, level: Level, defect: str | None = None) -
         Curve("Eq. 11 integrated", "Pa", exact, style="paper"),
     )
     return Evidence(
-        found={
+        quantities={
             "wall_pressure": pressure.against(exact[-1]),
             "force_balance": force.scaled(1 / (scene.rotor.speed**2 * float(moment))).against(1.0),
         },

@@ -50,7 +50,7 @@ def sloshing(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     still = _ring_frequencies(bare, 0.0) / _without_coriolis(bare, _depths(bare, _FILLS), _MODES)
     turning = _ring_frequencies(bare, factor) / _exact_frequencies(bare)
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             still=np.abs(still - 1).max(),
             frequencies=np.abs(turning - 1).max(),
             **_swing_errors(bare, _FILLS, swing, backwards=defect == "forcing_backwards"),
@@ -137,7 +137,7 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
         Curve("sum of cosines", "1", exact, style="reference"),
     )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             plane=np.abs(values / exact - 1).max(),
             held=(np.abs(values - exact) / widths).max(),
             **_swing_errors(bare, fills, swing, backwards=defect == "forcing_backwards"),

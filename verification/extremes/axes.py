@@ -35,7 +35,7 @@ _USUAL_SHARE: Final = 0.75
 
 
 @dataclass(frozen=True)
-class Axis:
+class InputAxis:
     """One input, from one end of what anyone might ask for to a step beyond the other."""
 
     name: str
@@ -62,24 +62,28 @@ class Axis:
 
 
 AXES: Final = (
-    Axis("speed", "speed", "rpm", 1.0, 3e5, usual=(300.0, 6e4)),
-    Axis("fill", "largest fill ratio", "1", 1e-6, 1.0, usual=(0.05, 0.9)),
-    Axis("angle", "central angle", "deg", 5.0, 89.0, usual=(10.0, 85.0), spacing="linear"),
-    Axis("plate", "plate thickness over that which closes the chamber", "1", 0.0, 1.05, (0.0, 0.8), "linear"),
-    Axis("viscosity", "kinematic viscosity", "m^2/s", 1e-7, 1e-2, usual=(1e-7, 1e-3)),
-    Axis("bore", "bore", "mm", 0.1, 20.0, usual=(0.3, 6.0)),
-    Axis("roughness", "roughness over bore", "1", 1e-7, 0.06, usual=(1e-6, 0.02)),
-    Axis("pressure", "gas pressure over the column to the siphon crest", "1", 0.0, 4.0, (0.8, 3.0), "linear"),
-    Axis(
+    InputAxis("speed", "speed", "rpm", 1.0, 3e5, usual=(300.0, 6e4)),
+    InputAxis("fill", "largest fill ratio", "1", 1e-6, 1.0, usual=(0.05, 0.9)),
+    InputAxis("angle", "central angle", "deg", 5.0, 89.0, usual=(10.0, 85.0), spacing="linear"),
+    InputAxis(
+        "plate", "plate thickness over that which closes the chamber", "1", 0.0, 1.05, (0.0, 0.8), "linear"
+    ),
+    InputAxis("viscosity", "kinematic viscosity", "m^2/s", 1e-7, 1e-2, usual=(1e-7, 1e-3)),
+    InputAxis("bore", "bore", "mm", 0.1, 20.0, usual=(0.3, 6.0)),
+    InputAxis("roughness", "roughness over bore", "1", 1e-7, 0.06, usual=(1e-6, 0.02)),
+    InputAxis(
+        "pressure", "gas pressure over the column to the siphon crest", "1", 0.0, 4.0, (0.8, 3.0), "linear"
+    ),
+    InputAxis(
         "place", "gas pressure on the shaft from a half up", "1", 0.0, 1.0, usual=(0.0, 0.4), spacing="linear"
     ),
-    Axis("unbalance", "unbalance over what one pair can carry", "1", 0.01, 1.5, usual=(0.05, 0.9)),
-    Axis("gain", "controller gain over the scene's", "1", 1e-4, 1e3, usual=(0.01, 10.0)),
-    Axis("noise", "sensor noise over the limit", "1", 1e-4, 10.0, usual=(1e-3, 0.5)),
-    Axis("period", "controller period", "s", 1e-3, 100.0, usual=(0.05, 5.0)),
-    Axis("tolerance", "tolerance", "1", 1e-10, 0.1, usual=(1e-4, 0.1)),
+    InputAxis("unbalance", "unbalance over what one pair can carry", "1", 0.01, 1.5, usual=(0.05, 0.9)),
+    InputAxis("gain", "controller gain over the scene's", "1", 1e-4, 1e3, usual=(0.01, 10.0)),
+    InputAxis("noise", "sensor noise over the limit", "1", 1e-4, 10.0, usual=(1e-3, 0.5)),
+    InputAxis("period", "controller period", "s", 1e-3, 100.0, usual=(0.05, 5.0)),
+    InputAxis("tolerance", "tolerance", "1", 1e-10, 0.1, usual=(1e-4, 0.1)),
     # Without gravity there is a closed form to compare the half-widths with.
-    Axis("gravity", "gravity over standard gravity", "1", 0.0, 2.0, usual=(0.0, 0.0), spacing="linear"),
+    InputAxis("gravity", "gravity over standard gravity", "1", 0.0, 2.0, usual=(0.0, 0.0), spacing="linear"),
 )
 """What a designed set varies together."""
 
@@ -198,7 +202,7 @@ def designed_set(*, count: int, seed: int) -> tuple[Point, ...]:
     return tuple(dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True))
 
 
-def _drawn(axis: Axis, share: FloatArray, kind: FloatArray) -> list[float]:
+def _drawn(axis: InputAxis, share: FloatArray, kind: FloatArray) -> list[float]:
     """Values that lie in the usual range as often as `_USUAL_SHARE` says."""
     low, high = (axis.share(end) for end in axis.usual)
     places: list[float] = np.where(kind < _USUAL_SHARE, low + share * (high - low), share).tolist()

@@ -46,7 +46,7 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judgement:
+class PointJudgement:
     """What became of one point."""
 
     ending: Ending
@@ -88,15 +88,15 @@ def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float
     except SceneError as error:
         # By its name alone: the path of the file is nothing of the scene's.
         text = str(error).replace(scene.file, scene.source)
-        return asdict(Judgement(ending=Ending.REFUSED, text=text, violations=tuple(_unclear(error))))
+        return asdict(PointJudgement(ending=Ending.REFUSED, text=text, violations=tuple(_unclear(error))))
     except Exception as error:
         # Whatever it is: finding it is what this is for.
         text = f"{type(error).__name__}: {error}"
-        return asdict(Judgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",)))
+        return asdict(PointJudgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",)))
     ratio, status = _worst_ratio(calibration, width_factor), calibration.chamber.status
     violations = (*_calibration_faults(calibration, ratio), *_loop_faults(varied, run, leak))
     return asdict(
-        Judgement(
+        PointJudgement(
             ending=Ending.BROKEN if violations else _ending(calibration),
             text="" if status.ok else status.text,
             violations=violations,

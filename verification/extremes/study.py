@@ -26,8 +26,8 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes.axes import AXES, Axis, Point, designed_set
-from ringbalance.verification.extremes.point import Ending, Judgement, judged
+from ringbalance.verification.extremes.axes import AXES, InputAxis, Point, designed_set
+from ringbalance.verification.extremes.point import Ending, PointJudgement, judged
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, the points done of it and their number."""
@@ -60,13 +60,13 @@ SIZES: Final[Mapping[Level, Size]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep:
+class AxisSweep:
     """One axis from end to end: even steps, and closer ones where the ending changes."""
 
-    axis: Axis
+    axis: InputAxis
     shares: FloatArray
     """Fractions of the way along the axis, ascending, shape (n,)."""
-    judgements: tuple[Judgement, ...]
+    judgements: tuple[PointJudgement, ...]
 
     @property
     def values(self) -> list[float]:
@@ -87,11 +87,11 @@ class Sweep:
             if ends[i] != ends[i + 1] and places[i + 1] - places[i] > fineness
         ]
 
-    def with_more(self, shares: Sequence[float], judgements: Sequence[Judgement]) -> Sweep:
+    def with_more(self, shares: Sequence[float], judgements: Sequence[PointJudgement]) -> AxisSweep:
         """The sweep with further places."""
         places, found = np.append(self.shares, shares), (*self.judgements, *judgements)
         order = np.argsort(places)
-        return Sweep(axis=self.axis, shares=places[order], judgements=tuple(found[i] for i in order))
+        return AxisSweep(axis=self.axis, shares=places[order], judgements=tuple(found[i] for i in order))
 
     def spans(self) -> list[Record]:
         """The stretches along which points end alike, from one end of the axis to the other.
@@ -135,7 +135,7 @@ class Sweep:
         }
 
 
-def _outcome(judgement: Judgement) -> tuple[Ending, str]:
+def _outcome(judgement: PointJudgement) -> tuple[Ending, str]:
     return judgement.ending, judgement.loop
 
 
@@ -151,11 +151,11 @@ class Extremes(Result):
     """
 
     points: tuple[Point, ...]
-    judgements: tuple[Judgement, ...]
-    sweeps: tuple[Sweep, ...]
+    judgements: tuple[PointJudgement, ...]
+    sweeps: tuple[AxisSweep, ...]
 
     @property
-    def everything(self) -> tuple[Judgement, ...]:
+    def everything(self) -> tuple[PointJudgement, ...]:
         """Judgements of the designed set and the sweeps."""
         return self.judgements + tuple(each for sweep in self.sweeps for each in sweep.judgements)
 
@@ -264,20 +264,20 @@ def find_extremes(
     size: Size,
     workers: int = 1,
     progress: Progress | None = None,
-    kept: Path | None = None,
+    folder: Path | None = None,
     mutation: Mapping[str, float] | None = None,
 ) -> Extremes:
     """Look at a scene's extremes, with the same result for any number of workers.
 
-    Args: `kept`: folder from which an interrupted study resumes. `mutation`: see `judged`.
+    Args: `folder`: folder from which an interrupted study resumes. `mutation`: see `judged`.
     Raises: SceneError: its chamber is imported.
     Raises: OSError: the folder cannot be written.
     """
     check_sector(scene)
     content, keywords = content_of(scene), dict(mutation or {})
-    store = None if kept is None else Store(folder=kept)
+    store = None if folder is None else Store(folder=folder)
 
-    def judge_all(what: str, points: Sequence[Point]) -> list[Judgement]:
+    def judge_all(what: str, points: Sequence[Point]) -> list[PointJudgement]:
         tasks = tasks_of(content, [partial(judged, scene, point, **keywords) for point in points])
         records = answers(
             what,
@@ -287,7 +287,7 @@ def find_extremes(
             workers=workers,
             progress=progress and (lambda done: progress(done.what, done.points, done.total)),
         )
-        return [Judgement.of_record(record) for record in records]
+        return [PointJudgement.of_record(record) for record in records]
 
     points = designed_set(count=size.points, seed=_SEED)
     return Extremes(
@@ -297,12 +297,14 @@ def find_extremes(
     )
 
 
-def _sweeps(judge: Callable[[Sequence[Point]], Sequence[Judgement]], size: Size) -> tuple[Sweep, ...]:
+def _sweeps(
+    judge: Callable[[Sequence[Point]], Sequence[PointJudgement]], size: Size
+) -> tuple[AxisSweep, ...]:
     """Every axis alone, in even steps, then halved wherever neighbours end differently.
 
     Of changes back and forth within a step some may be missed.
     """
-    sweeps = [Sweep(axis=axis, shares=np.zeros(0), judgements=()) for axis in AXES]
+    sweeps = [AxisSweep(axis=axis, shares=np.zeros(0), judgements=()) for axis in AXES]
     places = [np.linspace(0, 1, size.sweep).tolist() for _ in AXES]
     while any(places):
         points = [

@@ -110,20 +110,20 @@ class DuctMesh(_HalfSection):
 
     aspect_ratio: float = 1.0
     """Across the axis of rotation over along it."""
-    across: int = 12
+    across_axis: int = 12
     """Cells across the axis of rotation, an even number."""
-    along: int = 8
-    """Cells of the half along it."""
+    along_axis: int = 8
+    """Cells of the half along the axis of rotation."""
     wall_ratio: float = 20.0
     """Innermost cell over the cell at the wall."""
 
     def mesh(self) -> Any:
         """Quadratic mesh of the half section (z >= 0) of a duct of unit hydraulic diameter."""
         width = (1 + self.aspect_ratio) / 2
-        half = geometric_vertices(cells=self.across // 2, ratio=self.wall_ratio) / 2
+        half = geometric_vertices(cells=self.across_axis // 2, ratio=self.wall_ratio) / 2
         y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
         height = width / self.aspect_ratio
-        z = height / 2 * (1 - geometric_vertices(cells=self.along, ratio=self.wall_ratio)[::-1])
+        z = height / 2 * (1 - geometric_vertices(cells=self.along_axis, ratio=self.wall_ratio)[::-1])
         patch = tensor(x=with_midpoints(vertices=y), y=with_midpoints(vertices=z))
         return patch_mesh([patch], symmetry=on_symmetry)
 

@@ -55,8 +55,8 @@ _GRAVITY: Final = 9.80665
 _GRAVITY_FLIPPED: Final = "gravity_sign_flipped"
 _FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
     {
-        "force_off_by_a_percent": {"along": 1.01, "across": 1.01},
-        "force_across_off_by_a_percent": {"across": 1.01},
+        "force_off_by_a_percent": {"x_factor": 1.01, "y_factor": 1.01},
+        "force_across_off_by_a_percent": {"y_factor": 1.01},
     }
 )
 """Mutations of the body force."""
@@ -201,7 +201,7 @@ def gravity_study(
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
     return Evidence(
-        found={
+        quantities={
             **orders_found({"surface": surface, "field": field}),
             "volume_error": Found(value=volume),
         },
@@ -321,7 +321,7 @@ def manufactured_study(
             error=[abs(_wall_integral(s) / wall - 1) for s in solutions],
         )
     return Evidence(
-        found=as_found(
+        quantities=as_found(
             **{f"field_order_{name}": each.settled_order for name, each in fields.items()},
             field_error_quadratic=fields["quadratic"].finest_error,
             **{f"wall_order_{name}": each.settled_order for name, each in walls.items()},

@@ -58,7 +58,7 @@ class _ModelStatistics:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class Predictions:
     """All fields of one length, SI."""
 
     measured: FloatArray
@@ -82,10 +82,10 @@ class Comparison:
         allowed = np.hypot(self.stated, self.uncertainty * self.measured)
         return np.asarray(np.abs(self.predicted - self.measured) / allowed)
 
-    def where(self, chosen: BoolArray | IntArray | slice) -> Comparison:
+    def where(self, chosen: BoolArray | IntArray | slice) -> Predictions:
         """Some of the points, or all in another order."""
         own = {name: column[chosen] for name, column in vars(self).items() if name != "columns"}
-        return Comparison(**own, columns={name: column[chosen] for name, column in self.columns.items()})
+        return Predictions(**own, columns={name: column[chosen] for name, column in self.columns.items()})
 
     @property
     def statistics(self) -> _ModelStatistics:
@@ -153,7 +153,7 @@ def measurements(name: str) -> Observations:
     return found
 
 
-def compare(*sets: Observations, mutation: str | None = None) -> Comparison:
+def compare(*sets: Observations, mutation: str | None = None) -> Predictions:
     """Predict the points of data sets of one kind.
 
     Raises: SceneError: a kind that cannot be predicted, or rows that it does not hold for.
@@ -171,7 +171,7 @@ def compare(*sets: Observations, mutation: str | None = None) -> Comparison:
     columns = {name: np.concatenate([each.columns[name] for each in sets]) for name in sorted(shared)}
     (name,) = (column.name for column in kind.measured)
     widths = [each.uncertainty[name] / each.columns[name] for each in sets]
-    return Comparison(
+    return Predictions(
         measured=columns[name],
         predicted=MUTATIONS[mutation] * predicted,
         stated=stated,
@@ -181,14 +181,14 @@ def compare(*sets: Observations, mutation: str | None = None) -> Comparison:
     )
 
 
-def friction(*sets: Observations, mutation: str | None = None) -> Comparison:
+def friction(*sets: Observations, mutation: str | None = None) -> Predictions:
     """`compare` friction factors, in ascending order of the Reynolds number."""
     found = compare(*sets, mutation=mutation)
     return found.where(np.argsort(found.columns["reynolds"], kind="stable"))
 
 
 def beside_judged(
-    judged: Comparison, left_out: Mapping[str, Comparison] = MappingProxyType({}), *, taught: int = 0
+    judged: Predictions, left_out: Mapping[str, Predictions] = MappingProxyType({}), *, taught: int = 0
 ) -> dict[str, float]:
     """Numbers of what a case leaves out, and of all readings together.
 
@@ -236,7 +236,7 @@ def study(
     stated = float(np.mean(teachers.stated / teachers.predicted))
     return dataclasses.replace(
         found,
-        found={**found.found, **as_found(calibration=abs(width / stated - 1))},
+        quantities={**found.quantities, **as_found(calibration=abs(width / stated - 1))},
         numbers={**found.numbers, **more},
     )
 
@@ -245,7 +245,9 @@ def data_evidence(*sets: Observations, unit: str, mutation: str | None = None) -
     """Evidence of a case that compares data sets of one kind. Args: `unit`: of what was measured, SI."""
     comparison = compare(*sets, mutation=mutation)
     return Evidence(
-        found=as_found(share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)),
+        quantities=as_found(
+            share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)
+        ),
         numbers=comparison.statistics.numbers(),
         series=(comparison.scatter(KINDS[sets[0].kind].title, unit),),
     )
@@ -286,7 +288,7 @@ def data_document(path: Path) -> dict[str, Any]:
     }
 
 
-def _of_series(comparison: Comparison, name: str) -> Mapping[str, float]:
+def _of_series(comparison: Predictions, name: str) -> Mapping[str, float]:
     one = comparison.where(comparison.series == name)
     return {
         "points": one.measured.size,

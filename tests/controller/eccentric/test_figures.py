@@ -82,7 +82,7 @@ def test_figure_eight_is_mended_by_fine_tuning(paper: EccentricScene) -> None:
 
 def test_figure_nine_passes_the_models_own_critical_speed(paper: EccentricScene) -> None:
     evidence = run_up(paper, "light")
-    critical, numbers = evidence.found["critical"].value, evidence.numbers
+    critical, numbers = evidence.quantities["critical"].value, evidence.numbers
     assert critical == pytest.approx(130.43, abs=0.01)
     assert numbers["without"] == pytest.approx(135.05, abs=0.01)
     # A ramp of 1 rpm/s peaks behind the steady peak.
@@ -136,10 +136,10 @@ def test_the_run_is_below_the_corrected_bound_and_above_that_of_a_rotor_at_rest(
     paper: EccentricScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The claim is refuted by its force, so that no defect of the other quantity can show in its verdict."""
-    assert driven_balancing.bound(paper, "light").found["amplitude_ratio"].value < 1
+    assert driven_balancing.bound(paper, "light").quantities["amplitude_ratio"].value < 1
     at_rest = _motion_bound(PlantParameters.of(paper), speed=0.0, rate=1.0)
     monkeypatch.setattr(driven_balancing, "_motion_bound", lambda *_, **__: at_rest)
-    assert driven_balancing.bound(paper, "light").found["amplitude_ratio"].value > 1
+    assert driven_balancing.bound(paper, "light").quantities["amplitude_ratio"].value > 1
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e4])

@@ -174,7 +174,7 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
     primed, driven = [False] * half, [0] * half
     # From the negative chamber of a pair the crest is as far as from the other end of the tube.
     tube = second.scene.tube
-    mirrored = replace(second.scene, tube=replace(tube, hump_position=1 - tube.hump_position))
+    mirrored = with_tables(second.scene, tube={"hump_position": 1 - tube.hump_position})
     of_side = second, Second(mirrored)
     for start, end, injections in cycles(run):
         at, until = (int(np.argmin(np.abs(run.time - t))) for t in (start, end))

@@ -345,7 +345,7 @@ def test_a_lag_that_drives_the_target_vector_apart_is_learnt(
     scene: Scene, model: BalancerModel, degrees: float
 ) -> None:
     wrong = law_based(scene, assumed_lag_angle=scene.controller.assumed_lag_angle + math.radians(degrees))
-    noisy = replace(wrong, sensor=replace(scene.sensor, amplitude_noise=1e-8, phase_noise=0.01))
+    noisy = with_tables(wrong, sensor={"amplitude_noise": 1e-8, "phase_noise": 0.01})
     assert simulate(noisy, model, controller=TargetVector(scene=noisy)).outcome is Outcome.DIVERGING
     run = simulate(noisy, model)
     assert run.settled

@@ -294,7 +294,7 @@ def test_a_run_within_its_limit_in_time_is_watched_until_it_has_settled(
     assert settled.settled
     assert settled.settling_time is not None
     after, before = (
-        simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
+        simulate(with_tables(with_noise(scene), run={"time_limit": end}), model)
         for end in (settled.settling_time + 1.2, settled.settling_time - 0.1)
     )
     assert after.settling_time == settled.settling_time
@@ -320,7 +320,7 @@ def test_a_rotor_too_slow_for_a_ring_is_a_fault_of_the_scene(scene: Scene, model
         else:
             assert simulate(turning, model).status
     upright = with_tables(scene, environment={"shaft": "vertical"})
-    assert simulate(replace(upright, rotor=replace(scene.rotor, speed=5.0)), model).status
+    assert simulate(with_tables(upright, rotor={"speed": 5.0}), model).status
 
 
 # --- liquid that runs back through a full tube ---

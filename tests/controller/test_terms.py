@@ -74,7 +74,7 @@ def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(s
     assert list(neglected["unknown"]) == ["gas filling", "valve lag"]
     assert "at most 100 %" in neglected["text"]
     assert document["model_status"]["code"] == "ok"
-    slow = replace(short, rotor=replace(scene.rotor, speed=63.0))
+    slow = with_tables(short, rotor={"speed": 63.0})
     status = simulation_document(simulate(slow, calibrated))["model_status"]
     assert status["code"] == "out_of_range"
     assert "waves" in status["text"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 @pytest.fixture(scope="session")
@@ -277,6 +277,6 @@ def test_what_is_no_table_is_refused(content: bytes, told: str, paper_scene: Sce
 
 
 def test_chambers_are_those_of_the_scene(sound_files: Mapping[str, str], paper_scene: Scene) -> None:
-    pair = replace(paper_scene, disc=replace(paper_scene.disc, chambers=2))
+    pair = with_tables(paper_scene, disc={"chambers": 2})
     lines = refused(sound_files["injection"], pair)
     assert [line.split(": ")[1] for line in lines] == ['line 19, column "chamber" = "C"']

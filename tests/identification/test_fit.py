@@ -23,6 +23,7 @@ from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import with_model_error, with_value
+from scenes import with_tables
 
 UNBALANCE = 1e-4 * np.array([0, 1, 1, 2, 2, 1, 0, 2])
 ANGLE = np.array([0, 0.3, 2.5, 4.0, 1.0, 5.5, 0, 3.0])
@@ -176,7 +177,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
 def test_a_posterior_on_a_grid(paper_scene: Scene) -> None:
     """Means within 5 % of a standard deviation, standard deviations within 1 %: what is left is the bend of
     the prediction over the posterior, which the profile follows and a mean does not."""
-    scene = stated(replace(paper_scene, disc=replace(paper_scene.disc, lambda_factor=1.0)), bore=3e-5)
+    scene = stated(with_tables(paper_scene, disc={"lambda_factor": 1.0}), bore=3e-5)
     data = injected(scene, sd=1.5e-8)
     result = fit(scene, data=[data], parameters=["bore", "lambda_factor"])
     mean, spread = posterior(scene, data, result, 1.5e-8 * np.sqrt(2))

@@ -19,6 +19,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import with_value
+from scenes import with_tables
 
 RADII = np.array([0.040, 0.042, 0.0445, 0.0445])
 SURFACE = 0.034
@@ -136,7 +137,7 @@ def test_injections_alone_see_kappa_lambda(scene: Scene) -> None:
 
 def with_free_loss(scene: Scene, name: str) -> Scene:
     """The paper's prescribed k, or one that is calculated and lacks a loss."""
-    bare = replace(scene, tube=replace(scene.tube, drag_coefficient=None))
+    bare = with_tables(scene, tube={"drag_coefficient": None})
     return scene if name == "drag_coefficient" else bare
 
 
@@ -195,7 +196,7 @@ def test_end_rates_at_various_pressures_see_no_more(scene: Scene, loss: str) -> 
     """Where k depends on the velocity, and the start of the flow on k, pressures over a third do tell k; but
     not beyond what correlations and start are uncertain by, at the noise of the scene's own sensor."""
     random = np.random.default_rng(3)
-    bare = replace(with_free_loss(scene, loss), gas=replace(scene.gas, pressure=0.8e6))
+    bare = with_tables(with_free_loss(scene, loss), gas={"pressure": 0.8e6})
     truth = with_value(scene=bare, quantity=loss, value=45.0 if loss == "drag_coefficient" else 1.5)
     data = injections(
         truth,

@@ -26,6 +26,7 @@ from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value, with_value
+from scenes import with_tables
 
 
 def predicted(scene: Scene, data: Observations) -> FloatArray:
@@ -79,7 +80,7 @@ def test_injections_do_not_step_as_the_crest_moves(bends: int) -> None:
     A bend that changed its leg would make a step of 1 to 7 % of the velocity.
     """
     scene = liquid_ring_scene(load_scene(bundled_scene("six_chamber")))
-    scene = replace(scene, tube=replace(scene.tube, bends=scene.tube.bends[:1] * bends))
+    scene = with_tables(scene, tube={"bends": scene.tube.bends[:1] * bends})
     assert _misses_a_line(scene, Models.of(scene)) < 2e-3
 
 
@@ -173,7 +174,7 @@ def test_a_gas_line_delays_what_is_moved(paper_scene: Scene) -> None:
     plain = float(predicted(paper_scene, data)[0])
     gas = replace(paper_scene.gas, conductance=2e-9, critical_ratio=0.3, dead_volume=0.0)
     narrow = float(predicted(replace(paper_scene, gas=gas), data)[0])
-    late = float(predicted(replace(paper_scene, gas=replace(paper_scene.gas, valve_lag=0.05)), data)[0])
+    late = float(predicted(with_tables(paper_scene, gas={"valve_lag": 0.05}), data)[0])
     assert late == pytest.approx(plain, rel=1e-6)
     assert 0.2 * plain < narrow < 1.5 * plain
     assert narrow != pytest.approx(plain, rel=0.02)
@@ -193,7 +194,7 @@ def test_flow_at_rest_obeys_the_definition_of_k(paper_scene: Scene) -> None:
     pressures = np.geomspace(1e3, 1e6, 9)
     rate = predicted(paper_scene, observations("flow", {"pressure_difference": pressures}))
     u = rate / (math.pi / 4 * paper_scene.tube.bore**2)
-    still = replace(paper_scene, rotor=replace(paper_scene.rotor, speed=0.0))
+    still = with_tables(paper_scene, rotor={"speed": 0.0})
     k = tube_loss(still, u).k.value
     np.testing.assert_allclose((k + 1) * paper_scene.liquid.density * u**2 / 2, pressures, rtol=1e-8)
 

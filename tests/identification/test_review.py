@@ -24,6 +24,7 @@ from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from scenes import with_tables
 
 ROWS = 24
 SET = {
@@ -51,7 +52,7 @@ def transfers(
 @pytest.fixture(scope="module")
 def true(paper_scene: Scene) -> Scene:
     """A disc whose tube is a little narrower than its drawing."""
-    return replace(paper_scene, tube=replace(paper_scene.tube, bore=1.47e-3))
+    return with_tables(paper_scene, tube={"bore": 1.47e-3})
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +69,7 @@ def test_a_right_law_is_not_criticised(found: FitResult) -> None:
 
 def test_data_of_another_law_are_not_described(paper_scene: Scene, true: Scene) -> None:
     """A disc whose flow is laminar, fitted as the turbulent one of the scene, with the noise stated."""
-    thick = replace(
-        true, liquid=replace(true.liquid, kinematic_viscosity=50 * true.liquid.kinematic_viscosity)
-    )
+    thick = with_tables(true, liquid={"kinematic_viscosity": 50 * true.liquid.kinematic_viscosity})
     data = transfers(thick, Models.of(thick), seed=1)
     told = Review.of(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
     assert not told.describes

@@ -27,6 +27,7 @@ from ringbalance.identification.readings import Reading, other_readings
 from ringbalance.scene import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
+from scenes import with_tables
 
 NOISE = 3e-8
 START = 1e-5 * np.exp(1.5j)
@@ -71,7 +72,7 @@ def seen(change: np.ndarray, kind: str, random: np.random.Generator) -> dict[str
 def rig(scene: Scene, lag: float, letters: str, *, weights: Sequence[float]) -> list[Observations]:
     """Trial weights and, where chambers are driven, injections of a rotor with a lag, rad."""
     random = np.random.default_rng(7)
-    truth = replace(scene, rotor=replace(scene.rotor, lag_angle=lag))
+    truth = with_tables(scene, rotor={"lag_angle": lag})
     sizes = np.where(np.arange(len(weights)) > 0, 3e-4, 0.0)
     plans = [observations("trial_weight", {"unbalance": sizes, "angle": np.radians(weights)})]
     if letters:
@@ -102,7 +103,7 @@ def counted(data: Observations, senses: Sequence[bool]) -> Observations:
 def rig_scene(paper_scene: Scene) -> Scene:
     """A disc of which the influence coefficient alone is uncertain, and no lag is stated."""
     known = InputUncertainty(quantity="influence_coefficient", half_width=0.07, relative=True)
-    return replace(paper_scene, tube=replace(paper_scene.tube, drag_coefficient=3.0), uncertainty=(known,))
+    return with_tables(paper_scene, tube={"drag_coefficient": 3.0}, uncertainty=(known,))
 
 
 def readings(scene: Scene, data: Sequence[Observations]) -> tuple[Reading, ...]:
@@ -210,7 +211,7 @@ def test_weights_on_one_line_do_not_tell_their_sense(rig_scene: Scene) -> None:
 def test_a_stated_lag_beyond_180_degrees_is_no_sign_of_a_sense(rig_scene: Scene) -> None:
     """A sensor that stands elsewhere than the mark, say."""
     lag = math.radians(200)
-    turned = replace(rig_scene, rotor=replace(rig_scene.rotor, lag_angle=lag))
+    turned = with_tables(rig_scene, rotor={"lag_angle": lag})
     (made,) = rig(turned, lag, "", weights=WEIGHTS)
     assert told(readings(turned, [made])) == (set(), {"phases_turned+weights_turned"})
 

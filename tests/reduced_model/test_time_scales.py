@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from ringbalance.reduced_model.estimates import deciding_gas_time, start_up_loss
 from ringbalance.reduced_model.terms import FILLING, LAG, ModelUsed, models_used
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def moved(gas_time: float, *, power: int) -> float:
@@ -44,12 +45,12 @@ def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) ->
         "law_based": 0.05 / 7.2,
     }
     for kind, expected in kinds.items():
-        scene = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind=kind))
+        scene = with_tables(table_1_scene, controller={"kind": kind})
         assert deciding_gas_time(scene, rate=7.2e-6) == pytest.approx(expected)
-    trial = dataclasses.replace(table_1_scene, controller=dataclasses.replace(control, kind="trial"))
+    trial = with_tables(table_1_scene, controller={"kind": "trial"})
     assert deciding_gas_time(trial, rate=7.2e-6) == control.short_step
-    slow = dataclasses.replace(control, minimum_gas_time=0.02)
-    assert deciding_gas_time(dataclasses.replace(table_1_scene, controller=slow), rate=0.0) == 0.02
+    slow = with_tables(table_1_scene, controller={"minimum_gas_time": 0.02})
+    assert deciding_gas_time(slow, rate=0.0) == 0.02
 
 
 def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scene) -> None:

@@ -5,14 +5,16 @@ PYTHON_IN_VENV := $(VENV)/bin/python
 SCENE ?= scenes/liquid_ring_paper.toml
 OUT ?= out
 WORKERS ?= 2
+# Of tests/architecture, what may differ with Python: what starts load, packages and locks.
+START_TESTS := tests/architecture/test_light_start.py tests/architecture/test_packaging.py
 # Syntax and libraries of a Python between the oldest and the newest; a minute or so, for `make test-versions`.
-SHORT_TESTS := tests/scene tests/mesh tests/architecture tests/test_public_names.py tests/test_cli.py \
+SHORT_TESTS := $(START_TESTS) tests/scene tests/mesh tests/test_public_names.py tests/test_cli.py \
 	tests/physics/test_pressure.py tests/physics/test_tube_loss.py tests/reduced_model/test_paper_law.py \
 	tests/reduced_model/test_table.py tests/controller/test_loop.py tests/controller/test_compiled.py
 # What may differ with Python, NumPy or SciPy: files, processes, pickles and printed examples; solves, roots,
 # splines, linear algebra and compiled code.  What has failed under one version alone so far is among them or
 # a matter of types; cases, fits, sweeps, judged devices and pages are this program's own code over all that.
-NUMBER_TESTS := tests/architecture tests/scene tests/results tests/mesh tests/physics \
+NUMBER_TESTS := $(START_TESTS) tests/scene tests/results tests/mesh tests/physics \
 	tests/test_cli.py tests/test_public_names.py tests/test_python_interface.py \
 	tests/test_signals.py tests/export/test_fmu.py tests/export/test_compact.py tests/export/test_cli.py \
 	tests/reduced_model/test_paper_law.py tests/reduced_model/test_table.py \

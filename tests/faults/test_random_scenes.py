@@ -6,6 +6,7 @@ import json
 import math
 import random
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -95,10 +96,11 @@ def toml_of(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-def scenes() -> Iterator[tuple[str, Scene]]:
-    """The first scenes of the seed that load."""
-    draw, found = random.Random(SEED), 0
-    while found < SCENES:
+@cache
+def scenes() -> list[tuple[str, Scene]]:
+    """The first scenes of the seed that load, with their texts."""
+    draw, loaded = random.Random(SEED), []
+    while len(loaded) < SCENES:
         tables = document_of(draw)
         text = "\n".join(
             f"[{table}]\n" + "\n".join(f"{key} = {toml_of(value)}" for key, value in content.items())
@@ -108,8 +110,8 @@ def scenes() -> Iterator[tuple[str, Scene]]:
             scene = liquid_ring_scene(scene_from(content=text.encode(), file="random.toml"))
         except SceneError:
             continue
-        found += 1
-        yield text, scene
+        loaded.append((text, scene))
+    return loaded
 
 
 def numbers(value: Any, path: str = "") -> Iterator[tuple[str, float]]:
@@ -126,7 +128,7 @@ def numbers(value: Any, path: str = "") -> Iterator[tuple[str, float]]:
 
 @pytest.mark.parametrize("number", range(SCENES))
 def test_a_random_scene_is_answered(number: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text, scene = list(scenes())[number]
+    text, scene = scenes()[number]
     file = tmp_path / "random.toml"
     file.write_text(text)
     for command in ("calibrate", "simulate"):

@@ -1,4 +1,4 @@
-"""Two driven eccentric masses as every command knows them."""
+"""Balancer of two eccentric masses, as every command uses it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ from ringbalance.controller.balancer import (
     Settings,
     settles_within,
 )
-from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
+from ringbalance.controller.eccentric_mass.control_records import ImbalanceFilter
+from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, EccentricDevice, device, on_rotor
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.remedies import remedies_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -53,20 +54,20 @@ from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
 from ringbalance.scene.origins import SceneFile, with_values_at
 
-_FINEST_SHARE: Final = 0.01
-"""Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
-_SETTLED_WHIRL: Final = 12.0
+_LEAST_NOISE_FRACTION: Final = 0.01
+"""Least noise that a filter assumes, over the amplitude limit."""
+_WHIRL_DECAY_TIMES: Final = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
-_REACH: Final = 10.0
+_MAX_GAIN_FACTOR: Final = 10.0
 """Factor up to which a gain is tried."""
-_ADVISING: Final = 8
-"""Devices whose runs say what would mend them."""
-_SIZING: Final = 256
+_REMEDY_DEVICES: Final = 8
+"""Devices whose runs decide which remedies are tried."""
+_SIZING_DEVICES: Final = 256
 """Devices whose imbalance, without a run, sizes the masses."""
 
 
 class EccentricMassBalancer(Balancer):
-    """Two masses that motors drive along one track.
+    """Balancer of two masses that motors drive along one track.
 
     A scene gives the rotor by mass, stiffness and damping, alpha = W^2/(K_B - M W^2 + j C_B W), and takes a
     common one back as K_B = M W^2 + Re(W^2/alpha) and C_B = Im(W^2/alpha)/W, with the mass M of rotor and
@@ -80,7 +81,7 @@ class EccentricMassBalancer(Balancer):
         self.scene, self._rotors = scene, rotors
 
     def settings(self) -> tuple[Setting, ...]:
-        """Gains of the drives."""
+        """Gains of the drives, each at the scene's value and within its bounds."""
         lqr, friction = self.scene.lqr, self.scene.friction_filter
         values = {
             "lqr.state_weight": lqr.state_weight,
@@ -88,7 +89,12 @@ class EccentricMassBalancer(Balancer):
             "friction_filter.pair_gain": friction.pair_gain,
         }
         return tuple(
-            Setting(path=path, value=value, lowest=value / _REACH, highest=value * _REACH)
+            Setting(
+                path=path,
+                value=value,
+                lowest=value / _MAX_GAIN_FACTOR,
+                highest=value * _MAX_GAIN_FACTOR,
+            )
             for path, value in values.items()
             if value > 0
         )
@@ -101,8 +107,8 @@ class EccentricMassBalancer(Balancer):
         trace: bool = False,
         progress: Progress | None = None,
     ) -> Outcomes:
-        """See `Balancer`."""
-        return self._runs([settings], draws, trace=trace, progress=progress)[0]
+        """Run the devices one by one; see `Balancer`."""
+        return self._outcomes(settings, draws, self._devices(draws), trace=trace, progress=progress)
 
     def run_all(
         self,
@@ -111,73 +117,74 @@ class EccentricMassBalancer(Balancer):
         *,
         further: float = FURTHER,  # noqa: ARG002
     ) -> tuple[Outcomes, ...]:
-        """See `Balancer`; masses at rest are watched to the end of the run."""
-        return self._runs(settings, draws)
+        """Run several settings; masses at rest are watched to the end of the run. See `Balancer`."""
+        devices = self._devices(draws)
+        return tuple(self._outcomes(each, draws, devices) for each in settings)
 
-    def _runs(
+    def _outcomes(
         self,
-        settings: Sequence[Settings],
+        settings: Settings,
         draws: Draws,
+        devices: Sequence[EccentricDevice],
         *,
         trace: bool = False,
         progress: Progress | None = None,
-    ) -> tuple[Outcomes, ...]:
-        drawn = [self._device(number, drawn=draws.devices) for number in draws.numbers]
-        outcomes = []
-        for asked in settings:
-            scene = with_values_at(self.scene, asked)
-            strategy, results = StrategySettings.of(scene), []
-            for number, each in zip(draws.numbers, drawn, strict=True):
-                seed = run_noise(scene.run.seed, number) if draws.devices else scene.run.seed + number
-                plant = with_values_at(each.scene, asked)
-                run = simulate_eccentric(plant, seed=seed, settings=strategy, progress=progress)
-                start = plant.supervisor.start
-                amplitude = run.amplitude[run.time >= start]
-                late = math.inf if run.settling_time is None else max(0.0, run.settling_time - start)
-                results.append(
-                    RunResult(
-                        run=run,
-                        settling_time=late,
-                        final_amplitude=run.final_amplitude,
-                        energy=run.electrical_energy,
-                        worst_amplitude=float(np.max(amplitude)) if amplitude.size else run.worst_amplitude,
-                        ended=run.outcome.value,
-                        usable_moment=reach_of(plant),
-                        unbalance=plant.imbalance.mass * plant.imbalance.radius,
-                    )
+    ) -> Outcomes:
+        scene = with_values_at(self.scene, settings)
+        strategy, results = StrategySettings.of(scene), []
+        for number, each in zip(draws.numbers, devices, strict=True):
+            seed = run_noise(scene.run.seed, number) if draws.devices else scene.run.seed + number
+            plant = with_values_at(each.scene, settings)
+            run = simulate_eccentric(plant, seed=seed, settings=strategy, progress=progress)
+            start = plant.supervisor.start
+            amplitude = run.amplitude[run.time >= start]
+            results.append(
+                RunResult(
+                    run=run,
+                    settling_time=math.inf
+                    if run.settling_time is None
+                    else max(0.0, run.settling_time - start),
+                    final_amplitude=run.final_amplitude,
+                    energy=run.electrical_energy,
+                    worst_amplitude=float(np.max(amplitude)) if amplitude.size else run.worst_amplitude,
+                    ended=run.outcome.value,
+                    usable_moment=reach_of(plant),
+                    unbalance=plant.imbalance.mass * plant.imbalance.radius,
                 )
-            inputs = [each.inputs for each in drawn]
-            outcomes.append(Outcomes.of(results, numbers=draws.numbers, inputs=inputs, trace=trace))
-        return tuple(outcomes)
+            )
+        inputs = [each.inputs for each in devices]
+        return Outcomes.of(results, numbers=draws.numbers, inputs=inputs, trace=trace)
 
-    def _device(self, number: int, *, drawn: bool) -> Device:
-        return device(self.scene, number, self._rotors) if drawn else Device(scene=self.scene, inputs={})
+    def _devices(self, draws: Draws) -> list[EccentricDevice]:
+        if not draws.devices:
+            return [EccentricDevice(scene=self.scene, inputs={})] * len(draws.numbers)
+        return [device(self.scene, number, self._rotors) for number in draws.numbers]
 
     def asked_fraction(self) -> float:
-        """The scene's."""
+        """Fraction of the devices that the scene requires to meet every demand."""
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
         """Settled in time, at the latest when the speed changes, and what may remain where it is stated."""
-        scene, wanted = self.scene, self.scene.requirement
+        scene, requirement = self.scene, self.scene.requirement
         until = (scene.steady_until or scene.run.time_limit) - scene.supervisor.start
-        time = until if wanted.settling_time is None else wanted.settling_time
-        settles = settles_within(time, stated=wanted.settling_time is not None)
-        if wanted.residual is None:
+        time = until if requirement.settling_time is None else requirement.settling_time
+        settles = settles_within(time, stated=requirement.settling_time is not None)
+        if requirement.residual is None:
             return (settles,)
         residual = Demand(
             code="residual",
             outcome="final_amplitude",
             sense=AT_MOST,
-            required=wanted.residual,
+            required=requirement.residual,
             unit="m",
             stated=True,
         )
         return settles, residual
 
     def trials(self) -> tuple[Trials, ...]:
-        """The gains of the drives with their margins, where the scene's have less: no other gain decides
-        whether masses settle."""
+        """Recommended gains of the drives, where the scene's have less margin: no other gain decides whether
+        masses settle."""
         changes = advised(self.scene)
         if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
             return ()
@@ -186,15 +193,15 @@ class EccentricMassBalancer(Balancer):
         return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """Parts of another size, and what helps runs that end as those of the scene and some devices."""
-        own, drawn = (self.run({}, draws) for draws in (AS_GIVEN, Draws.first(_ADVISING)))
-        scenes = (self._device(number, drawn=True).scene for number in range(_SIZING))
+        """Parts of another size, and changes that help runs which end as those of some devices."""
+        nominal, sample = (self.run({}, draws) for draws in (AS_GIVEN, Draws.first(_REMEDY_DEVICES)))
+        scenes = (device(self.scene, number, self._rotors).scene for number in range(_SIZING_DEVICES))
         # Imbalance over what the masses cancel.
-        shares = [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
-        return remedies_of(self.scene, drawn, own, shares)
+        ratios = [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
+        return tuple(remedies_of(self.scene, nominal, sample, ratios))
 
     def drawn_input(self, name: str) -> DrawnInput:
-        """See `Balancer`."""
+        """Kind of an input; the direction of an imbalance has no key to measure."""
         if name == PHASE:
             return DrawnInput(common=False, measure="", path=PHASE)
         if name.startswith(FITTED):
@@ -202,11 +209,11 @@ class EccentricMassBalancer(Balancer):
         return super().drawn_input(name)
 
     def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
-        """See `Balancer`."""
+        """Balancer of another scene; see `Balancer`."""
         return EccentricMassBalancer(eccentric_scene(scene), self._rotors)
 
     def rotor(self, number: int | None = None) -> CommonRotor:
-        """At the speed at which the strategy starts; see `Balancer`."""
+        """Rotor at the speed at which the strategy starts; see `Balancer`."""
         scene = self.scene if number is None else device(self.scene, number, self._rotors).scene
         speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
         if speed <= 0:
@@ -228,39 +235,54 @@ class EccentricMassBalancer(Balancer):
         )
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> EccentricMassBalancer:
-        """Opposite each other until the rotor's vibration is steady, with the noise that both balancers have.
+        """Masses opposite each other until the vibration is steady, with the sensor noise of both balancers.
 
         A wrong assumption stays as wrong as it was. Raises: SceneError: no such rotor has these masses.
         """
-        scene = self.scene
-        before, masses = scene.rotor, scene.masses
-        whole = before.mass + 2 * masses.mass if rotor.mass is None else rotor.mass
-        lighter = replace(scene, rotor=replace(before, mass=whole - 2 * masses.mass))
+        scene, before = self.scene, self.scene.rotor
+        own_mass = before.mass + 2 * scene.masses.mass
+        mass = own_mass if rotor.mass is None else rotor.mass
+        lighter = replace(scene, rotor=replace(before, mass=mass - 2 * scene.masses.mass))
         plant = on_rotor(lighter, rotor)
-        _check_rotor(rotor, scene, plant.rotor)
-        moved = replace(
+        after = plant.rotor
+        if after.mass <= 0 or abs(rotor.unbalance) > after.mass * scene.imbalance.radius:
+            problem = "these masses, or the imbalance, are heavier than the rotor itself"
+            raise rotor_fault(scene, "masses.mass", problem, "lighter masses")
+        if after.stiffness <= 0 or after.damping <= 0:
+            lag = math.degrees(-cmath.phase(rotor.influence))
+            problem = f"no bearing of this kind gives a lag of {lag:.4g} deg with this influence coefficient"
+            allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
+            raise rotor_fault(scene, "rotor.stiffness", problem, allowed)
+        # The strategy waits until the vibration from the rotor's start has died away.
+        start, step = (
+            _WHIRL_DECAY_TIMES * 2 * (after.mass + 2 * scene.masses.mass) / after.damping,
+            scene.sensor.step,
+        )
+        start = math.ceil(start / step) * step
+        angle = scene.masses.initial_angle[0]
+        mounted = replace(
             plant,
             sensor=replace(
                 scene.sensor, position_noise=rotor.noise, velocity_noise=rotor.noise * rotor.speed
             ),
-            imbalance_filter=_believed(
-                scene, plant.rotor, rotor, heavier=whole / (before.mass + 2 * masses.mass)
-            ),
-            supervisor=replace(scene.supervisor, limit=rotor.limit),
+            imbalance_filter=_rescaled(scene, after, rotor, mass_ratio=mass / own_mass),
+            masses=replace(scene.masses, initial_angle=(angle, angle + math.pi)),
+            supervisor=replace(scene.supervisor, limit=rotor.limit, start=start),
             requirement=EccentricRequirement(fraction=scene.requirement.fraction),
+            run=replace(scene.run, time_limit=scene.run.time_limit + start),
         )
-        return EccentricMassBalancer(_steady_start(moved), rotors)
+        return EccentricMassBalancer(mounted, rotors)
 
     def sampling_time(self) -> float:
-        """See `Balancer`."""
+        """Time between two samples, s."""
         return self.scene.sensor.step
 
     def span(self) -> float:
-        """See `Balancer`."""
+        """Time from the start of balancing to the end of a run, s."""
         return self.scene.run.time_limit - self.scene.supervisor.start
 
     def lasting(self, span: float) -> EccentricMassBalancer:
-        """See `Balancer`."""
+        """Balancer with runs that balance for `span`, s."""
         limit = span + self.scene.supervisor.start
         return EccentricMassBalancer(
             replace(self.scene, run=replace(self.scene.run, time_limit=limit)), self._rotors
@@ -283,53 +305,29 @@ class EccentricMassBalancer(Balancer):
         return (reach, *loops_quantities(RecommendedGains.of(self.scene)))
 
     def rows(self, run: EccentricRun) -> Rows:
-        """See `Balancer`."""
+        """Rows of a run as `simulate` prints them."""
         return run.rows()
 
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
-        """See `Balancer`."""
+        """Columns of every sample of a run."""
         return eccentric_history(run)
 
 
-def _believed(scene: EccentricScene, found: EccentricRotor, rotor: CommonRotor, *, heavier: float) -> Any:
-    """The imbalance filter's assumptions; `heavier`: mass of rotor and masses over that before."""
-    before, believed = scene.rotor, scene.imbalance_filter
-    assumed = max(rotor.noise, _FINEST_SHARE * rotor.limit)
-    louder, stiffer = assumed / believed.position_noise, found.stiffness / before.stiffness
-    damping = believed.assumed_damping
+def _rescaled(
+    scene: EccentricScene, after: EccentricRotor, rotor: CommonRotor, *, mass_ratio: float
+) -> ImbalanceFilter:
+    """Imbalance filter on another rotor. Args: `mass_ratio`: mass with eccentric masses over that before."""
+    before, keys = scene.rotor, scene.imbalance_filter
+    noise = max(rotor.noise, _LEAST_NOISE_FRACTION * rotor.limit)
+    louder, stiffer = noise / keys.position_noise, after.stiffness / before.stiffness
+    damping = keys.assumed_damping
     return replace(
-        believed,
-        position_noise=assumed,
-        velocity_noise=assumed * rotor.speed,
-        velocity_walk=believed.velocity_walk * louder * stiffer / heavier,
-        unbalance_walk=believed.unbalance_walk * louder * heavier,
-        assumed_mass=believed.assumed_mass * (found.mass / before.mass),
-        assumed_stiffness=believed.assumed_stiffness * stiffer,
-        assumed_damping=found.damping if before.damping == 0 else damping * (found.damping / before.damping),
+        keys,
+        position_noise=noise,
+        velocity_noise=noise * rotor.speed,
+        velocity_walk=keys.velocity_walk * louder * stiffer / mass_ratio,
+        unbalance_walk=keys.unbalance_walk * louder * mass_ratio,
+        assumed_mass=keys.assumed_mass * (after.mass / before.mass),
+        assumed_stiffness=keys.assumed_stiffness * stiffer,
+        assumed_damping=after.damping if before.damping == 0 else damping * (after.damping / before.damping),
     )
-
-
-def _steady_start(scene: EccentricScene) -> EccentricScene:
-    """At constant speed; the strategy waits until the vibration from the rotor's start has died away."""
-    whole = scene.rotor.mass + 2 * scene.masses.mass
-    start = _SETTLED_WHIRL * 2 * whole / scene.rotor.damping
-    start = math.ceil(start / scene.sensor.step) * scene.sensor.step
-    first = scene.masses.initial_angle[0]
-    return replace(
-        scene,
-        masses=replace(scene.masses, initial_angle=(first, first + math.pi)),
-        supervisor=replace(scene.supervisor, start=start),
-        run=replace(scene.run, time_limit=scene.run.time_limit + start),
-    )
-
-
-def _check_rotor(rotor: CommonRotor, scene: EccentricScene, found: EccentricRotor) -> None:
-    """Faults of what the common rotor asks of this scene's."""
-    if found.mass <= 0 or abs(rotor.unbalance) > found.mass * scene.imbalance.radius:
-        problem = "these masses, or the imbalance, are heavier than the rotor itself"
-        raise rotor_fault(scene, "masses.mass", problem, "lighter masses")
-    if found.stiffness <= 0 or found.damping <= 0:
-        lag = math.degrees(-cmath.phase(rotor.influence))
-        problem = f"no bearing of this kind gives a lag of {lag:.4g} deg with this influence coefficient"
-        allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
-        raise rotor_fault(scene, "rotor.stiffness", problem, allowed)

@@ -36,15 +36,15 @@ FrictionCompensation = Literal["break_away", "none"]
 Strategy = Literal["whole", "locked"]
 CorrectionRule = Literal["measured", "trials"]
 
-_FINEST = 1e-5
-"""Noise that a filter assumes of exact sensors, as a share of what it expects to see at first."""
-_FINEST_RATE = 1e-3
-_UNBALANCE_MEMORY = 0.01
-"""Walk of the unbalance within 1 s, as a share of what the noise of 1 s leaves unknown far above the critical
-speed: the filter averages over 100 s, longer than an estimation takes."""
-_VELOCITY_MEMORY = 0.03
-"""The same of the velocity's walk; its share is largest at the critical speed, where damping divides it."""
-_LONGEST_WAIT = 30.0
+_FINEST_FRACTION = 1e-5
+"""Noise that a filter assumes of exact sensors, as a fraction of the deviation that it expects at first."""
+_FINEST_RATE_RAD_S = 1e-3
+_UNBALANCE_WALK_FRACTION = 0.01
+"""Walk of the unbalance within 1 s, as a fraction of what the noise of 1 s leaves unknown far above the
+critical speed: the filter averages over 100 s, longer than an estimation takes."""
+_VELOCITY_WALK_FRACTION = 0.03
+"""Walk of the velocity likewise; its fraction is largest at the critical speed, where damping divides it."""
+_LONGEST_WAIT_S = 30.0
 
 
 def _capacity(mass: float, radius: float) -> float:
@@ -64,23 +64,23 @@ def _critical_velocity(travel: float, stiffness: float, rotor: float, mass: floa
 
 def _assumed_noise(noise: float, expected: float) -> float:
     """Standard deviation that the filter assumes of a sensor: never so small that nothing else counts."""
-    return max(noise, _FINEST * expected)
+    return max(noise, _FINEST_FRACTION * expected)
 
 
 def _velocity_walk(noise: float, step: float, stiffness: float, rotor: float, mass: float) -> float:
     """W_c^2 times the displacement that a second of samples leaves unknown, m/s in 1 s."""
-    return _VELOCITY_MEMORY * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
+    return _VELOCITY_WALK_FRACTION * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
 
 
 def _unbalance_walk(noise: float, step: float, rotor: float, mass: float) -> float:
     """The whole mass times the displacement that a second of samples leaves unknown, kg m in 1 s."""
-    return _UNBALANCE_MEMORY * (rotor + 2 * mass) * noise * math.sqrt(step)
+    return _UNBALANCE_WALK_FRACTION * (rotor + 2 * mass) * noise * math.sqrt(step)
 
 
 def _settling(damping: float, rotor: float, mass: float) -> float:
     """Eight time constants of the free whirl, at most half a minute, s."""
-    whole = 2 * (rotor + 2 * mass)
-    return _LONGEST_WAIT if damping * _LONGEST_WAIT <= 8 * whole else 8 * whole / damping
+    twice_mass = 2 * (rotor + 2 * mass)
+    return _LONGEST_WAIT_S if damping * _LONGEST_WAIT_S <= 8 * twice_mass else 8 * twice_mass / damping
 
 
 def _two_turns(profile: Sequence[Any]) -> float:
@@ -91,7 +91,7 @@ def _two_turns(profile: Sequence[Any]) -> float:
 
 
 def _friction_walk(radius: float) -> float:
-    """Of a friction arm within 1 s, m."""
+    """Random walk of a friction arm within 1 s, m."""
     return 4e-5 * radius
 
 
@@ -224,7 +224,7 @@ class FrictionFilter:
             "encoder_rate_noise of [sensor], at least 0.001 rad/s",
             "standard deviation that the filter assumes",
             "sensor.encoder_rate_noise",
-            rule=partial(max, _FINEST_RATE),
+            rule=partial(max, _FINEST_RATE_RAD_S),
         ),
     ]
     rate_walk: Annotated[Rate, standard("0.01 rad/s", "random walk of the speed of a mass within 1 s")]

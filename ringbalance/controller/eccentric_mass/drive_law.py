@@ -1,4 +1,4 @@
-"""The law of the motors' voltages: what the rotor asks for, what friction takes, and what moves the masses.
+"""The law of the motors' voltages: torques of the rotor, of friction, and of the control of the masses.
 
 The rotor's acceleration is not measured but follows from its own equation, with the acceleration that the
 masses are about to have; friction is compensated in the sense in which the mass moves or, at rest, is meant
@@ -8,7 +8,6 @@ to move.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from ringbalance.controller.eccentric_mass.friction_filter import TrackModel
@@ -17,17 +16,17 @@ from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.platform.compiled import in_place
 
-SMOOTHING_TIME: Final = 0.05
-"""Of the angles and rates that arrival is judged by, s."""
-SLOWEST_RATE: Final = 1e-3
-"""Below which a mass rests, however good the encoder, rad/s."""
-_BREAKS_AWAY: Final = 3.0
+SMOOTHING_TIME_S: Final = 0.05
+"""Time constant of the angles and rates that arrival is judged by."""
+SLOWEST_RATE_RAD_S: Final = 1e-3
+"""Rate below which a mass rests, however good the encoder."""
+_BREAK_AWAY_SIGMA: Final = 3.0
 """Standard deviations of a friction arm beyond its estimate with which a mass at rest is set going."""
 Pair = tuple[float, float]
 
 
 class DriveLaw(NamedTuple):
-    """What the law of the voltages knows of masses, drives and sensors."""
+    """Configuration of the law of the voltages: masses, drives and sensors."""
 
     whirl: WhirlModel
     track: TrackModel
@@ -40,19 +39,21 @@ class DriveLaw(NamedTuple):
     position_gain: float
     rate_gain: float
     breaks_away: bool
-    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
+    """True if friction is compensated so that a mass at rest breaks away; else it is not compensated."""
     slow: float
     """Rate below which a mass counts as resting, rad/s."""
     near: float
-    """Distance from its place within which a resting mass is left to friction, rad."""
+    """Distance from its goal within which a resting mass is left to friction, rad."""
 
     @classmethod
     def of(cls, scene: EccentricScene) -> DriveLaw:
-        """What the law of the voltages knows."""
-        plant, track = PlantParameters.of(scene), track_model(scene)
+        """Derive the law's constants from a scene."""
+        plant, track, sensor = PlantParameters.of(scene), track_model(scene), scene.sensor
         position_gain, rate_gain = lqr_gain(
             track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
         )
+        finest_move = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
+        smooth_noise = sensor.encoder_noise * math.sqrt(sensor.step / (2 * SMOOTHING_TIME_S))
         return cls(
             whirl=believed_whirl(scene),
             track=track,
@@ -62,13 +63,13 @@ class DriveLaw(NamedTuple):
             position_gain=position_gain,
             rate_gain=rate_gain,
             breaks_away=scene.lqr.friction_compensation == "break_away",
-            slow=max(3 * scene.sensor.encoder_rate_noise, SLOWEST_RATE),
-            near=_near(scene),
+            slow=max(3 * sensor.encoder_rate_noise, SLOWEST_RATE_RAD_S),
+            near=max(0.25 * finest_move, 3 * smooth_noise),
         )
 
 
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
-    """The rotor as configured in filter and controller; its mass includes the eccentric masses."""
+    """Rotor as configured in filter and controller; its mass includes the eccentric masses."""
     assumed = scene.imbalance_filter
     mass = assumed.assumed_mass + 2 * scene.masses.mass
     return WhirlModel(mass, assumed.assumed_damping, assumed.assumed_stiffness)
@@ -94,15 +95,8 @@ def lqr_gain(track: TrackModel, *, state_weight: float, input_weight: float) -> 
     return position, more / (math.sqrt(track.damping**2 + more) + track.damping)
 
 
-def _near(scene: EccentricScene) -> float:
-    """A quarter of the finest move asked for, but not finer than the smoothed encoder can tell."""
-    finest = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
-    smooth = scene.sensor.encoder_noise * math.sqrt(scene.sensor.step / (2 * SMOOTHING_TIME))
-    return max(0.25 * finest, 3 * smooth)
-
-
 class Motion(NamedTuple):
-    """What the law sees of rotor and masses, in the rotor's frame."""
+    """Measured motion of rotor and masses, in the rotor's frame."""
 
     speed: float
     """W, rad/s."""
@@ -117,12 +111,12 @@ class Motion(NamedTuple):
 
 
 @in_place
-def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) -> Pair:
-    """Torque, N m, that the rotor's motion and its speed rate ask of each mass's drive.
+def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, acceleration: Pair) -> Pair:
+    """Torque, N m, that the rotor's motion and its speed rate require of each mass's drive.
 
     b (c_i a_y - s_i a_x) + J W' with the rotor's absolute acceleration a along its axes, from
     M a = -C_B (z' + j W z) - K_B z + theta (W^2 - j W') + b sum ((W + w_i)^2 - j (W' + w_i')) exp(j phi_i).
-    Args: `wanted`: w_i', rad/s^2.
+    Args: `acceleration`: w_i' that the masses are about to have, rad/s^2.
     Source: parts (a) of Eqs. 30 and 39 of the paper on eccentric masses, with the terms of the speed rate.
     """
     w, rate = motion.speed, motion.speed_rate
@@ -130,14 +124,14 @@ def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, wanted: Pair) 
     force -= law.whirl.damping * (motion.velocity + complex(0.0, w) * motion.position)
     force -= law.whirl.stiffness * motion.position
     for i in range(2):
-        pull = complex((w + motion.rate[i]) ** 2, -(rate + wanted[i]))
+        pull = complex((w + motion.rate[i]) ** 2, -(rate + acceleration[i]))
         force += law.track.moment * pull * complex(math.cos(motion.angle[i]), math.sin(motion.angle[i]))
     return _tangential_load(law, motion, force / law.whirl.mass)
 
 
 @in_place
 def steady_load(law: DriveLaw, motion: Motion) -> Pair:
-    """The same, N m, of a steady whirl while the imbalance is not known: a = -W^2 z + 2 j W z' + j W' z."""
+    """Torque, N m, that a steady whirl of unknown imbalance requires: a = -W^2 z + 2 j W z' + j W' z."""
     w = motion.speed
     pull = complex(-w * w, motion.speed_rate) * motion.position
     return _tangential_load(law, motion, pull + complex(0.0, 2 * w) * motion.velocity)
@@ -158,7 +152,7 @@ def _tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pa
 def friction_torque(
     law: DriveLaw, arm: float, deviation: float, speed: float, rate: float, distance: float
 ) -> float:
-    """Torque that makes up for friction, N m; zero for a resting mass that is near its place.
+    """Torque that makes up for friction, N m; zero for a resting mass that is near its goal.
 
     mu b (W + w)^2 in the sense of w; at rest, where friction opposes whatever is about to move the mass, in
     the sense of where the mass should go, and as large as friction may be: an arm that is estimated too small
@@ -173,27 +167,17 @@ def friction_torque(
     pressure = law.track.moment * (speed + rate) ** 2
     if abs(rate) > law.slow:
         return math.copysign(max(arm, 0.0) * pressure, rate)
-    largest = max(arm + _BREAKS_AWAY * deviation, 0.0) * pressure
+    largest = max(arm + _BREAK_AWAY_SIGMA * deviation, 0.0) * pressure
     return math.copysign(largest, distance) if abs(distance) > law.near else 0.0
 
 
 @in_place
 def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> float:
-    """The regulator's torque, u = -k_p (phi - phi_d) - k_d phi', N m.
+    """Torque of the regulator, u = -k_p (phi - phi_d) - k_d phi', N m.
 
     Source: Eq. 49 of the paper on eccentric masses.
     """
     return -law.position_gain * (angle - goal) - law.rate_gain * rate
-
-
-@in_place
-def friction_needed(law: DriveLaw, motion: Motion, imbalance: complex, arm: Sequence[float]) -> float:
-    """Largest share of what these friction arms hold at most that holding the masses takes."""
-    load, share = rotor_load(law, motion, imbalance, (0.0, 0.0)), 0.0
-    for i in range(2):
-        most = arm[i] * law.track.moment * motion.speed * motion.speed
-        share = max(share, abs(load[i]) / most if most > 0 else math.inf)
-    return share
 
 
 @in_place

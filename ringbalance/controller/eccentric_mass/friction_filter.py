@@ -31,14 +31,14 @@ class TrackModel(NamedTuple):
 
 
 class FrictionNoise(NamedTuple):
-    """What the friction filter takes to be random."""
+    """Random parts of the friction filter's model."""
 
     rate_variance: float
-    """Of the encoder's rate, rad^2/s^2."""
+    """Variance of the encoder's rate, rad^2/s^2."""
     acceleration: float
     """White noise on the mass's acceleration, rad^2/s^3."""
     arm: float
-    """How fast the friction arm may wander, m^2/s."""
+    """Rate at which the friction arm may wander, m^2/s."""
 
 
 FRICTION_FILTER: Final = np.dtype(

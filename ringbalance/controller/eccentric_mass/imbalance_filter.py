@@ -58,21 +58,21 @@ class WhirlModel(NamedTuple):
 
 
 class FilterSettings(NamedTuple):
-    """What the filter assumes; noises are white and given as power per unit time."""
+    """Assumptions of the filter; noises are white and given as power per unit time."""
 
     model: WhirlModel
     acceleration_noise: float
-    """Of the rotor along each axis, m^2/s^3."""
+    """Noise of the rotor's acceleration along each axis, m^2/s^3."""
     imbalance_noise: float
-    """Of the imbalance along each axis, kg^2 m^2/s: how fast it may wander."""
+    """Rate at which the imbalance may wander along each axis, kg^2 m^2/s."""
     start: tuple[float, float, float]
     """Standard deviations before the first sample of displacement, m, velocity, m/s, and imbalance, kg m."""
     step: float
     """s."""
     laboratory: bool
-    """Whether the sensor stands still, its sample turned back by the rotor's angle."""
+    """True if the sensor stands still, its sample turned back by the rotor's angle."""
     euler: bool
-    """The paper's transition in place of the exact one."""
+    """True for the paper's transition in place of the exact one."""
 
 
 IMBALANCE_FILTER: Final = np.dtype(
@@ -92,7 +92,7 @@ IMBALANCE_FILTER: Final = np.dtype(
 
 @compiled
 def _write_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
-    """The state one step later, exactly: exp(A dt) in closed form.
+    """Write the matrix that carries the state one step on, exactly: exp(A dt) in closed form.
 
     The whirl is an oscillator in the fixed frame, seen from the rotor; the imbalance adds what lies between
     the steady whirl and where the oscillator would take it.
@@ -140,7 +140,7 @@ def _write_identity(out: FloatArray) -> None:
 
 @in_place
 def _write_euler_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
-    """The paper's transition I + A dt, which keeps the steady whirl but not the way there.
+    """Write the paper's transition I + A dt, which keeps the steady whirl but not the way there.
 
     Source: Eq. 14 of the paper on eccentric masses.
     """
@@ -157,7 +157,7 @@ def _write_euler_transition(model: WhirlModel, angular_velocity: float, step: fl
 
 @compiled
 def _write_process(settings: FilterSettings, angular_velocity: float, out: FloatArray) -> None:
-    """Covariance that white noise builds up within one step, positive semidefinite.
+    """Write the covariance that white noise builds up within one step, positive semidefinite.
 
     Integral of E(s) diag(0, 0, q_a, q_a, q_m, q_m) E(s)^T over 0 to dt, by eight Gauss points.
     Source: Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans. Automat. Contr. 23
@@ -221,7 +221,7 @@ def set_speed(estimate: Record, settings: FilterSettings, speed: float) -> None:
 
 @in_place
 def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
-    """Before the first sample nothing moves; the imbalance is kept."""
+    """Write a state before the first sample: nothing moves; the imbalance stays as it is."""
     position, velocity, _ = settings.start
     for i in range(4):
         estimate.state[i] = 0.0
@@ -233,7 +233,7 @@ def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
 
 @compiled
 def begin_filter(estimate: Record, settings: FilterSettings, speed: float) -> None:
-    """Before the first sample, at a speed, rad/s: nothing moves and nothing is out of balance.
+    """Write a state before the first sample, at a speed, rad/s: nothing moves or is out of balance.
 
     Args: `estimate`: an element of type `IMBALANCE_FILTER`, of zeros.
     """
@@ -243,44 +243,44 @@ def begin_filter(estimate: Record, settings: FilterSettings, speed: float) -> No
 
 
 def imbalance_filter(settings: FilterSettings, *, speed: float) -> Records:
-    """A filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
+    """Make a filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
     estimate = np.zeros(1, dtype=IMBALANCE_FILTER)
     begin_filter(estimate[0], settings, speed)
     return estimate
 
 
 class MassInput(NamedTuple):
-    """What the eccentric masses do within one step of the filter."""
+    """Effect of the eccentric masses within one step of the filter."""
 
     imbalance: complex
     """p + C_B p'/(M W^2), mean over the step."""
     drift: complex
     """Integral of p'/M over the step, m."""
     covariance: tuple[float, float, float]
-    """That the encoders' angles give the imbalance, xx, xy and yy."""
+    """Covariance that the encoders' angles give the imbalance, xx, xy and yy."""
     drift_variance: float
-    """That the encoders' rates give each coordinate of the drift, m^2."""
+    """Variance that the encoders' rates give each coordinate of the drift, m^2."""
 
 
 def locked_masses(imbalance: complex) -> MassInput:
-    """Masses at rest at angles that are known exactly."""
+    """Effect of masses at rest at angles that are known exactly."""
     return MassInput(imbalance, 0.0j, (0.0, 0.0, 0.0), 0.0)
 
 
 @in_place
 def mass_vector(moment: float, angle: Numbers, rate: Numbers) -> tuple[complex, complex]:
     """p = b sum exp(j phi_i), kg m, and its time derivative."""
-    place, pace = 0.0j, 0.0j
+    vector, vector_rate = 0.0j, 0.0j
     for i in range(2):
         arm = moment * complex(math.cos(angle[i]), math.sin(angle[i]))
-        place += arm
-        pace += complex(0.0, rate[i]) * arm
-    return place, pace
+        vector += arm
+        vector_rate += complex(0.0, rate[i]) * arm
+    return vector, vector_rate
 
 
 @in_place
 def encoder_covariance(moment: float, angle: Numbers, deviation: float) -> tuple[float, float, float]:
-    """Of p, from encoders with this standard deviation, xx, xy and yy, kg^2 m^2."""
+    """Covariance of p, from encoders with this standard deviation, xx, xy and yy, kg^2 m^2."""
     xx, xy, yy = 0.0, 0.0, 0.0
     for i in range(2):
         x, y = -moment * deviation * math.sin(angle[i]), moment * deviation * math.cos(angle[i])

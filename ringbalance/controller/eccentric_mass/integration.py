@@ -2,9 +2,9 @@
 
 Between such events the motion is smooth and a Runge-Kutta step of Dormand and Prince's fifth-order formula
 carries it; within the step that holds an event the event's time is found by bisection to the last digits,
-the mass is set to rest there, and the friction law gives what follows.  The step given is divided until it
-is short against every rate of the plant.  While friction holds both masses at
-constant speed the step has a closed form.
+the mass is set to rest there, and the friction law gives what follows.  A step is divided until it is short
+against every rate of the plant.  While friction holds both masses at constant speed the step has a closed
+form.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.platform.compiled import compiled
 from ringbalance.scene.units import format_quantity
 
-LONGEST: Final = 0.1
-"""Greatest product of a substep and the plant's fastest rate."""
+MAX_RATE_PRODUCT: Final = 0.1
+"""Largest product of a substep and the plant's fastest rate."""
 _STAGES: Final = 6
 _BISECTIONS: Final = 40
-_MOST_EVENTS: Final = 64
+_MAX_EVENTS: Final = 64
 _COUPLING: Final = np.array(
     [
         [0, 0, 0, 0, 0],
@@ -58,11 +58,11 @@ _COUPLING: Final = np.array(
 Source: Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980).
 """
 _TIMES: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
-"""Of the stages, as fractions of the step."""
+"""Times of the stages, as fractions of the step."""
 _WEIGHTS: Final = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
-"""Of the stages in the result of order 5."""
-_APART: Final = 1e-6
-"""Least distance of both roots, relative, which divides by it."""
+"""Weights of the stages in the result of order 5."""
+_LEAST_ROOT_DISTANCE: Final = 1e-6
+"""Least distance of both roots, relative: the closed form divides by it."""
 
 
 @compiled
@@ -76,24 +76,24 @@ def _smooth(
     work: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write the state one step later, the motions of the masses staying as they are.
+    """Write the state one step later, with unchanged motions of the masses.
 
     `work` has one row for each stage and one for the argument of the next.
     """
     argument = work[_STAGES]
     for stage in range(_STAGES):
-        for place in range(SIZE):
+        for i in range(SIZE):
             total = 0.0
             for earlier in range(stage):
-                total += _COUPLING[stage, earlier] * work[earlier, place]
-            argument[place] = state[place] + step * total
+                total += _COUPLING[stage, earlier] * work[earlier, i]
+            argument[i] = state[i] + step * total
         then = speed + drive.rate * step * _TIMES[stage]
         write_derivative(parameters, argument, then, drive, motion, work[stage])
-    for place in range(SIZE):
+    for i in range(SIZE):
         total = 0.0
         for stage in range(_STAGES):
-            total += _WEIGHTS[stage] * work[stage, place]
-        out[place] = state[place] + step * total
+            total += _WEIGHTS[stage] * work[stage, i]
+        out[i] = state[i] + step * total
 
 
 @compiled
@@ -105,15 +105,15 @@ def _broken(
     drive: Drive,
     motion: Motions,
 ) -> bool:
-    """Whether a mass no longer moves, or is no longer held, as `motion` says."""
+    """Return True if a mass no longer moves, or is no longer held, as in `motion`."""
     if motion[0] * state[6] < 0.0 or motion[1] * state[7] < 0.0:
         return True
     held = (motion[0] == HELD and stuck[0] != LOCKED, motion[1] == HELD and stuck[1] != LOCKED)
     if not (held[0] or held[1]):
         return False
     torques = loads(parameters, state, speed, drive).torques
-    one, two = angular_accelerations(torques, motion)
-    return (held[0] and slips(torques, 0, two)) or (held[1] and slips(torques, 1, one))
+    first, second = angular_accelerations(torques, motion)
+    return (held[0] and slips(torques, 0, second)) or (held[1] and slips(torques, 1, first))
 
 
 @compiled
@@ -128,7 +128,7 @@ def _first_event(
     work: FloatArray,
     out: FloatArray,
 ) -> float:
-    """Time just after the first event within a step; the state there is written."""
+    """Time just after the first event within a step, s; the state at that time is written."""
     before, after = 0.0, step
     for trial in range(_BISECTIONS + 1):
         middle = 0.5 * (before + after)
@@ -160,7 +160,7 @@ def _advance(
 ) -> None:
     """Carry state and flags through one substep, event by event, in place."""
     done = 0.0
-    for event in range(_MOST_EVENTS):
+    for event in range(_MAX_EVENTS):
         now = speed + drive.rate * done
         motion = motions(loads(parameters, state, now, drive).torques, state, stuck)
         for mass in range(2):
@@ -168,14 +168,14 @@ def _advance(
                 stuck[mass] = STUCK if motion[mass] == HELD else SLIDING
         left = step - done
         _smooth(parameters, state, now, drive, motion, left, work, trial)
-        cut = event < _MOST_EVENTS - 1 and _broken(
+        cut = event < _MAX_EVENTS - 1 and _broken(
             parameters, trial, stuck, now + drive.rate * left, drive, motion
         )
         if cut:
             done += _first_event(parameters, state, stuck, now, drive, motion, left, work, trial)
         # An element at a time: numba compiles array assignment ten times as long.
-        for place in range(SIZE):
-            state[place] = trial[place]
+        for i in range(SIZE):
+            state[i] = trial[i]
         if not cut or done >= step:
             return
 
@@ -192,7 +192,7 @@ def _fastest_rate(parameters: PlantParameters, speed: float) -> float:
 def substeps(parameters: PlantParameters, speed: float, rate: float, step: float) -> int:
     """Number of substeps that keeps each short against every rate of the plant. Returns: At least 1."""
     fastest = _fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
-    return max(1, math.ceil(fastest * step / LONGEST))
+    return max(1, math.ceil(fastest * step / MAX_RATE_PRODUCT))
 
 
 @compiled
@@ -236,7 +236,7 @@ def _held_step(
     drive: Drive,
     step: float,
 ) -> bool:
-    """Carry the rotor through one step, in place, if both masses are held for sure; say whether they are.
+    """Carry the rotor through one step, in place, if both masses are certainly held; return True if so.
 
     The deviation d = z - z_s from the steady whirl obeys M D'' + C_B D' + K_B D = 0 for D = d exp(j W t), so
     d = d_1 exp((s_1 - j W) t) + d_2 exp((s_2 - j W) t), with s the roots of M s^2 + C_B s + K_B.  The track's
@@ -248,126 +248,119 @@ def _held_step(
     mass, half = parameters.mass, 0.5 * parameters.damping / parameters.mass
     root = cmath.sqrt(complex(half * half - parameters.stiffness / mass, 0.0))
     first, second = root - half, -root - half
-    if abs(root) < _APART * abs(first) or second.real > 0.0 or first.real > 0.0:
+    if abs(root) < _LEAST_ROOT_DISTANCE * abs(first) or second.real > 0.0 or first.real > 0.0:
         return False
-    steady = _steady(parameters, state, speed, drive)
-    away, turning = complex(state[0], state[1]) - steady, complex(0.0, speed)
-    velocity = complex(state[2], state[3])
-    one = (velocity - (second - turning) * away) / (first - second)
-    two = away - one
-    pull = abs(first) ** 2 * abs(one) + abs(second) ** 2 * abs(two)
-    if not _hold_surely(parameters, state, stuck, speed, drive, steady, pull):
-        return False
-    one *= cmath.exp((first - turning) * step)
-    two *= cmath.exp((second - turning) * step)
-    place, pace = steady + one + two, (first - turning) * one + (second - turning) * two
-    state[0], state[1], state[2], state[3] = place.real, place.imag, pace.real, pace.imag
-    for i in range(2):
-        if stuck[i] != LOCKED:
-            stuck[i] = STUCK
-    return True
-
-
-@compiled
-def _steady(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> complex:
     moment = complex(drive.unbalance_x, drive.unbalance_y)
     for i in range(2):
         moment += parameters.moment * complex(math.cos(state[4 + i]), math.sin(state[4 + i]))
-    dynamic = complex(parameters.stiffness - parameters.mass * speed * speed, parameters.damping * speed)
-    # Without damping at the critical speed there is none: friction then holds nothing for sure.
-    return speed * speed * moment / dynamic if dynamic != 0 else complex(math.inf, 0.0)
-
-
-@compiled
-def _hold_surely(
-    parameters: PlantParameters,
-    state: FloatArray,
-    stuck: IntArray,
-    speed: float,
-    drive: Drive,
-    steady: complex,
-    pull: float,
-) -> bool:
-    """Whether friction holds both masses against drive, steady whirl and any deviation of that size."""
+    dynamic = complex(parameters.stiffness - mass * speed * speed, parameters.damping * speed)
+    # Without damping there is no steady whirl at the critical speed: friction then certainly holds nothing.
+    steady = speed * speed * moment / dynamic if dynamic != 0 else complex(math.inf, 0.0)
+    away, turning = complex(state[0], state[1]) - steady, complex(0.0, speed)
+    velocity = complex(state[2], state[3])
+    first_part = (velocity - (second - turning) * away) / (first - second)
+    second_part = away - first_part
+    pull = abs(first) ** 2 * abs(first_part) + abs(second) ** 2 * abs(second_part)
     for i in range(2):
         across = steady.imag * math.cos(state[4 + i]) - steady.real * math.sin(state[4 + i])
         most = parameters.friction_arm[i] * parameters.moment * speed * speed
         load = abs(drive.torque[i] + parameters.moment * speed * speed * across) + parameters.moment * pull
         if stuck[i] != LOCKED and not load <= most:
             return False
-    return math.isfinite(pull)
+    if not math.isfinite(pull):
+        return False
+    first_part *= cmath.exp((first - turning) * step)
+    second_part *= cmath.exp((second - turning) * step)
+    displacement = steady + first_part + second_part
+    velocity = (first - turning) * first_part + (second - turning) * second_part
+    state[0], state[1], state[2], state[3] = (
+        displacement.real,
+        displacement.imag,
+        velocity.real,
+        velocity.imag,
+    )
+    for i in range(2):
+        if stuck[i] != LOCKED:
+            stuck[i] = STUCK
+    return True
 
 
-MOST_SUBSTEPS: Final = 30_000_000
-"""About one minute, at 2 us each."""
-MOST_SAMPLES: Final = 2_000_000
-"""About 500 MB of histories."""
+MAX_SUBSTEPS: Final = 30_000_000
+"""Substeps of a run of about one minute, at 2 us each."""
+MAX_SAMPLES: Final = 2_000_000
+"""Samples whose histories take about 500 MB."""
+_INTERVAL_SUBSTEPS: Final = 50_000
+"""Substeps between two reports of progress, some 0.1 s."""
 
 
 def check_substeps(scene: EccentricScene) -> None:
     """Refuse a scene whose run would take many minutes or much memory.
 
     A substep lasts at most 0.1 / (|W| + sqrt(K_B / M) + C_B / M + C_add / J_least).
-    Raises: SceneError: more than `MOST_SAMPLES`, or more than `MOST_SUBSTEPS`; it names the key of the
+    Raises: SceneError: more than `MAX_SAMPLES`, or more than `MAX_SUBSTEPS`; it names the key of the
     fastest rate and what is allowed.
     """
-    samples = scene.run.time_limit / scene.sensor.step + 1
-    if samples > MOST_SAMPLES:
-        longest = scene.sensor.step * (MOST_SAMPLES - 1)
-        problem = f"the run would take {samples:.3g} samples, and {MOST_SAMPLES:.3g} are the most"
-        value = format_quantity(scene.run.time_limit, "time", "s")
-        allowed = f"at most {longest:.4g} s, or a longer sensor.step"
-        raise SceneError([_fault(scene, ("run", "time_limit"), value, problem, allowed)])
-    count = _substeps(scene)
-    if count > MOST_SUBSTEPS:
-        key, value, allowed = _fastest(scene)
-        problem = (
-            f"the run would take {count:.3g} steps of the integration, and {MOST_SUBSTEPS:.3g} are the most"
+    samples, duration = scene.run.time_limit / scene.sensor.step + 1, scene.run.time_limit
+    if samples > MAX_SAMPLES:
+        longest = scene.sensor.step * (MAX_SAMPLES - 1)
+        raise SceneError(
+            [
+                Fault(
+                    file=scene.file,
+                    table="run",
+                    key="time_limit",
+                    value=format_quantity(duration, "time", "s"),
+                    problem=f"the run would take {samples:.3g} samples, and {MAX_SAMPLES:.3g} are the most",
+                    allowed=f"at most {longest:.4g} s, or a longer sensor.step",
+                )
+            ]
         )
-        raise SceneError([_fault(scene, key, value, problem, f"{allowed}, or a shorter run.time_limit")])
-
-
-def _substeps(scene: EccentricScene) -> float:
-    parameters, step = PlantParameters.of(scene), scene.sensor.step
-    times, speeds = scene.rotor.profile
-    samples = scene.samples
-    # Not at every sample: close enough for a limit, and cheap.
-    at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
-    rates = np.abs(np.interp(at, times, speeds)) + _fastest_rate(parameters, 0.0)
-    return samples * float(np.mean(np.maximum(np.ceil(rates * step / LONGEST), 1.0)))
-
-
-def _fastest(scene: EccentricScene) -> tuple[tuple[str, str], str, str]:
-    """Key, present value and limit of the largest of the rates that the steps follow from."""
+    count = _substeps(scene)
+    if count <= MAX_SUBSTEPS:
+        return
     plant, resistance = PlantParameters.of(scene), scene.motor.resistance
     least = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
     speed = max(abs(point.speed) for point in scene.rotor.speed_profile)
     whirl, damped = math.sqrt(plant.stiffness / plant.mass), plant.damping / plant.mass
     drive = plant.drive_damping / least
     # Half of what the whole run may have: the other rates take their part.
-    rate = 0.5 * MOST_SUBSTEPS * LONGEST / scene.run.time_limit
+    rate = 0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration
     most, lowest = "at most", "at least"
-    keys = [
+    rates = [
         (whirl, ("rotor", "stiffness"), plant.stiffness, most, plant.mass * rate**2, "stiffness", "N/m"),
         (damped, ("rotor", "damping"), plant.damping, most, plant.mass * rate, "damping", "N*s/m"),
         (speed, ("rotor", "speed_profile"), speed, most, rate, "speed", "rpm"),
         (drive, ("motor", "resistance"), resistance, lowest, resistance * drive / rate, "resistance", "ohm"),
     ]
-    _, key, value, bound, limit, dimension, unit = max(keys)
-    shown = format_quantity(limit, dimension, unit, digits=3)
-    return key, format_quantity(value, dimension, unit), f"{bound} {shown}"
+    _, (table, key), value, bound, limit, dimension, unit = max(rates)
+    limit_text = format_quantity(limit, dimension, unit, digits=3)
+    problem = f"the run would take {count:.3g} steps of the integration, and {MAX_SUBSTEPS:.3g} are the most"
+    raise SceneError(
+        [
+            Fault(
+                file=scene.file,
+                table=table,
+                key=key,
+                value=format_quantity(value, dimension, unit),
+                problem=problem,
+                allowed=f"{bound} {limit_text}, or a shorter run.time_limit",
+            )
+        ]
+    )
 
 
-def _fault(scene: EccentricScene, key: tuple[str, str], value: str, problem: str, allowed: str) -> Fault:
-    return Fault(file=scene.file, table=key[0], key=key[1], value=value, problem=problem, allowed=allowed)
+def _substeps(scene: EccentricScene) -> float:
+    """Substeps of a whole run, from its speed at no more than 10,000 of the samples."""
+    times, speeds = scene.rotor.profile
+    samples = scene.samples
+    instants = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
+    rates = np.abs(np.interp(instants, times, speeds)) + _fastest_rate(PlantParameters.of(scene), 0.0)
+    substeps_each = np.maximum(np.ceil(rates * scene.sensor.step / MAX_RATE_PRODUCT), 1.0)
+    return samples * float(np.mean(substeps_each))
 
 
-_PIECE: Final = 50_000
-"""Substeps of a piece, some 0.1 s."""
-
-
-def stretches(scene: EccentricScene) -> Iterator[tuple[int, int]]:
-    """Pieces of a run's samples between which the caller hears of it: first number and one past the last."""
-    size = max(1, round(_PIECE * scene.samples / _substeps(scene)))
+def intervals(scene: EccentricScene) -> Iterator[tuple[int, int]]:
+    """Yield the first sample of each interval between two reports of progress, and one past the last."""
+    size = max(1, round(_INTERVAL_SUBSTEPS * scene.samples / _substeps(scene)))
     for begin in range(0, scene.samples, size):
         yield begin, min(begin + size, scene.samples)

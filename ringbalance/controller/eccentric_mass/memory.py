@@ -1,4 +1,4 @@
-"""What the strategy remembers and what a run keeps of it: stages, causes, and their records."""
+"""Memory of the strategy and history of a run: stages, causes, and their records."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Pair = tuple[float, float]
 
 NOT_YET: Final = -1.0
 MOVING, RELEASED, HELD = range(3)
-"""The drives bring the masses to their goal; are off, as friction holds the masses; or hold them, because
-friction does not, or is not known to."""
+"""State of the drives: bringing the masses to their goal; off, as friction holds the masses; or holding them,
+because friction does not, or is not known to."""
 WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, CORRECTION, FINE_TUNING, REST, FAILED = range(9)
-"""What the strategy is doing, with the paper's periods:
+"""Stages of the strategy, with the paper's periods:
 
     nothing yet;
     (A) the masses are held, the imbalance is estimated;
@@ -35,7 +35,7 @@ STAGE_NAMES: Final = (
 NONE, BALANCED, SATURATED, RESIDUAL, TUNING_TIME, SPEED_CHANGED, TOO_SLOW = range(7)
 SPEED_NOT_CONSTANT, IMBALANCE_UNCERTAIN, FRICTION_UNCERTAIN, STALLED, NOT_ARRIVED = range(7, 12)
 LOCKED_MASSES, MASSES_MOVE = 12, 13
-"""Why the last stage was entered."""
+"""Cause of entering the last stage."""
 CAUSE_NAMES: Final = (
     *("none", "balanced", "saturated", "residual", "tuning_time", "speed_changed", "too_slow"),
     *("speed_not_constant", "imbalance_uncertain", "friction_uncertain", "stalled", "not_arrived"),
@@ -44,7 +44,7 @@ CAUSE_NAMES: Final = (
 
 
 class EccentricMeasurement(NamedTuple):
-    """One sample of everything that the strategy may look at."""
+    """Sample of everything that the strategy may look at."""
 
     time: float
     speed: float
@@ -52,15 +52,15 @@ class EccentricMeasurement(NamedTuple):
     speed_rate: float
     """W', rad/s^2."""
     rotor_angle: float
-    """Of the rotor's first axis, rad."""
+    """Angle of the rotor's first axis, rad."""
     position: complex
     """Displacement in the sensor's frame, m."""
     velocity: complex
     """m/s."""
     angle: Pair
-    """Of the masses, rad, not wrapped."""
+    """Angles of the masses, rad, not wrapped."""
     rate: Pair
-    """Of the masses, rad/s."""
+    """Rates of the masses, rad/s."""
 
 
 _REAL: Final = (
@@ -71,10 +71,10 @@ _REAL: Final = (
     "nearer",  # when the masses last came nearer by a noticeable angle, s
     "averaging",  # from when on the vibration is averaged, s; NOT_YET while the masses move
     "left",  # imbalance that the targets leave, kg m
-    "objective",  # mean amplitude at the place that the masses have or go to, m; infinite before the first
+    "objective",  # mean amplitude at the present goal, m; infinite before the first
     "short",  # largest distance from its goal at which friction held a mass after the last move, rad
     "share",  # correction: of a whole step that is taken
-    "least",  # fine tuning: objective at its best place, m
+    "least",  # fine tuning: objective at its best goal, m
     "move_size",  # rad
     "deviation",  # of the estimated imbalance, the largest in any direction, kg m
     "surprise",  # sum of the imbalance filter's normalised innovations squared
@@ -85,20 +85,20 @@ _WHOLE: Final = (
     "cause",
     "hold",
     "averaged",  # samples in the mean
-    "saturated",  # whether the imbalance is more than the masses can undo
+    "saturated",  # 1 if the imbalance is more than the masses can undo
     "driven",  # samples of the friction stage, without its beginning
     "stalled",  # those of them in which a mass was nearly at a standstill
     "steps",  # of correction, taken so far
     "move",  # of the four of fine tuning, the one that is tried now
     "failed",  # moves in a row that were no better than staying
-    "done",  # whether the moves have become shorter than the search is asked for
-    "running",  # whether the imbalance filter took in the last sample that was its turn
+    "done",  # 1 if the moves have become shorter than the search is to resolve
+    "running",  # 1 if the imbalance filter took in the last sample that was its turn
     "judged",  # samples in `surprise`
 )
 _COMPLEX: Final = (
     "total",  # sum of the rotor-fixed vibration in the mean, m
-    "residual",  # correction: mean vibration at its best place, m; infinite before the first mean
-    "corrected",  # imbalance for which the targets there were, kg m
+    "residual",  # correction: mean vibration at its best goal, m; infinite before the first mean
+    "corrected",  # imbalance for which the targets of that goal were, kg m
     "aim",  # for which the present targets are, kg m
     "position",  # smoothed, m, as velocity, angle and rate
     "velocity",
@@ -108,9 +108,9 @@ _COMPLEX: Final = (
 )
 _PAIRS: Final = (
     "goal",  # where the masses should be, rad, unwrapped
-    "place",  # correction: goal at its best place, rad
+    "best_goal",  # correction: goal of the least mean vibration, rad
     "aimed",  # goal of the present step; friction may hold the masses short of it
-    "base",  # fine tuning: its best place, rad
+    "base",  # fine tuning: its best goal, rad
     "angle",
     "rate",
     "torque",  # known torques summed over the samples since the friction filter's last step, N m
@@ -127,7 +127,7 @@ MEMORY: Final = np.dtype(
     + [(name, np.float64, (2,)) for name in _PAIRS]
     + [("filter", IMBALANCE_FILTER), ("friction", FRICTION_FILTER, (2,))]
 )
-"""All that changes from sample to sample."""
+"""State of the strategy, which changes from sample to sample."""
 HISTORY: Final = np.dtype(
     [
         ("state", np.float64, (8,)),  # of the plant
@@ -143,4 +143,4 @@ HISTORY: Final = np.dtype(
         ("friction_variance", np.float64, (2,)),  # m^2
     ]
 )
-"""What a run keeps of a sample; estimates of a filter are constant outside its stage."""
+"""Sample of a run; estimates of a filter are constant outside its stage."""

@@ -1,4 +1,4 @@
-"""How a run of two eccentric masses ends."""
+"""Outcomes of a run of two eccentric masses."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 
 class EccentricOutcome(StrEnum):
-    """How a run ended."""
+    """Outcome of a run."""
 
     SETTLED = "settled"
     RISES_AGAIN = "rises_again"

@@ -41,13 +41,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.physics.balancing import amplification_factor, critical_speed
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place
 
 Pair = tuple[float, float]
-"""A number of each mass."""
+"""Numbers of both masses."""
 Motions = tuple[int, int]
 
 
@@ -117,8 +117,9 @@ class PlantParameters(NamedTuple):
         Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
         """
         masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
-        ratio = motor.teeth[2] / motor.teeth[0]
-        moment = masses.mass * masses.guide_radius
+        first, second, third = motor.teeth
+        ratio, moment = third / first, masses.mass * masses.guide_radius
+        shafts = motor.motor_inertia + motor.gear_inertia * (first / second) ** 2
         return cls(
             mass=rotor.mass + 2 * masses.mass,
             damping=rotor.damping,
@@ -127,7 +128,7 @@ class PlantParameters(NamedTuple):
             phase=imbalance.phase,
             moment=moment,
             inertia=moment * masses.guide_radius,
-            drive_inertia=_reflected_inertia(motor),
+            drive_inertia=shafts * ratio**2,
             drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
             drive_gain=motor.torque_constant / motor.resistance * ratio,
             friction_arm=masses.friction_arm,
@@ -142,8 +143,8 @@ def rotor_record(scene: EccentricScene) -> dict[str, float | None]:
     """Critical speed, rad/s, amplification factor, and the phase of what the masses leave of the unbalance
     where they start, rad in the rotor's frame; plain numbers.
     """
-    plant, placed = PlantParameters.of(scene), scene.masses.initial_angle
-    left = cmath.rect(plant.unbalance, plant.phase) + sum(cmath.rect(plant.moment, each) for each in placed)
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
+    left = cmath.rect(plant.unbalance, plant.phase) + sum(cmath.rect(plant.moment, each) for each in angles)
     constants = {"mass": plant.mass, "stiffness": plant.stiffness}
     return {
         "critical_speed_rad_s": critical_speed(**constants),
@@ -152,20 +153,15 @@ def rotor_record(scene: EccentricScene) -> dict[str, float | None]:
     }
 
 
-def _reflected_inertia(motor: Motor) -> float:
-    first, second, third = motor.teeth
-    return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2
-
-
 @in_place
 def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float, float]:
     """W, rad/s, and W', rad/s^2, just after a time; constant before the first corner and after the last."""
     if time < times[0]:
         return speeds[0], 0.0
-    for place in range(len(times) - 1):
-        if time < times[place + 1]:
-            rate = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
-            return speeds[place] + rate * (time - times[place]), rate
+    for i in range(len(times) - 1):
+        if time < times[i + 1]:
+            rate = (speeds[i + 1] - speeds[i]) / (times[i + 1] - times[i])
+            return speeds[i] + rate * (time - times[i]), rate
     return speeds[-1], 0.0
 
 
@@ -173,12 +169,12 @@ def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float,
 def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
     """Angle of the rotor, the integral of its speed from time zero. Returns: rad, not wrapped."""
     angle: float = speeds[0] * min(time, times[0])
-    for place in range(len(times) - 1):
-        end = min(time, times[place + 1])
-        if end > times[place]:
-            now, _ = speed_at(times, speeds, times[place])
-            slope = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
-            length = end - times[place]
+    for i in range(len(times) - 1):
+        end = min(time, times[i + 1])
+        if end > times[i]:
+            now, _ = speed_at(times, speeds, times[i])
+            slope = (speeds[i + 1] - speeds[i]) / (times[i + 1] - times[i])
+            length = end - times[i]
             angle += now * length + 0.5 * slope * length * length
     angle += speeds[-1] * max(0.0, time - times[-1])
     return angle
@@ -196,12 +192,12 @@ _ROUNDING: Final = 1e-12
 
 
 class _Torques(NamedTuple):
-    """The equations of both masses once the rotor's accelerations are eliminated.
+    """Equations of both masses once the rotor's accelerations are eliminated.
 
-    A phi'' = g - friction, with A = [[own, cross], [cross, own]].
+    A phi'' = g - friction, with A = [[inertia, cross], [cross, inertia]].
     """
 
-    own: float
+    inertia: float
     """J + J_add - b^2 / M, kg m^2."""
     cross: float
     """-b^2 / M cos(phi_1 - phi_2), kg m^2."""
@@ -214,28 +210,29 @@ class _Torques(NamedTuple):
 @in_place
 def angular_accelerations(torques: _Torques, motion: Motions) -> Pair:
     """phi'' of both masses in given motions, rad/s^2."""
+    inertia, cross = torques.inertia, torques.cross
     net_1 = torques.driving[0] - motion[0] * torques.friction[0]
     net_2 = torques.driving[1] - motion[1] * torques.friction[1]
     if motion[0] == HELD:
-        return 0.0, 0.0 if motion[1] == HELD else net_2 / torques.own
+        return 0.0, 0.0 if motion[1] == HELD else net_2 / inertia
     if motion[1] == HELD:
-        return net_1 / torques.own, 0.0
-    determinant = torques.own * torques.own - torques.cross * torques.cross
-    one = (torques.own * net_1 - torques.cross * net_2) / determinant
-    two = (torques.own * net_2 - torques.cross * net_1) / determinant
-    return one, two
+        return net_1 / inertia, 0.0
+    determinant = inertia * inertia - cross * cross
+    first = (inertia * net_1 - cross * net_2) / determinant
+    second = (inertia * net_2 - cross * net_1) / determinant
+    return first, second
 
 
 @in_place
 def slips(torques: _Torques, mass: int, other_acceleration: float) -> bool:
-    """Whether a held mass breaks loose: |g - cross phi''_other| > mu_f b W^2."""
+    """Return True if a held mass breaks loose: |g - cross phi''_other| > mu_f b W^2."""
     load = abs(torques.driving[mass] - torques.cross * other_acceleration)
     return load > torques.friction[mass] * (1.0 + _ROUNDING)
 
 
 @in_place
 def _consistent(torques: _Torques, motion: Motions, loose: tuple[bool, bool]) -> bool:
-    """Whether motions of masses at rest hold together; a mass that already moves is not asked."""
+    """Return True if motions of masses at rest are consistent; a mass that already moves is not looked at."""
     acceleration = angular_accelerations(torques, motion)
     for i in range(2):
         if loose[i]:
@@ -247,7 +244,7 @@ def _consistent(torques: _Torques, motion: Motions, loose: tuple[bool, bool]) ->
 
 @in_place
 def _moving(flag: int, rate: float) -> int:
-    """Which way a mass moves that is locked or has a rate."""
+    """Motion of a mass that is locked or has a rate."""
     if flag == LOCKED or rate == 0.0:
         return HELD
     return FORWARDS if rate > 0.0 else BACKWARDS
@@ -255,43 +252,42 @@ def _moving(flag: int, rate: float) -> int:
 
 @in_place
 def motions(torques: _Torques, state: FloatArray, stuck: IntArray) -> Motions:
-    """Which way each mass moves, or that it is held: HELD, FORWARDS or BACKWARDS."""
+    """Motion of each mass: HELD, FORWARDS or BACKWARDS."""
     loose = (stuck[0] != LOCKED and state[6] == 0.0, stuck[1] != LOCKED and state[7] == 0.0)
-    known = (_moving(stuck[0], state[6]), _moving(stuck[1], state[7]))
+    present = (_moving(stuck[0], state[6]), _moving(stuck[1], state[7]))
     for first in (HELD, FORWARDS, BACKWARDS):
         for second in (HELD, FORWARDS, BACKWARDS):
-            motion = (first if loose[0] else known[0], second if loose[1] else known[1])
+            motion = (first if loose[0] else present[0], second if loose[1] else present[1])
             if _consistent(torques, motion, loose):
                 return motion
     # Only rounding can bring us here: the torques are at their bounds.
-    return known
+    return present
 
 
 SIZE: Final = 8
 
 
 class Drive(NamedTuple):
-    """What acts on the plant from outside while a step lasts."""
+    """Inputs of the plant while a step lasts."""
 
     unbalance_x: float
     """U cos phi_m, kg m."""
     unbalance_y: float
     """U sin phi_m, kg m."""
     torque: Pair
-    """Of each motor at standstill, B_add V, N m."""
+    """Torque of each motor at standstill, B_add V, N m."""
     rate: float
     """W', rad/s^2, constant."""
 
 
 class _Loads(NamedTuple):
-    """Forces on rotor and masses in one state."""
+    """Forces on rotor and masses in one state of the plant."""
 
     force_x: float
     """All but M a_x and b phi_i'' sin phi_i in the first equation, N."""
     force_y: float
-    """Likewise in the second, N."""
+    """All but M a_y and b phi_i'' cos phi_i in the second equation, N."""
     torques: _Torques
-    """Of the masses."""
 
 
 @in_place
@@ -302,7 +298,7 @@ def _limited(voltage: float, maximum: float) -> float:
 
 @in_place
 def drive_of(parameters: PlantParameters, command: FloatArray, rate: float) -> Drive:
-    """Gather what acts on the plant from outside."""
+    """Gather the inputs of the plant."""
     most, gain = parameters.maximum_voltage, parameters.drive_gain
     return Drive(
         parameters.unbalance * math.cos(parameters.phase),
@@ -330,14 +326,14 @@ def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: D
     force_x -= parameters.damping * (state[2] - speed * state[1]) + parameters.stiffness * state[0]
     force_y -= parameters.damping * (state[3] + speed * state[0]) + parameters.stiffness * state[1]
     lever, common, drag = b / parameters.mass, parameters.inertia * rate, parameters.drive_damping
-    own_1 = drive.torque[0] - drag * state[6] - common
-    own_2 = drive.torque[1] - drag * state[7] - common
+    drive_1 = drive.torque[0] - drag * state[6] - common
+    drive_2 = drive.torque[1] - drag * state[7] - common
     torques = _Torques(
         parameters.inertia + parameters.drive_inertia - b * lever,
         -b * lever * (cos_1 * cos_2 + sin_1 * sin_2),
         (
-            own_1 - lever * (force_y * cos_1 - force_x * sin_1),
-            own_2 - lever * (force_y * cos_2 - force_x * sin_2),
+            drive_1 - lever * (force_y * cos_1 - force_x * sin_1),
+            drive_2 - lever * (force_y * cos_2 - force_x * sin_2),
         ),
         (parameters.friction_arm[0] * b * square_1, parameters.friction_arm[1] * b * square_2),
     )
@@ -354,30 +350,30 @@ def write_derivative(
     out: FloatArray,
 ) -> None:
     """Write the time derivative of the state for given motions of the masses."""
-    found = loads(parameters, state, speed, drive)
-    one, two = angular_accelerations(found.torques, motion)
+    load = loads(parameters, state, speed, drive)
+    first, second = angular_accelerations(load.torques, motion)
     b, rate = parameters.moment, drive.rate
-    pull_x = b * (math.sin(state[4]) * one + math.sin(state[5]) * two)
-    pull_y = b * (math.cos(state[4]) * one + math.cos(state[5]) * two)
-    accelerated_x = (found.force_x + pull_x) / parameters.mass
-    accelerated_y = (found.force_y - pull_y) / parameters.mass
+    pull_x = b * (math.sin(state[4]) * first + math.sin(state[5]) * second)
+    pull_y = b * (math.cos(state[4]) * first + math.cos(state[5]) * second)
+    accelerated_x = (load.force_x + pull_x) / parameters.mass
+    accelerated_y = (load.force_y - pull_y) / parameters.mass
     out[0] = state[2]
     out[1] = state[3]
     out[2] = accelerated_x + 2 * speed * state[3] + rate * state[1] + speed * speed * state[0]
     out[3] = accelerated_y - 2 * speed * state[2] - rate * state[0] + speed * speed * state[1]
     out[4] = state[6]
     out[5] = state[7]
-    out[6] = one
-    out[7] = two
+    out[6] = first
+    out[7] = second
 
 
 def rest_state(angles: tuple[float, float]) -> FloatArray:
-    """The state of a rotor at its centre, in its own frame, with masses at rest on the track, shape (8,)."""
+    """State of a rotor at its centre, in its own frame, with masses at rest on the track, shape (8,)."""
     return np.array([0.0, 0.0, 0.0, 0.0, angles[0], angles[1], 0.0, 0.0])
 
 
 def stuck_flags(flag: int) -> IntArray:
-    """The same flag for both masses. Returns: Shape (2,)."""
+    """One flag for both masses, shape (2,)."""
     return np.full(2, flag, dtype=np.int64)
 
 

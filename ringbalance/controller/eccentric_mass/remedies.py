@@ -1,8 +1,8 @@
-"""Changes of a scene with eccentric masses to try where too few devices meet what is asked.
+"""Changes of a scene with eccentric masses to try where too few devices meet the requirements.
 
 Masses and their arm are sized by the imbalances of drawn devices, which needs no run; a higher limit by the
-vibration that runs come down to; unstable gains by their loops' poles.  What else may help goes by how runs
-end, by factors: runs of the changed scene say which will do.
+vibration that runs come down to; unstable gains by their loops' poles.  Further changes follow from the ends
+of runs, by factors: runs of the changed scene show which suffice.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.origins import raw_value_at, value_at
 
-_MOST: Final = 4
-"""Kinds of change that are tried by how runs end."""
-_SPARE: Final = (1.05, 1.5)
-"""Times the masses that cancel the imbalance of nearly every device."""
-_NEARLY: Final = 0.99
-"""Of the devices, whose imbalance masses are sized by."""
-_FINER: Final = {"": (0.5, 0.25), "finer_": (0.05,)}
-"""Times the noise of a sensor; where half of it serves none, a twentieth is tried all the same."""
-_SHORTER: Final = (0.5, 0.25, 0.125)
-"""Times the wait before the vibration is averaged, which sets the pace of the strategy."""
-_LIMITS: Final = (1.2, 2.0)
-"""Times the largest amplitude that the drawn devices come down to."""
+_MAX_KINDS: Final = 4
+"""Kinds of change that are tried by the ends of runs."""
+_SIZE_FACTORS: Final = (1.05, 1.5)
+"""Masses to try over those that cancel the imbalance of nearly every device."""
+_SIZING_QUANTILE: Final = 0.99
+"""Quantile of the devices' imbalances that masses are sized by."""
+_NOISE_FACTORS: Final = {"": (0.5, 0.25), "finer_": (0.05,)}
+"""Noises of a sensor to try over its present one; a twentieth is tried even where half helps no device."""
+_WAIT_FACTORS: Final = (0.5, 0.25, 0.125)
+"""Waits to try over the present one, before the vibration is averaged: they set the strategy's pace."""
+_LIMIT_FACTORS: Final = (1.2, 2.0)
+"""Limits to try over the largest amplitude that the drawn devices come down to."""
 _BLIND: Final = frozenset(
     {
         EccentricOutcome.RISES_AGAIN,
@@ -84,116 +84,83 @@ _BY_END: Final[Mapping[EccentricOutcome, tuple[tuple[Mapping[str, float | str], 
     ),
     EccentricOutcome.DIVERGED: (({"lqr.state_weight": 1 / 30, "friction_filter.speed_gain": 0.25},),),
 }
-"""Kinds of change by how runs end, each with its sizes: times a value, or what is set."""
+"""Kinds of change by the ends of runs, each with its sizes: factors of a value, or the new value."""
 
 
 def remedies_of(
-    scene: EccentricScene, drawn: Outcomes, own: Outcomes, shares: Sequence[float]
-) -> tuple[Remedy, ...]:
-    """Every change by itself: parts that are too small, what helps such ends, less noise, another limit.
+    scene: EccentricScene, nominal: Outcomes, sample: Outcomes, imbalances: Sequence[float]
+) -> Iterator[Remedy]:
+    """Yield every change by itself: larger parts, those that help such ends, less noise, another limit.
 
-    Those of one kind follow each other with the smallest first.
+    Changes of one kind follow each other with the smallest first.
 
-    Args: `drawn`: of some devices. `own`: of the scene's. `shares`: of many devices, imbalance over what the
-        masses cancel.
+    Args: `nominal`: runs of the scene's device. `sample`: runs of some drawn devices. `imbalances`: those of
+        many devices, over what the masses cancel.
     """
-    first = tuple(_of_masses(scene, shares))
-    ended = Counter((*own.ended, *drawn.ended))
-    return (
-        *first,
-        *_of_loops(scene),
-        *_of_ends(scene, ended),
-        *_of_pace(scene, drawn),
-        *_of_sensors(scene, drawn),
-        *_of_limit(scene, drawn),
-    )
-
-
-def _of_loops(scene: EccentricScene) -> Iterator[Remedy]:
-    """Gains that the drives bear, and the transition that bears every step."""
-    if not _stable(scene):
+    # Heavier masses, or farther out, where some devices have more imbalance than they cancel.
+    needed = float(np.quantile(imbalances, _SIZING_QUANTILE))
+    for code, path in (("mass", "masses.mass"), ("guide_radius", "masses.guide_radius")):
+        for factor in _SIZE_FACTORS if needed > 1.0 else ():
+            value = _rounded_up(factor * needed * value_at(scene, path))
+            yield Remedy(code=code, changes={path: value}, continuous=True)
+    # Gains that the drives bear, and the transition that bears every step.
+    stable = all(loop.stable for loop in RecommendedGains.of(scene).loops)
+    if not stable:
         yield Remedy(code="gains", changes=advised(scene))
     if scene.imbalance_filter.discretisation == "euler":
         yield Remedy(code="discretisation", changes={"imbalance_filter.discretisation": "exact"})
-
-
-def _stable(scene: EccentricScene) -> bool:
-    return all(loop.stable for loop in RecommendedGains.of(scene).loops)
-
-
-def _of_pace(scene: EccentricScene, drawn: Outcomes) -> Iterator[Remedy]:
-    """A shorter wait, where devices settle later than the scene requires."""
+    yield from _by_ends(scene, Counter((*nominal.ended, *sample.ended)), stable=stable)
     required, wait = scene.requirement.settling_time, scene.fine_tuning.wait
-    if required is not None and wait > 0 and np.any(drawn.settled & (drawn.settling_time > required)):
-        yield from (Remedy(code="wait", changes={"fine_tuning.wait": factor * wait}) for factor in _SHORTER)
-
-
-def _of_ends(scene: EccentricScene, ended: Counter[str]) -> Iterator[Remedy]:
-    """For the commonest end first; none that sets what the scene has, or that it leaves open."""
-    kinds: dict[str, list[Settings]] = {}
-    for end, _ in ended.most_common():
-        # Drives that are unstable do not come to an end in any time.
-        if end == EccentricOutcome.TIME_LIMIT and not _stable(scene):
-            continue
-        for sizes in _BY_END.get(EccentricOutcome(end), ()):
-            code = "_and_".join(path.partition(".")[2] for path in sizes[0])
-            changes = [_changed(scene, factors) for factors in sizes]
-            kinds.setdefault(code, [each for each in changes if each])
-    for code, several in list(kinds.items())[:_MOST]:
-        yield from (Remedy(code=code, changes=each) for each in several)
-
-
-def _changed(scene: EccentricScene, factors: Mapping[str, float | str]) -> Settings:
-    """Changes of a scene by factors on its numbers or by other words, without those that change nothing."""
-    changes: dict[str, float | str] = {}
-    for path, factor in factors.items():
-        before = raw_value_at(scene, path)
-        if isinstance(factor, str):
-            changes |= {path: factor} if before != factor else {}
-        elif before:
-            changes[path] = factor * before
-    return changes
-
-
-def _of_masses(scene: EccentricScene, shares: Sequence[float]) -> Iterator[Remedy]:
-    """Heavier, or farther out, where some devices have more imbalance than the masses cancel."""
-    needed = float(np.quantile(shares, _NEARLY))
-    if needed > 1.0:
-        for code, path in (("mass", "masses.mass"), ("guide_radius", "masses.guide_radius")):
-            for spare in _SPARE:
-                value = _rounded_up(spare * needed * value_at(scene, path))
-                yield Remedy(code=code, changes={path: value}, continuous=True)
-
-
-def _of_sensors(scene: EccentricScene, drawn: Outcomes) -> Iterator[Remedy]:
-    if _BLIND.isdisjoint(drawn.ended):
-        return
-    for code, paths in _SENSORS.items():
+    if required is not None and wait > 0 and np.any(sample.settled & (sample.settling_time > required)):
+        yield from (Remedy(code="wait", changes={"fine_tuning.wait": each * wait}) for each in _WAIT_FACTORS)
+    for code, paths in () if _BLIND.isdisjoint(sample.ended) else _SENSORS.items():
         values = {path: value_at(scene, path) for path in paths}
         if any(value > 0 for path, value in values.items() if path.startswith("sensor.")):
-            for prefix, factor in ((prefix, each) for prefix, some in _FINER.items() for each in some):
+            for prefix, factor in (
+                (prefix, each) for prefix, some in _NOISE_FACTORS.items() for each in some
+            ):
                 finer = {path: factor * value for path, value in values.items() if value > 0}
                 yield Remedy(code=prefix + code, changes=finer)
-
-
-def _of_limit(scene: EccentricScene, drawn: Outcomes) -> Iterator[Remedy]:
-    """As high as what is reached, below the vibration without balancing; or as low as a required residual."""
+    # A limit as low as a required residual; or as high as what runs reach, below the vibration before.
     limit, residual = scene.supervisor.limit, scene.requirement.residual
-    reached = float(np.max(drawn.final_amplitude))
-    if residual is not None:
-        if residual < limit:
-            yield Remedy(code="limit", changes={"supervisor.limit": residual})
-    elif limit < reached < math.inf:
+    reached = float(np.max(sample.final_amplitude))
+    if residual is not None and residual < limit:
+        yield Remedy(code="limit", changes={"supervisor.limit": residual})
+    elif residual is None and limit < reached < math.inf:
         speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
-        before = (
-            abs(PlantParameters.of(scene).steady_whirl(speed, scene.masses.initial_angle)) if speed else 0.0
-        )
-        for value in (_rounded_up(factor * reached) for factor in _LIMITS):
-            if value < before:
+        whirl = PlantParameters.of(scene).steady_whirl(speed, scene.masses.initial_angle) if speed else 0.0
+        for value in (_rounded_up(factor * reached) for factor in _LIMIT_FACTORS):
+            if value < abs(whirl):
                 yield Remedy(code="limit", changes={"supervisor.limit": value})
 
 
+def _by_ends(scene: EccentricScene, ended: Counter[str], *, stable: bool) -> Iterator[Remedy]:
+    """Yield changes for the commonest end first; none that sets what the scene has, or that it leaves open.
+
+    Args: `stable`: True if the loops of the drives are: others do not come to an end in any time.
+    """
+    kinds: dict[str, list[Settings]] = {}
+    for end, _ in ended.most_common():
+        if end == EccentricOutcome.TIME_LIMIT and not stable:
+            continue
+        for sizes in _BY_END.get(EccentricOutcome(end), ()):
+            code, several = "_and_".join(path.partition(".")[2] for path in sizes[0]), []
+            for factors in sizes:
+                changes: dict[str, float | str] = {}
+                for path, factor in factors.items():
+                    before = raw_value_at(scene, path)
+                    if isinstance(factor, str):
+                        changes |= {path: factor} if before != factor else {}
+                    elif before:
+                        changes[path] = factor * before
+                if changes:
+                    several.append(changes)
+            kinds.setdefault(code, several)
+    for code, several in list(kinds.items())[:_MAX_KINDS]:
+        yield from (Remedy(code=code, changes=each) for each in several)
+
+
 def _rounded_up(value: float) -> float:
-    """To two digits."""
+    """Round up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return float(f"{math.ceil(value / unit * (1 - 1e-12)) * unit:.2g}")

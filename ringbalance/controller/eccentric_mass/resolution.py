@@ -1,9 +1,9 @@
-"""How well the filter can know the imbalance by what is not known of the rotor.
+"""Uncertainty of the estimated imbalance by that of the rotor.
 
 In a steady whirl the filter finds (D_b/D)(theta + p) - p_b, with D = K_B - M W^2 + j C_B W of the rotor, D_b
 as configured and p = b sum exp(j phi_i) of the masses.  An estimation takes in the start's transient as well,
 from which a wrong bearing takes up to half as much again: so the filter is given, without noise, the whirl of
-a rotor that is one standard deviation off in one input, and what it then finds differently counts.
+a rotor that is one standard deviation off in one input, and the difference of its estimates counts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import filter_settings, off_by_one
 from ringbalance.scene.arrays import FloatArray
 
-_LONGEST_STEPS = 2_000
+_MAX_STEPS = 2_000
 """Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""
 _INPUTS = ("rotor.mass", "rotor.stiffness", "rotor.damping", "masses.mass", "masses.guide_radius")
 
@@ -37,49 +37,39 @@ def rotor_covariance(
     estimation, s.
     Returns: Shape (2, 2), along the rotor's axes; zero without stated uncertainties, and for a rotor at rest.
     """
-    found = np.zeros((2, 2))
-    plants = list(off_by_one(scene, _INPUTS))
+    covariance, plants = np.zeros((2, 2)), list(off_by_one(scene, _INPUTS))
     if speed == 0 or not plants:
-        return found
-    step = max(scene.imbalance_filter.step, duration / _LONGEST_STEPS)
+        return covariance
+    step = max(scene.imbalance_filter.step, duration / _MAX_STEPS)
     count = max(round(duration / step), 1)
     settings = filter_settings(scene)._replace(step=step, euler=False)
     estimate, assumed = imbalance_filter(settings, speed=speed), scene.imbalance_filter
     variance = np.repeat([assumed.position_noise**2, assumed.velocity_noise**2], 2) * (assumed.step / step)
+    masses = locked_masses(_initial_vector(scene))
 
     def estimated(plant: EccentricScene) -> FloatArray:
-        whirls = _whirls(plant, imbalance, speed=speed, begin=begin, step=step, count=count)
+        """Imbalance that the filter estimates of this rotor, which starts from rest."""
+        rotor, drive = plant.rotor, imbalance + _initial_vector(plant)
+        model = WhirlModel(rotor.mass + 2 * plant.masses.mass, rotor.damping, rotor.stiffness)
+        state = np.array([0.0, 0.0, 0.0, 0.0, drive.real, drive.imag])
+        if begin > 0:
+            state = whirl_transition(model, speed, begin) @ state
+        transition, whirls = whirl_transition(model, speed, step), np.empty((count, 6))
+        for i in range(count):
+            state = transition @ state
+            whirls[i] = state
         samples = whirls @ estimate["observation"][0].T
-        masses = locked_masses(_place(scene))
         states, _ = imbalance_history(estimate, samples=samples, variance=variance, masses=masses)
         return np.asarray(states[-1, 4:6])
 
-    middle = estimated(scene)
+    nominal = estimated(scene)
     for plant in plants:
-        change = estimated(plant) - middle
-        found += np.outer(change, change)
-    return found
+        change = estimated(plant) - nominal
+        covariance += np.outer(change, change)
+    return covariance
 
 
-def _place(scene: EccentricScene) -> complex:
+def _initial_vector(scene: EccentricScene) -> complex:
     """p = b sum exp(j phi_i) of the masses where they start, kg m."""
     moment = scene.masses.mass * scene.masses.guide_radius
     return moment * sum(cmath.exp(1j * angle) for angle in scene.masses.initial_angle)
-
-
-def _whirls(
-    plant: EccentricScene, imbalance: complex, *, speed: float, begin: float, step: float, count: int
-) -> FloatArray:
-    """States of the filter's model for a rotor that starts from rest, shape (n, 6)."""
-    rotor = plant.rotor
-    model = WhirlModel(rotor.mass + 2 * plant.masses.mass, rotor.damping, rotor.stiffness)
-    drive = imbalance + _place(plant)
-    state = np.array([0.0, 0.0, 0.0, 0.0, drive.real, drive.imag])
-    if begin > 0:
-        state = whirl_transition(model, speed, begin) @ state
-    onward = whirl_transition(model, speed, step)
-    states = np.empty((count, 6))
-    for i in range(count):
-        state = onward @ state
-        states[i] = state
-    return states

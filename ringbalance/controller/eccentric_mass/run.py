@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.balancer import Progress
-from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, stretches
+from ringbalance.controller.eccentric_mass.integration import check_substeps, intervals, plant_step
 from ringbalance.controller.eccentric_mass.memory import (
     HISTORY,
     LOCKED_MASSES,
@@ -33,36 +33,36 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
 from ringbalance.results.result import Presentation
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, Record, Records
-from ringbalance.scene.platform.compiled import compiled, in_place
+from ringbalance.scene.arrays import FloatArray, IntArray, Record
+from ringbalance.scene.platform.compiled import compiled
 
 Seed = int | np.random.Generator | None
-"""Of random numbers, or these themselves."""
-NOISES = 8
+"""Seed of random numbers, or their generator."""
+SENSOR_NOISES = 8
 """Random numbers that one sample takes: four of vibration, two angles, two rates."""
-_LARGEST_WHIRL = 1e3
-"""Of the masses' own track.  The plant is linear in the displacement, which no bearing is far below this."""
-_LARGEST_TURN = 1e3
-"""Of a mass within one sample, rad: more than a hundred turns, which no sampled loop controls."""
-_LARGEST = 1e100
-"""Of any number, whatever its unit, so that squares and products of what is kept are finite."""
+_MAX_WHIRL = 1e3
+"""Largest displacement over the radius of the masses' track: the plant is linear in the displacement, which
+no bearing is far below this."""
+_MAX_TURN_RAD = 1e3
+"""Largest travel of a mass within one sample: more than a hundred turns, which no sampled loop controls."""
+_MAX_NUMBER = 1e100
+"""Largest number in a history, whatever its unit, so that squares and products of it are finite."""
 
 
 class _Machine(NamedTuple):
-    """What is run beside the strategy."""
+    """Rotor, plant and sensors of a run."""
 
     plant: PlantParameters
     times: FloatArray
-    """Of the corners of the speed profile, s."""
+    """Times of the corners of the speed profile, s."""
     speeds: FloatArray
-    """At the corners, rad/s."""
+    """Speeds at the corners, rad/s."""
     position_noise: float
-    """Standard deviation, as the others."""
     velocity_noise: float
     encoder_noise: float
     encoder_rate_noise: float
     locked: bool
-    """Whether the masses are clamped to the track, without drive and filter."""
+    """True if the masses are clamped to the track, without drive and filter."""
 
     @classmethod
     def of(cls, scene: EccentricScene) -> _Machine:
@@ -79,65 +79,28 @@ class _Machine(NamedTuple):
         )
 
 
-def _recorded(
-    scene: EccentricScene, seed: Seed, progress: Progress, settings: StrategySettings
-) -> tuple[Records, Records]:
-    """Every sample before the first that means nothing, type `HISTORY`, and the strategy's memory at the end,
-    type `MEMORY`, shape (1,)."""
-    machine, count = _Machine.of(scene), scene.samples
-    history, memory = np.zeros(count, dtype=HISTORY), np.zeros(1, dtype=MEMORY)
-    random = np.random.default_rng(scene.run.seed if seed is None else seed)
-    numbers = random.standard_normal((count, NOISES))
-    state = rest_state(scene.masses.initial_angle)
-    stuck = stuck_flags(LOCKED if machine.locked else STUCK)
-    if not machine.locked:
-        begin_strategy(settings, memory[0], _measure(machine, settings, state, 0.0, numbers[0]))
-    for begin, end in stretches(scene):
-        state, stuck = _run_stretch(settings, machine, numbers, memory[0], state, stuck, history, begin, end)
-        progress(end * settings.step, scene.run.time_limit)
-        bad = np.flatnonzero(_diverged(history[begin:end], scene))
-        if bad.size:
-            # At the start everything rests.
-            history = history[: max(begin + int(bad[0]), 1)]
-            break
-    # The energy of the last sample's voltage would be spent after the run.
-    history["energy"] = np.concatenate([[0.0], history["energy"][:-1]])
-    return history, memory
-
-
-def _diverged(history: Records, scene: EccentricScene) -> BoolArray:
-    state = history["state"]
-    whirl = np.max(np.abs(state[:, :2]), axis=1)
-    turn = np.max(np.abs(state[:, 6:8]), axis=1) * scene.sensor.step
-    # A comparison with NaN is false.
-    usual = (whirl <= _LARGEST_WHIRL * scene.masses.guide_radius) & (turn <= _LARGEST_TURN)
-    for name in HISTORY.names or ():
-        usual &= np.all(np.abs(history[name].reshape(len(history), -1)) <= _LARGEST, axis=1)
-    return np.asarray(~usual)
-
-
 @compiled
 def _measure(
     machine: _Machine, settings: StrategySettings, state: FloatArray, time: float, numbers: FloatArray
 ) -> EccentricMeasurement:
-    """What the sensors show. Args: `numbers`: standard normal, shape (8,)."""
+    """Sample that the sensors show. Args: `numbers`: standard normal, shape (8,)."""
     speed, speed_rate = speed_at(machine.times, machine.speeds, time)
     turn = turned(machine.times, machine.speeds, time)
-    place, velocity = complex(state[0], state[1]), complex(state[2], state[3])
+    position, velocity = complex(state[0], state[1]), complex(state[2], state[3])
     if settings.laboratory:
         outward = complex(math.cos(turn), math.sin(turn))
-        velocity = outward * (velocity + complex(0.0, speed) * place)
-        place = outward * place
-    place += complex(machine.position_noise * numbers[0], machine.position_noise * numbers[1])
+        velocity = outward * (velocity + complex(0.0, speed) * position)
+        position = outward * position
+    position += complex(machine.position_noise * numbers[0], machine.position_noise * numbers[1])
     velocity += complex(machine.velocity_noise * numbers[2], machine.velocity_noise * numbers[3])
     noise, rate_noise = machine.encoder_noise, machine.encoder_rate_noise
     angle = (state[4] + noise * numbers[4], state[5] + noise * numbers[5])
     rate = (state[6] + rate_noise * numbers[6], state[7] + rate_noise * numbers[7])
-    return EccentricMeasurement(time, speed, speed_rate, turn, place, velocity, angle, rate)
+    return EccentricMeasurement(time, speed, speed_rate, turn, position, velocity, angle, rate)
 
 
 @compiled
-def _run_stretch(
+def _run_interval(
     settings: StrategySettings,
     machine: _Machine,
     numbers: FloatArray,
@@ -155,35 +118,31 @@ def _run_stretch(
     plant, step, voltage = machine.plant, settings.step, np.zeros(2)
     energy = 0.0 if first == 0 else history[first - 1].energy
     for i in range(first, after):
-        seen = _measure(machine, settings, state, i * step, numbers[i])
+        measurement = _measure(machine, settings, state, i * step, numbers[i])
         if machine.locked:
             memory.cause, memory.hold = LOCKED_MASSES, RELEASED
             memory.goal[0], memory.goal[1] = state[4], state[5]
         else:
-            strategy_step(settings, memory, seen)
+            strategy_step(settings, memory, measurement)
             voltage[0], voltage[1] = memory.voltage[0], memory.voltage[1]
-        _keep(history[i], memory, state)
-        later, stuck = plant_step(plant, state, stuck, voltage, seen.speed, seen.speed_rate, step)
+        row = history[i]
+        row.stage, row.cause, row.hold = memory.stage, memory.cause, memory.hold
+        # An element at a time: numba compiles array assignment ten times as long.
+        for k in range(8):
+            row.state[k] = state[k]
+        for k in range(2):
+            row.voltage[k], row.goal[k] = memory.voltage[k], memory.goal[k]
+            row.friction_arm[k] = memory.friction[k].arm
+            row.friction_variance[k] = memory.friction[k].arm_variance
+            row.imbalance[k] = memory.filter.state[4 + k]
+            for m in range(2):
+                row.imbalance_covariance[k, m] = memory.filter.covariance[4 + k, 4 + m]
+        speed, rate = measurement.speed, measurement.speed_rate
+        later, stuck = plant_step(plant, state, stuck, voltage, speed, rate, step)
         energy += electrical_energy(plant, state, later, voltage, step)
-        history[i].energy = energy
+        row.energy = energy
         state = later
     return state, stuck
-
-
-@in_place
-def _keep(row: Record, memory: Record, state: FloatArray) -> None:
-    """Write a sample into the history."""
-    # An element at a time: numba compiles array assignment ten times as long.
-    for place in range(8):
-        row.state[place] = state[place]
-    row.stage, row.cause, row.hold = memory.stage, memory.cause, memory.hold
-    for k in range(2):
-        row.voltage[k], row.goal[k] = memory.voltage[k], memory.goal[k]
-        row.friction_arm[k] = memory.friction[k].arm
-        row.friction_variance[k] = memory.friction[k].arm_variance
-        row.imbalance[k] = memory.filter.state[4 + k]
-        for m in range(2):
-            row.imbalance_covariance[k, m] = memory.filter.covariance[4 + k, 4 + m]
 
 
 def simulate_eccentric(
@@ -195,17 +154,39 @@ def simulate_eccentric(
 ) -> EccentricRun:
     """Run a scene from a rotor at its centre and masses at rest, to its time limit.
 
-    Args: `seed`: of numpy's default generator for the sensors' noise; default the scene's. `progress`: called
-    several times a second; None for silence. `settings`: of the strategy; default those of the scene.
+    Args: `seed`: seed of numpy's default generator for the sensors' noise; default the scene's. `progress`:
+    called several times a second. `settings`: constants of the strategy; default those of the scene.
     Returns: EccentricRun; its status says how the run ended and what to do next. A run that diverges ends at
     the last sample that means anything.
     Raises: SceneError: a run that takes too many samples or steps.
     Source: Fig. 3 of the paper on eccentric masses.
     """
     check_substeps(scene)
-    history, memory = _recorded(
-        scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
-    )
+    settings, machine = settings or StrategySettings.of(scene), _Machine.of(scene)
+    history, memory = np.zeros(scene.samples, dtype=HISTORY), np.zeros(1, dtype=MEMORY)
+    random = np.random.default_rng(scene.run.seed if seed is None else seed)
+    numbers = random.standard_normal((scene.samples, SENSOR_NOISES))
+    state = rest_state(scene.masses.initial_angle)
+    stuck = stuck_flags(LOCKED if machine.locked else STUCK)
+    if not machine.locked:
+        begin_strategy(settings, memory[0], _measure(machine, settings, state, 0.0, numbers[0]))
+    for begin, end in intervals(scene):
+        state, stuck = _run_interval(settings, machine, numbers, memory[0], state, stuck, history, begin, end)
+        if progress is not None:
+            progress(end * settings.step, scene.run.time_limit)
+        part = history[begin:end]
+        whirl = np.max(np.abs(part["state"][:, :2]), axis=1)
+        turn = np.max(np.abs(part["state"][:, 6:8]), axis=1) * scene.sensor.step
+        # A comparison with NaN is false.
+        bounded = (whirl <= _MAX_WHIRL * scene.masses.guide_radius) & (turn <= _MAX_TURN_RAD)
+        for name in HISTORY.names or ():
+            bounded &= np.all(np.abs(part[name].reshape(len(part), -1)) <= _MAX_NUMBER, axis=1)
+        if not bounded.all():
+            # At the start everything rests.
+            history = history[: max(begin + int(np.argmin(bounded)), 1)]
+            break
+    # The energy of the last sample's voltage would be spent after the run.
+    history["energy"] = np.concatenate([[0.0], history["energy"][:-1]])
     presentation = Presentation(document=eccentric_document, rows=eccentric_rows)
     return EccentricRun(scene=scene, history=history, memory=memory[0], presentation=presentation)
 

@@ -1,4 +1,4 @@
-"""What a run with two eccentric masses leaves: every sample, what follows, and what is said of it."""
+"""Record of a run with two eccentric masses: every sample, results derived from them, and findings."""
 
 from __future__ import annotations
 
@@ -41,28 +41,24 @@ from ringbalance.results.rows import Finding, Value, sentences
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Records
 from ringbalance.scene.uncertain import NORMAL_95
 
-_NOTHING: Final = 1e-6
-"""Share of the limit below which a vibration is round-off."""
-_FINAL_TIME: Final = 1.0
-"""Over which the final amplitude is averaged, s."""
-
-
-_NOTICEABLE_STALL: Final = 0.05
-"""Share of the friction stage with a mass nearly at a standstill that is worth a warning."""
-_WRONG_MODEL: Final = 1.5
+_ROUNDING_FRACTION: Final = 1e-6
+"""Fraction of the limit below which a vibration is round-off."""
+_FINAL_TIME_S: Final = 1.0
+"""Time over which the final amplitude is averaged."""
+_NOTICEABLE_STALL_FRACTION: Final = 0.05
+"""Fraction of the friction stage with a mass nearly at a standstill that deserves a warning."""
+_WRONG_MODEL_INNOVATION: Final = 1.5
 """Mean normalised innovation squared beyond which the filter's model is called wrong; chance alone keeps it
 within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
-
-
-_OFTEN: Final = 0.5
-"""Share of a run with a voltage at its limit, beyond which that is what keeps masses from their goals."""
-_RUN_AWAY: Final = 5.0
+_SATURATED_FRACTION: Final = 0.5
+"""Fraction of a run with a voltage at its limit, beyond which that is what keeps masses from their goals."""
+_RUN_AWAY_TURNS: Final = 5.0
 """Turns of a mass beyond which it does not come to its goal: all moves together are shorter."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StageSpan:
-    """One stage of the strategy."""
+    """Stage of the strategy, as a run went through it."""
 
     name: str
     start: float
@@ -73,7 +69,7 @@ class StageSpan:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class EccentricRun(PresentedResult):
-    """One run of the whole strategy on the plant.
+    """Run of the whole strategy on the plant.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
@@ -88,7 +84,7 @@ class EccentricRun(PresentedResult):
     history: Records
     """Every sample, type `HISTORY`."""
     memory: np.void
-    """Of the strategy at the end, type `MEMORY`."""
+    """Memory of the strategy at the end, type `MEMORY`."""
 
     @property
     def innovation(self) -> float | None:
@@ -99,7 +95,7 @@ class EccentricRun(PresentedResult):
 
     @cached_property
     def time(self) -> FloatArray:
-        """s, shape (n,)."""
+        """Time of the samples, s, shape (n,)."""
         return np.arange(len(self.history["state"]), dtype=np.float64) * self.scene.sensor.step
 
     @cached_property
@@ -119,7 +115,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def phase(self) -> FloatArray:
-        """Of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
+        """Phase of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
         return np.asarray(np.angle(self.whirl), dtype=np.float64)
 
     @property
@@ -129,42 +125,42 @@ class EccentricRun(PresentedResult):
 
     @property
     def mass_rate(self) -> FloatArray:
-        """rad/s, shape (2, n)."""
+        """True rates of the masses, rad/s, shape (2, n)."""
         return self.history["state"][:, 6:8].T
 
     @property
     def goal(self) -> FloatArray:
-        """Where the masses should be, rad, shape (2, n)."""
+        """Angles that the masses should have, rad, shape (2, n)."""
         return self.history["goal"].T
 
     @property
     def voltage(self) -> FloatArray:
-        """V, shape (2, n)."""
+        """Voltages of the motors, V, shape (2, n)."""
         return self.history["voltage"].T
 
     @property
     def drive_off(self) -> BoolArray:
-        """Whether both drives are off, shape (n,)."""
+        """True where both drives are off, shape (n,)."""
         return np.asarray(self.history["hold"] == RELEASED)
 
     @property
     def limit(self) -> float:
-        """m."""
+        """Amplitude limit, m."""
         return self.scene.supervisor.limit
 
     @property
     def stage(self) -> int:
-        """At the end of the run."""
+        """Stage at the end of the run."""
         return int(self.history["stage"][-1])
 
     @property
     def end(self) -> float:
-        """s."""
+        """Time of the last sample, s."""
         return float(self.time[-1])
 
     @property
     def diverged(self) -> bool:
-        """Whether it ended early, at the last sample that means anything."""
+        """True if the run ended early, at the last sample that means anything."""
         return self.time.size < self.scene.samples
 
     @cached_property
@@ -172,8 +168,8 @@ class EccentricRun(PresentedResult):
         """Sample of the largest vibration above the limit after the rotor was balanced to within it; None for
         none.
         """
-        content = np.isin(self.history["cause"], (BALANCED, SPEED_CHANGED))
-        within = np.flatnonzero(content & (self.amplitude <= self.limit))
+        done = np.isin(self.history["cause"], (BALANCED, SPEED_CHANGED))
+        within = np.flatnonzero(done & (self.amplitude <= self.limit))
         if within.size == 0:
             return None
         worst = int(within[0]) + int(np.argmax(self.amplitude[within[0] :]))
@@ -193,37 +189,33 @@ class EccentricRun(PresentedResult):
         """SETTLED when the true amplitude stays within the limit to the end, whatever the strategy does."""
         if self.diverged:
             return EccentricOutcome.DIVERGED
-        cause = int(self.history["cause"][-1])
+        speed, memory = self.speed, self.memory
+        last_cause = cause = int(self.history["cause"][-1])
         if cause == LOCKED_MASSES:
             return EccentricOutcome.LOCKED
-        shown = self._shown_cause(cause)
-        # The amplitude of a rotor that hardly turns tells nothing.
-        if shown != TOO_SLOW and self.within_since is not None and self.left is None:
+        # A run that ends within a stage may show already why the stage would have failed.
+        if self.stage == IMBALANCE and abs(speed[-1]) < self.scene.supervisor.lowest_speed:
+            cause = TOO_SLOW
+        elif self.stage == IMBALANCE and speed.size > 1 and speed[-1] != speed[-2]:
+            cause = SPEED_NOT_CONSTANT
+        elif self.stage == FRICTION and memory["stalled"] > STALLED_SHARE * memory["driven"]:
+            cause = STALLED
+        # The amplitude of a rotor that hardly turns proves nothing.
+        if cause != TOO_SLOW and self.within_since is not None and self.left is None:
             return EccentricOutcome.SETTLED
-        if cause == BALANCED:
+        if last_cause == BALANCED:
             return EccentricOutcome.RISES_AGAIN
-        return EccentricOutcome.TIME_LIMIT if shown == NONE else EccentricOutcome(CAUSE_NAMES[shown])
-
-    def _shown_cause(self, cause: int) -> int:
-        """Of the end; a run that ends within a stage may show already why the stage would have failed."""
-        speed = self.speed
-        if self.stage == IMBALANCE:
-            if abs(speed[-1]) < self.scene.supervisor.lowest_speed:
-                return TOO_SLOW
-            steady = speed.size < 2 or speed[-1] == speed[-2]
-            return cause if steady else SPEED_NOT_CONSTANT
-        stalled = self.stage == FRICTION and self.memory["stalled"] > STALLED_SHARE * self.memory["driven"]
-        return STALLED if stalled else cause
+        return EccentricOutcome.TIME_LIMIT if cause == NONE else EccentricOutcome(CAUSE_NAMES[cause])
 
     @property
     def settling_time(self) -> float | None:
-        """s, from which on the amplitude stays at or below the limit; None when not settled."""
+        """Time from which on the amplitude stays at or below the limit, s; None when not settled."""
         ended_well = self.outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}
         return self.within_since if ended_well else None
 
     @property
     def settled(self) -> bool:
-        """Whether the amplitude ends at or below the limit and stays there."""
+        """True if the amplitude ends at or below the limit and stays there."""
         return self.settling_time is not None
 
     @cached_property
@@ -233,17 +225,17 @@ class EccentricRun(PresentedResult):
 
     @property
     def friction_known(self) -> bool:
-        """Whether the friction stage came to its end: then its drives have done what they are there for."""
+        """True if the friction stage came to its end: then its drives have done what they are for."""
         return bool(np.any(self.history["stage"] == POSITIONING))
 
     @property
     def imbalance(self) -> complex:
-        """As estimated at the end, kg m."""
+        """Imbalance as estimated at the end, kg m."""
         return complex(*self.history["imbalance"][-1])
 
     @cached_property
     def rotor_covariance(self) -> FloatArray:
-        """Of the estimated imbalance, from what is stated of rotor and masses, kg^2 m^2, shape (2, 2)."""
+        """Covariance of the estimated imbalance by rotor and masses, kg^2 m^2, shape (2, 2)."""
         estimating, step = self.estimated_at, self.scene.sensor.step
         if estimating.size == 0:
             return np.zeros((2, 2))
@@ -257,19 +249,18 @@ class EccentricRun(PresentedResult):
 
     @property
     def imbalance_covariance(self) -> FloatArray:
-        """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
+        """Covariance of the imbalance estimated at the end, by noise and rotor, kg^2 m^2, shape (2, 2)."""
         return np.asarray(self.history["imbalance_covariance"][-1] + self.rotor_covariance)
 
     @property
     def friction_half_width(self) -> FloatArray:
-        """Of the friction arms as estimated (95 %), from noise and from what is stated of motor and
-        masses, m, shape (2,)."""
+        """Half-widths (95 %) of the friction arms, m, by noise, motor and masses, shape (2,)."""
         doubt = np.square(self.memory["arm_doubt"])
         return np.asarray(NORMAL_95 * np.sqrt(self.history["friction_variance"][-1] + doubt))
 
     @property
     def stages(self) -> tuple[StageSpan, ...]:
-        """Those that the strategy went through, one after the other."""
+        """Stages that the strategy went through, one after the other."""
         stage, time = self.history["stage"], self.time
         edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
         return tuple(
@@ -279,17 +270,16 @@ class EccentricRun(PresentedResult):
 
     @property
     def targets(self) -> Targets | None:
-        """For the imbalance as it was estimated; None when it never came to that."""
+        """Targets for the imbalance as it was estimated; None when the run did not come to that."""
         if not self.friction_known:
             return None
         x, y = self.history["imbalance"][-1]
-        masses = self.scene.masses
-        gap, moment = masses.arc_length / masses.guide_radius, PlantParameters.of(self.scene).moment
-        return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
+        moment = PlantParameters.of(self.scene).moment
+        return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, self.scene.masses.gap)
 
     @property
     def unbalanced_amplitude(self) -> float:
-        """Steady amplitude that the masses' first places would give at the last speed, m."""
+        """Steady amplitude that the masses' initial angles would give at the last speed, m."""
         speed = float(self.speed[-1])
         if speed == 0:
             return 0.0
@@ -297,18 +287,18 @@ class EccentricRun(PresentedResult):
 
     @property
     def final_amplitude(self) -> float:
-        """Mean over the last second, m."""
-        return float(np.mean(self.amplitude[self.time >= self.time[-1] - _FINAL_TIME]))
+        """Mean amplitude over the last second, m."""
+        return float(np.mean(self.amplitude[self.time >= self.time[-1] - _FINAL_TIME_S]))
 
     @property
     def residual_ratio(self) -> float | None:
-        """Final amplitude over that of the first places at this speed; None where nothing would vibrate."""
+        """Final amplitude over that of the initial angles at this speed; None where nothing would vibrate."""
         unbalanced = self.unbalanced_amplitude
-        return None if unbalanced < _NOTHING * self.limit else self.final_amplitude / unbalanced
+        return None if unbalanced < _ROUNDING_FRACTION * self.limit else self.final_amplitude / unbalanced
 
     @property
     def electrical_energy(self) -> float:
-        """Taken by both motors from the supply in the whole run, J."""
+        """Energy that both motors took from the supply in the whole run, J."""
         return float(self.history["energy"][-1])
 
     @property
@@ -318,7 +308,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def saturation(self) -> float:
-        """Seconds for which a voltage was at its limit."""
+        """Time for which a voltage was at its limit, s."""
         most = PlantParameters.of(self.scene).maximum_voltage
         at_limit = np.any(np.abs(self.history["voltage"]) >= most, axis=1)
         return float(np.count_nonzero(at_limit)) * self.scene.sensor.step
@@ -339,26 +329,38 @@ class EccentricRun(PresentedResult):
 
     @cached_property
     def ended(self) -> Finding:
-        """How the run ended, with its numbers."""
-        code = f"masses_{self.outcome.value}"
+        """Finding on the end of the run, with its numbers."""
+        code, supervisor = f"masses_{self.outcome.value}", self.scene.supervisor
         if self.outcome is EccentricOutcome.RISES_AGAIN:
-            code = "masses_not_kept" if self.left is None else _risen(self, self.left)
+            code, worst = "masses_not_kept", self.left
+            if worst is not None:
+                # Either masses have moved, or the speed magnifies what they left.
+                first = int(np.argmax(self.history["cause"] == BALANCED))
+                moved = np.abs(self.mass_angle[:, first : worst + 1] - self.mass_angle[:, [first]])
+                still = np.max(moved, initial=0.0) <= supervisor.arrival_angle
+                by_trials = supervisor.correction == "trials"
+                code = "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
+                if not still or self.speed[worst] == self.speed[first]:
+                    code = "masses_rises_again"
         if self.outcome in OF_DRIVES and (unstable := next(_unstable(self.scene), None)):
             numbers = {**_numbers(self), **unstable.values}
             return replace(_finding("masses_unstable", numbers), change=unstable.change)
-        if self.outcome in OF_DRIVES and self.run_away > _RUN_AWAY:
-            code = "masses_run_away" if self.saturation > _OFTEN * self.end else "masses_turn"
+        if self.outcome in OF_DRIVES and self.run_away > _RUN_AWAY_TURNS:
+            saturated = self.saturation > _SATURATED_FRACTION * self.end
+            code = "masses_run_away" if saturated else "masses_turn"
         if self.outcome is EccentricOutcome.LOCKED and self.within_since is not None:
             code = "masses_locked_within"
         return _finding(code, _numbers(self))
 
     @cached_property
     def warned(self) -> tuple[Finding, ...]:
-        """What the user should know although the run continued."""
+        """Findings that a user should know although the run continued."""
         numbers = {name: value for name, value in _numbers(self).items() if value is not None}
-        unlike = self.innovation is not None and self.innovation > _WRONG_MODEL
-        settled, by_euler = self.outcome is EccentricOutcome.SETTLED, _by_euler(self)
-        stalls = _stalled(self) > _NOTICEABLE_STALL and not self.friction_known
+        keys, settled = self.scene.imbalance_filter, self.outcome is EccentricOutcome.SETTLED
+        unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
+        # The Euler transition is the cause to remove first.
+        by_euler = keys.discretisation == "euler" and (unlike or keys.step > _euler_limit(self))
+        stalls = _stalled_fraction(self) > _NOTICEABLE_STALL_FRACTION and not self.friction_known
         due = {
             "strategy_not_finished": settled and self.stage not in {REST, FAILED},
             "strategy_failed": settled and self.stage == FAILED,
@@ -367,45 +369,24 @@ class EccentricRun(PresentedResult):
             "euler_too_coarse": by_euler,
             "innovations_unlike_model": unlike and not by_euler,
             "drives_stay_on": int(self.history["hold"][-1]) == HELD,
-            "masses_meet": self.least_gap < _own_angle(self.scene),
+            "masses_meet": self.least_gap < self.scene.masses.gap,
         }
         findings = (_finding(code, numbers) for code, is_due in due.items() if is_due)
         return (*_unstable(self.scene), *findings)
 
     @property
     def status(self) -> str:
-        """How the run ended and what to do next."""
+        """End of the run and what to do next, as a sentence."""
         return self.ended.text
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know, as sentences."""
+        """Findings that a user should know, as sentences."""
         return tuple(each.text for each in self.warned)
-
-
-def _risen(run: EccentricRun, worst: int) -> str:
-    """Why a balanced rotor has left its limit: masses that moved, or the speed that magnifies what they left.
-
-    Args: `worst`: sample of the largest vibration.
-    """
-    first = int(np.argmax(run.history["cause"] == BALANCED))
-    moved = np.abs(run.mass_angle[:, first : worst + 1] - run.mass_angle[:, [first]])
-    still = np.max(moved, initial=0.0) <= run.scene.supervisor.arrival_angle
-    if not still or run.speed[worst] == run.speed[first]:
-        return "masses_rises_again"
-    by_trials = run.scene.supervisor.correction == "trials"
-    return "masses_rises_by_trials" if by_trials else "masses_rises_by_speed"
 
 
 def _finding(code: str, numbers: Mapping[str, Value]) -> Finding:
     return Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
-
-
-def _by_euler(run: EccentricRun) -> bool:
-    """Whether the filter is wrong, or says so, with the Euler transition: the cause to remove first."""
-    told = run.scene.imbalance_filter
-    unlike = run.innovation is not None and run.innovation > _WRONG_MODEL
-    return told.discretisation == "euler" and (unlike or told.step > _euler_limit(run))
 
 
 def _euler_limit(run: EccentricRun) -> float:
@@ -416,7 +397,7 @@ def _euler_limit(run: EccentricRun) -> float:
 
 
 def _unstable(scene: EccentricScene) -> Iterator[Finding]:
-    """Loops whose poles are outside the unit circle, each with the gain or the hold that would do."""
+    """Yield each loop whose poles are outside the unit circle, with the gain or the hold that suffices."""
     if scene.supervisor.strategy == "locked":
         return
     gains = RecommendedGains.of(scene)
@@ -430,27 +411,23 @@ def _unstable(scene: EccentricScene) -> Iterator[Finding]:
             )
 
 
-def _stalled(run: EccentricRun) -> float:
+def _stalled_fraction(run: EccentricRun) -> float:
     return int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1)
 
 
-def _own_angle(scene: EccentricScene) -> float:
-    return scene.masses.arc_length / scene.masses.guide_radius
-
-
 def _numbers(run: EccentricRun) -> dict[str, Value]:
-    """Of which a sentence takes what it names."""
-    scene, left = run.scene, run.left
+    """Numbers of which a sentence takes those that it names."""
+    scene, worst = run.scene, run.left
     supervisor, covariance = scene.supervisor, run.history["imbalance_covariance"][-1]
-    # Of the imbalance by noise, kg m.
+    # Standard deviation of the imbalance by noise, kg m.
     deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(covariance))))
     return {
         "final_amplitude": float(run.amplitude[-1]),
         "time": run.end,
         "limit": supervisor.limit,
         "settling_time": run.within_since,
-        "later_amplitude": None if left is None else float(run.amplitude[left]),
-        "later_speed": None if left is None else float(run.speed[left]),
+        "later_amplitude": None if worst is None else float(run.amplitude[worst]),
+        "later_speed": None if worst is None else float(run.speed[worst]),
         "imbalance": abs(run.imbalance),
         "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
         "residual": float(run.memory["left"]),
@@ -463,10 +440,10 @@ def _numbers(run: EccentricRun) -> dict[str, Value]:
         "stage": STAGE_NAMES[run.stage],
         "turns": run.run_away,
         "cause": CAUSE_NAMES[int(run.history["cause"][-1])].replace("_", " "),
-        "stalled_fraction": _stalled(run),
+        "stalled_fraction": _stalled_fraction(run),
         "saturation": run.saturation,
         "euler_limit": _euler_limit(run),
         "innovation": run.innovation,
         "least_gap": run.least_gap,
-        "own_angle": _own_angle(scene),
+        "own_angle": scene.masses.gap,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -17,8 +17,9 @@ from ringbalance.results.rows import Quantity, around
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 
-_MOST_ROWS: Final = 2500
+_DOCUMENT_INSTANTS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
+_BAND_INSTANTS: Final = 600
 
 
 def eccentric_document(run: EccentricRun) -> dict[str, Any]:
@@ -30,10 +31,10 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
     """
     # Equally spaced samples, with the stages' edges and the largest vibration.
     last = run.time.size - 1
-    even = np.linspace(0, last, min(_MOST_ROWS, run.time.size)).round().astype(np.int64)
+    even = np.linspace(0, last, min(_DOCUMENT_INSTANTS, run.time.size)).round().astype(np.int64)
     edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])
     extra = np.array([int(np.argmax(run.amplitude)), last], dtype=np.int64)
-    kept = np.unique(np.concatenate([even, np.minimum(edges, last), extra]))
+    samples = np.unique(np.concatenate([even, np.minimum(edges, last), extra]))
     targets = run.targets
     return {
         "balancer": run.balancer,
@@ -58,21 +59,21 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
             "residual_kg_m": targets.residual,
             "saturated": bool(targets.saturated),
         },
-        "time_s": run.time[kept].tolist(),
-        "speed_rad_s": run.speed[kept].tolist(),
-        "amplitude_m": run.amplitude[kept].tolist(),
-        "phase_rad": run.phase[kept].tolist(),
-        "mass_angle_rad": run.mass_angle[:, kept].tolist(),
-        "goal_rad": run.goal[:, kept].tolist(),
-        "voltage_V": run.voltage[:, kept].tolist(),
-        "drive_off": run.drive_off[kept].tolist(),
+        "time_s": run.time[samples].tolist(),
+        "speed_rad_s": run.speed[samples].tolist(),
+        "amplitude_m": run.amplitude[samples].tolist(),
+        "phase_rad": run.phase[samples].tolist(),
+        "mass_angle_rad": run.mass_angle[:, samples].tolist(),
+        "goal_rad": run.goal[:, samples].tolist(),
+        "voltage_V": run.voltage[:, samples].tolist(),
+        "drive_off": run.drive_off[samples].tolist(),
         "estimates": {
-            "imbalance_kg_m": run.history["imbalance"][kept].T.tolist(),
-            "imbalance_covariance": run.history["imbalance_covariance"][kept].tolist(),
+            "imbalance_kg_m": run.history["imbalance"][samples].T.tolist(),
+            "imbalance_covariance": run.history["imbalance_covariance"][samples].tolist(),
             "imbalance_rotor_covariance": run.rotor_covariance.tolist(),
             "imbalance_half_width_kg_m": (NORMAL_95 * np.sqrt(np.diag(run.imbalance_covariance))).tolist(),
-            "friction_arm_m": run.history["friction_arm"][kept].T.tolist(),
-            "friction_variance": run.history["friction_variance"][kept].T.tolist(),
+            "friction_arm_m": run.history["friction_arm"][samples].T.tolist(),
+            "friction_variance": run.history["friction_variance"][samples].T.tolist(),
             "friction_half_width_m": run.friction_half_width.tolist(),
         },
         **run.rows().document(),
@@ -80,7 +81,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
 
 
 def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
-    """Every sample of a run by name of its column: rotor-fixed vectors, angles not wrapped."""
+    """Columns of a table of every sample by name: rotor-fixed vectors, angles not wrapped."""
     history = run.history
     stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
     columns: dict[str, FloatArray] = {
@@ -106,7 +107,7 @@ def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
     return {
         **{name: values.tolist() for name, values in columns.items()},
         "drive_off": run.drive_off.astype(int).tolist(),
-        "stage": [run.stages[place].name for place in stages],
+        "stage": [run.stages[stage].name for stage in stages],
     }
 
 
@@ -116,25 +117,10 @@ def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
 
 def eccentric_rows(run: EccentricRun) -> Rows:
     """Quantities, findings and stages of the run."""
-    at = np.searchsorted(run.time, [stage.end for stage in run.stages])
-    stages = [
-        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
-        for stage, amplitude in zip(run.stages, run.amplitude[at], strict=True)
-    ]
-    return Rows(
-        title=f"Run of {run.scene.name} ({run.scene.source}), eccentric masses",
-        quantities=tuple(_quantities(run)),
-        findings=(run.ended, *run.warned),
-        facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
-        tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
-    )
-
-
-def _quantities(run: EccentricRun) -> Iterator[Quantity]:
     x, y = (float(each) for each in run.history["imbalance"][-1])
     width = NORMAL_95 * math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
     size = math.hypot(x, y)
-    rows: list[tuple[str, str, str, float | None, float]] = [
+    values: list[tuple[str, str, str, float | None, float]] = [
         ("settling_time", "settling time", "s", run.settling_time, 0.0),
         ("final_amplitude", "amplitude at the end", "m", run.final_amplitude, 0.0),
         ("worst_amplitude", "amplitude at worst", "m", run.worst_amplitude, 0.0),
@@ -146,30 +132,47 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
     ]
     arms = zip(run.history["friction_arm"][-1], run.friction_half_width, strict=True)
     for number, (arm, half) in enumerate(arms, start=1):
-        rows.append(
+        values.append(
             (f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), float(half))
         )
     for number, angle in enumerate(run.mass_angle[:, -1], start=1):
-        place = float(angle) % math.tau
-        rows.append((f"mass_angle_{number}", f"mass {number} at", "rad", place, 0.0))
-    for key, name, unit, value, half in rows:
+        values.append((f"mass_angle_{number}", f"mass {number} at", "rad", float(angle) % math.tau, 0.0))
+    quantities = []
+    for key, name, unit, value, half in values:
         low, high = (None, None) if value is None else around(value, half)
         origin = "given" if key == "limit" else "simulated"
-        yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)
-
-
-_INSTANTS = 600
+        quantities.append(
+            Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)
+        )
+    ends = np.searchsorted(run.time, [stage.end for stage in run.stages])
+    stages = [
+        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
+        for stage, amplitude in zip(run.stages, run.amplitude[ends], strict=True)
+    ]
+    return Rows(
+        title=f"Run of {run.scene.name} ({run.scene.source}), eccentric masses",
+        quantities=tuple(quantities),
+        findings=(run.ended, *run.warned),
+        facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
+        tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
+    )
 
 
 def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
     """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
     one, so that no peak is lost.
 
-    Args: `end`: of the times, s. Returns: For JSON, SI; a run that ended before has its last value.
+    Args: `end`: last of the times, s. Returns: Plain numbers for JSON, SI; a run that ended before has its
+        last value.
     """
-    time = np.linspace(0.0, end, _INSTANTS)
-    peaks = np.array([_peaks(run.run, time) for run in runs])
-    low, middle, high = (row.tolist() for row in np.quantile(peaks, [0.0, 0.5, 1.0], axis=0))
+    time = np.linspace(0.0, end, _BAND_INSTANTS)
+    peaks = []
+    for result in runs:
+        run = result.run
+        edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
+        since = np.concatenate([edges[:1], edges[:-1]])
+        peaks.append([run.amplitude[a : max(b, a) + 1].max() for a, b in zip(since, edges, strict=True)])
+    low, middle, high = (row.tolist() for row in np.quantile(np.array(peaks), [0.0, 0.5, 1.0], axis=0))
     return {
         "time_s": time.tolist(),
         "low_m": low,
@@ -178,9 +181,3 @@ def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
         "runs": len(runs),
         "settled": sum(each.settled for each in runs),
     }
-
-
-def _peaks(run: Any, time: Any) -> Any:
-    edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
-    since = np.concatenate([edges[:1], edges[:-1]])
-    return [float(run.amplitude[a : max(b, a) + 1].max()) for a, b in zip(since, edges, strict=True)]

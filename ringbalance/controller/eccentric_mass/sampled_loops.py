@@ -24,26 +24,28 @@ from ringbalance.scene.arrays import ComplexArray
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
 _TORQUE_MARGIN: Final = 1.5
-"""Of the speed control at standstill over the friction of the scene, at the recommended drive speed."""
-_SMALL: Final = 1e-4
+"""Torque of the speed control at standstill over the friction of the scene, at the recommended speed."""
+_SMALL_DECAY: Final = 1e-4
 _HALVINGS: Final = 50
-_FARTHEST: Final = 1e9
-"""Times or below the scene's own value that a limit is looked for; a gain that nothing limits ends there."""
+_SEARCH_FACTOR: Final = 1e9
+"""Largest ratio of a limit to the scene's value, or its inverse; without a limit the search ends at it."""
+_Poles = Callable[[float, float, float], ComplexArray]
+"""Poles by the key's value, the hold, s, and a factor on the loop's gain."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _SampledLoop:
-    """One loop of the drives."""
+    """Control loop of the drives, as sampled."""
 
     name: str
     key: str
-    """Of the scene, which sets its gain."""
+    """Key of the scene that sets its gain."""
     value: float
-    """Of that key, in SI."""
+    """Value of that key, in SI."""
     unit: str
-    """Of that key; empty for the weight q, which has none."""
+    """Unit of that key; empty for the weight q, which has none."""
     poles: ComplexArray
-    """Per step, shape (1,) or (2,)."""
+    """Poles per step, shape (1,) or (2,)."""
     gain_margin: float
     """Factor by which the loop's own gain could grow before a pole leaves the unit circle."""
     recommended: float
@@ -60,7 +62,7 @@ class _SampledLoop:
 
     @property
     def stable(self) -> bool:
-        """Whether all poles lie within the unit circle."""
+        """True if all poles lie within the unit circle."""
         return self.radius < 1
 
 
@@ -69,15 +71,16 @@ class RecommendedGains:
     """Sampled poles of a scene's loops, and values of its keys that make them stable and strong enough."""
 
     regulator: _SampledLoop
-    """Of all stages but the friction stage: `lqr.state_weight`."""
+    """Loop of all stages but the friction stage: `lqr.state_weight`."""
     speed: _SampledLoop
-    """Of the friction stage: `friction_filter.speed_gain`."""
+    """Loop of the friction stage: `friction_filter.speed_gain`."""
     pair: _SampledLoop
-    """Of the angle between the masses in the friction stage: `friction_filter.pair_gain`."""
+    """Loop of the angle between the masses in the friction stage: `friction_filter.pair_gain`."""
     step: float
     """Longest hold of the voltage that leaves every loop its margin with the scene's gains, s."""
     drive_speed: float
-    """At least the scene's, rad/s: with the lower of both speed gains it overcomes friction with a margin."""
+    """Drive speed, at least the scene's, rad/s: with the lower of both speed gains it overcomes friction with
+    a margin."""
 
     @property
     def loops(self) -> tuple[_SampledLoop, _SampledLoop, _SampledLoop]:
@@ -87,80 +90,67 @@ class RecommendedGains:
     @classmethod
     def of(cls, scene: EccentricScene) -> RecommendedGains:
         """Judge the loops of a scene before it is run."""
-        regulator, speed = _regulator(scene), _speed(scene)
-        slower = min(speed.value, speed.recommended)
-        pair = _pair(scene, slower)
-        return cls(
-            regulator=regulator,
-            speed=speed,
-            pair=pair,
-            step=min(loop.recommended_step for loop in (regulator, speed, pair)),
-            drive_speed=_drive_speed(scene, slower),
+        plant, track, keys, lqr = (
+            PlantParameters.of(scene),
+            track_model(scene),
+            scene.friction_filter,
+            scene.lqr,
         )
+
+        def regulator_poles(weight: float, hold: float, margin: float) -> ComplexArray:
+            position, rate = lqr_gain(track, state_weight=weight, input_weight=lqr.input_weight)
+            return _poles(scene, hold, margin * position, margin * rate)
+
+        def speed_poles(gain: float, hold: float, margin: float) -> ComplexArray:
+            return _poles(scene, hold, 0.0, plant.drive_gain * (margin * gain), eased=True)
+
+        def pair_poles(pair: float, speed: float, hold: float) -> ComplexArray:
+            # The angle between the masses gets each drive's error.
+            return _poles(scene, hold, 2 * plant.drive_gain * pair, plant.drive_gain * speed, eased=True)
+
+        regulator = _loop(
+            scene,
+            name="regulator",
+            key="lqr.state_weight",
+            value=lqr.state_weight,
+            unit="",
+            poles=regulator_poles,
+        )
+        speed = _loop(
+            scene,
+            name="speed control",
+            key="friction_filter.speed_gain",
+            value=keys.speed_gain,
+            unit="V*s/rad",
+            poles=speed_poles,
+        )
+        slower = min(speed.value, speed.recommended)
+        pair = _loop(
+            scene,
+            name="pair control",
+            key="friction_filter.pair_gain",
+            value=keys.pair_gain,
+            unit="V/rad",
+            poles=lambda gain, hold, margin: pair_poles(margin * gain, keys.speed_gain, hold),
+            # With the recommended speed gain, and with a margin on both gains.
+            value_poles=lambda gain, hold, margin: pair_poles(margin * gain, slower, hold),
+            hold_poles=lambda gain, hold, margin: pair_poles(margin * gain, margin * keys.speed_gain, hold),
+            start=keys.pair_gain or slower,
+        )
+        # The speed w where B_add gamma w is the friction's torque, with a margin.
+        friction = max(plant.friction_arm) * plant.moment * scene.rotor.speed_profile[0].speed ** 2
+        drive_speed = max(keys.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * slower))
+        step = min(loop.recommended_step for loop in (regulator, speed, pair))
+        return cls(regulator=regulator, speed=speed, pair=pair, step=step, drive_speed=drive_speed)
 
 
 def advised(scene: EccentricScene) -> dict[str, float]:
-    """By key, SI, the gains that are above the recommended ones, lowered, and drives fast enough."""
+    """Gains above the recommended ones, lowered, and a sufficient drive speed, by key, SI."""
     gains = RecommendedGains.of(scene)
     changes = {loop.key: loop.recommended for loop in gains.loops if loop.value > loop.recommended}
     if gains.drive_speed > scene.friction_filter.drive_speed:
         changes["friction_filter.drive_speed"] = gains.drive_speed
     return changes
-
-
-def _regulator(scene: EccentricScene) -> _SampledLoop:
-    inputs, track = scene.lqr.input_weight, track_model(scene)
-
-    def poles(weight: float, step: float, margin: float) -> ComplexArray:
-        position, rate = lqr_gain(track, state_weight=weight, input_weight=inputs)
-        return _poles(scene, step, margin * position, margin * rate)
-
-    return _loop(
-        scene, name="regulator", key="lqr.state_weight", value=scene.lqr.state_weight, unit="", poles=poles
-    )
-
-
-def _speed(scene: EccentricScene) -> _SampledLoop:
-    """One pole, that of the rate."""
-    per_volt = PlantParameters.of(scene).drive_gain
-
-    def poles(gain: float, step: float, margin: float) -> ComplexArray:
-        return _poles(scene, step, 0.0, per_volt * (margin * gain), eased=True)
-
-    gain = scene.friction_filter.speed_gain
-    return _loop(
-        scene,
-        name="speed control",
-        key="friction_filter.speed_gain",
-        value=gain,
-        unit="V*s/rad",
-        poles=poles,
-    )
-
-
-def _pair(scene: EccentricScene, slower: float) -> _SampledLoop:
-    """The angle between the masses gets each drive's error. Args: `slower`: speed gain beside which a gain
-    is recommended."""
-    told, per_volt = scene.friction_filter, PlantParameters.of(scene).drive_gain
-
-    def poles(pair: float, speed: float, step: float) -> ComplexArray:
-        return _poles(scene, step, 2 * per_volt * pair, per_volt * speed, eased=True)
-
-    return _loop(
-        scene,
-        name="pair control",
-        key="friction_filter.pair_gain",
-        value=told.pair_gain,
-        unit="V/rad",
-        poles=lambda pair, step, margin: poles(margin * pair, told.speed_gain, step),
-        beside=lambda pair, step, margin: poles(margin * pair, slower, step),
-        whole=lambda pair, step, margin: poles(margin * pair, margin * told.speed_gain, step),
-        start=told.pair_gain or slower,
-    )
-
-
-_Poles = Callable[[float, float, float], ComplexArray]
-"""Of the key's value, the hold, s, and a factor on the loop's gain."""
 
 
 def _loop(
@@ -171,12 +161,16 @@ def _loop(
     value: float,
     unit: str,
     poles: _Poles,
-    beside: _Poles | None = None,
-    whole: _Poles | None = None,
+    value_poles: _Poles | None = None,
+    hold_poles: _Poles | None = None,
     start: float | None = None,
 ) -> _SampledLoop:
-    """Args: `beside`, `whole`: poles by which a value, and a hold, are recommended; default `poles`."""
-    step, at, held = scene.lqr.step, beside or poles, whole or poles
+    """Args: `value_poles`, `hold_poles`: poles that recommend a value, and a hold; default `poles`."""
+    step, value_poles, hold_poles = scene.lqr.step, value_poles or poles, hold_poles or poles
+
+    def hold_stable(hold: float) -> bool:
+        return _inside(hold_poles(value, hold, GAIN_MARGIN))
+
     return _SampledLoop(
         name=name,
         key=key,
@@ -184,40 +178,33 @@ def _loop(
         unit=unit,
         poles=poles(value, step, 1.0),
         gain_margin=_largest(lambda factor: _inside(poles(value, step, factor)), 1.0),
-        recommended=_largest(lambda other: _inside(at(other, step, GAIN_MARGIN)), start or value),
-        recommended_step=_step(scene, lambda hold: _inside(held(value, hold, GAIN_MARGIN))),
+        recommended=_largest(lambda other: _inside(value_poles(other, step, GAIN_MARGIN)), start or value),
+        recommended_step=step if hold_stable(step) else _largest(hold_stable, step),
     )
-
-
-def _drive_speed(scene: EccentricScene, gain: float) -> float:
-    """Where B_add gamma w is the friction's torque, with a margin."""
-    plant = PlantParameters.of(scene)
-    speed = scene.rotor.speed_profile[0].speed
-    friction = max(plant.friction_arm) * plant.moment * speed**2
-    return max(scene.friction_filter.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * gain))
 
 
 def _poles(
     scene: EccentricScene, step: float, position: float, rate: float, *, eased: bool = False
 ) -> ComplexArray:
-    """Largest first, of the angle between opposite masses, whose rotor gives way most: J (1 - 2 b^2/(M J)).
+    """Poles, largest first, of the angle between opposite masses, whose rotor gives way most.
 
-    `eased`: whether the drive law makes up for the rotor, which it does not while the imbalance is unknown.
+    Their inertia is J (1 - 2 b^2/(M J)). Args: `eased`: True if the drive law makes up for the rotor, which
+    it does not while the imbalance is unknown.
     """
     track, mass = track_model(scene), PlantParameters.of(scene).mass
     given_way = 2 * track.moment**2 / (mass * track.inertia)
     if eased:
         position, rate = (1 - given_way) * position, (1 - given_way) * rate - given_way * track.damping
     decay = track.damping / (track.inertia * (1 - given_way)) * step
-    kept = math.exp(-decay)
+    remaining = math.exp(-decay)
     # Mean of the rate, and of its integral, that a step of one unit of torque leaves.
     first = -math.expm1(-decay) / decay if decay > 0 else 1.0
-    second = (1 - first) / decay if decay > _SMALL else 0.5 - decay / 6
+    second = (1 - first) / decay if decay > _SMALL_DECAY else 0.5 - decay / 6
     per_torque = step / (track.inertia * (1 - given_way))
     if position == 0:
-        return np.array([kept - per_torque * first * rate], dtype=np.complex128)
-    trace = 1 - per_torque * step * second * position + kept - per_torque * first * rate
-    product = (1 - per_torque * step * second * position) * (kept - per_torque * first * rate)
+        return np.array([remaining - per_torque * first * rate], dtype=np.complex128)
+    trace = 1 - per_torque * step * second * position + remaining - per_torque * first * rate
+    product = (1 - per_torque * step * second * position) * (remaining - per_torque * first * rate)
     product += per_torque * first * position * step * (first - per_torque * second * rate)
     root = cmath.sqrt(0.25 * trace**2 - product)
     far = 0.5 * trace + (root if trace * root.real >= 0 else -root)
@@ -225,21 +212,18 @@ def _poles(
 
 
 def _inside(poles: ComplexArray) -> bool:
+    """Return True if all poles lie within the unit circle."""
     return bool(np.max(np.abs(poles)) < 1)
-
-
-def _step(scene: EccentricScene, stable: Callable[[float], bool]) -> float:
-    return scene.lqr.step if stable(scene.lqr.step) else _largest(stable, scene.lqr.step)
 
 
 def _largest(stable: Callable[[float], bool], start: float) -> float:
     """Largest value that is stable, in case all smaller ones are as well.
 
-    Doubled or halved from `start` up to the limit, and bisected there: far below it a slow pole rounds to
-    one, and a search among such values would end anywhere.
+    Doubled or halved from `start` up to the limit, and bisected from then on: far below it a slow pole rounds
+    to one, and a search among such values would end anywhere.
     """
     low, factor = start, 2.0 if stable(start) else 0.5
-    while start / _FARTHEST < low < start * _FARTHEST and stable(factor * low) == (factor > 1):
+    while start / _SEARCH_FACTOR < low < start * _SEARCH_FACTOR and stable(factor * low) == (factor > 1):
         low *= factor
     low, high = (low, 2 * low) if factor > 1 else (0.5 * low, low)
     for _ in range(_HALVINGS):
@@ -249,7 +233,7 @@ def _largest(stable: Callable[[float], bool], start: float) -> float:
 
 
 def loops_status(gains: RecommendedGains) -> str:
-    """Whether every loop has its margin, and what to change."""
+    """Sentence on the margins of the loops, and on the change that gives them."""
     unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
     high = [loop for loop in gains.loops if loop.value > loop.recommended]
     if not unstable and not high:
@@ -261,7 +245,7 @@ def loops_status(gains: RecommendedGains) -> str:
 
 
 def loops_document(gains: RecommendedGains) -> dict[str, Any]:
-    """For JSON, SI."""
+    """Turn the loops into plain numbers for JSON, SI."""
     return {
         "loops_status": loops_status(gains),
         "gain": {loop.key: loop.recommended for loop in gains.loops},

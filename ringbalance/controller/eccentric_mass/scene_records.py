@@ -123,6 +123,11 @@ class EccentricMasses:
         UNCERTAIN,
     ]
 
+    @property
+    def gap(self) -> float:
+        """Angle that one mass takes up on the track, rad."""
+        return self.arc_length / self.guide_radius
+
 
 @dataclass(frozen=True, kw_only=True)
 class Motor:
@@ -148,7 +153,7 @@ class Motor:
 
 @dataclass(frozen=True, kw_only=True)
 class EccentricSensor:
-    """What is measured, how well and how often."""
+    """Sensors of vibration and masses: frame, noise and step."""
 
     frame: Annotated[
         Frame, standard("rotor", "frame in which the sensors measure the rotor's position and velocity")
@@ -164,7 +169,7 @@ class EccentricSensor:
 
 @dataclass(frozen=True, kw_only=True)
 class EccentricRequirement:
-    """What the balancer is wanted for, and in which fraction of drawn devices; None: nothing is required."""
+    """Requirements of the balancer (None: not required), and the fraction of devices that must meet them."""
 
     settling_time: Annotated[
         PositiveTime | None,
@@ -193,7 +198,7 @@ class EccentricRequirement:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class EccentricScene(SceneFile):
-    """All that a run with two eccentric masses needs, in SI units.
+    """Scene of a run with two eccentric masses, in SI units.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
@@ -217,19 +222,19 @@ class EccentricScene(SceneFile):
 
     @property
     def samples(self) -> int:
-        """Of a run that does not diverge."""
+        """Number of samples of a run that does not diverge."""
         return round(self.run.time_limit / self.sensor.step) + 1
 
     @property
     def steady_until(self) -> float | None:
         """Time at which the speed first changes, s; None: it keeps its first value to the end of the run."""
         corners = pairwise(self.rotor.speed_profile)
-        changes = [here.time for here, after in corners if here.speed != after.speed]
+        changes = [corner.time for corner, after in corners if corner.speed != after.speed]
         return changes[0] if changes and 0 < changes[0] < self.run.time_limit else None
 
 
 def eccentric_scene(scene: SceneFile) -> EccentricScene:
-    """The same scene, when its balancer is two eccentric masses. Raises: SceneError: it has another."""
+    """Narrow a scene to one whose balancer is two eccentric masses. Raises: SceneError: it has another."""
     return scene_as(EccentricScene, scene)
 
 
@@ -254,24 +259,24 @@ ECCENTRIC_MASS = Schema.of(
 """A scene whose balancer is two eccentric masses."""
 
 
-_ROUNDING = 1e-9
+_ROUNDING_FRACTION = 1e-9
 
 
 def _imbalance_in_rotor(imbalance: float, rotor: float) -> Contradiction | None:
     """m_im <= m_r, since the imbalance is a part of the rotor."""
     if imbalance <= rotor:
         return None
-    whole = written(rotor, "kg")
+    limit = written(rotor, "kg")
     return Contradiction(
-        problem=f"the imbalance is a part of the rotor's mass ({whole}), so it cannot be heavier",
-        allowed=f"at least 0 kg and at most {whole}",
+        problem=f"the imbalance is a part of the rotor's mass ({limit}), so it cannot be heavier",
+        allowed=f"at least 0 kg and at most {limit}",
     )
 
 
 def _masses_fit_track(arc: float, radius: float) -> Contradiction | None:
     """Both masses fit on the track: l <= pi r_b."""
     limit = math.pi * radius
-    if arc <= limit * (1 + _ROUNDING):
+    if arc <= limit * (1 + _ROUNDING_FRACTION):
         return None
     return Contradiction(
         problem="two masses of this length do not fit on the track",
@@ -282,7 +287,7 @@ def _masses_fit_track(arc: float, radius: float) -> Contradiction | None:
 def _masses_apart(angles: tuple[float, float], arc: float, radius: float) -> Contradiction | None:
     """The masses do not overlap at the start: |phi_1 - phi_2| >= l / r_b around the circle."""
     apart, least = abs(math.remainder(angles[0] - angles[1], 2 * math.pi)), arc / radius
-    if apart >= least * (1 - _ROUNDING):
+    if apart >= least * (1 - _ROUNDING_FRACTION):
         return None
     width = written(least, "deg")
     return Contradiction(
@@ -296,10 +301,10 @@ def _profile_in_order(profile: tuple[SpeedPoint, ...]) -> Contradiction | None:
     allowed = "at least one { time, speed }, in order of time, each time once"
     if not profile:
         return Contradiction(problem="it has no entry", allowed=allowed)
-    for place, (before, after) in enumerate(pairwise(profile), start=2):
+    for number, (before, after) in enumerate(pairwise(profile), start=2):
         if after.time <= before.time:
             late, early = written(after.time, "s"), written(before.time, "s")
-            problem = f"entry {place} ({late}) does not come after the one before ({early})"
+            problem = f"entry {number} ({late}) does not come after the one before ({early})"
             return Contradiction(problem=problem, allowed=allowed)
     return None
 
@@ -327,7 +332,7 @@ def _moves_in_order(stop: float, step: float) -> Contradiction | None:
 
 
 def _widths_below(names: tuple[str, ...]) -> Rule:
-    """No stated uncertainty is larger than its quantity, of those whose values follow the widths."""
+    """Rule: no stated uncertainty is larger than its quantity, of those whose values follow the widths."""
 
     def below(
         widths: Mapping[str, tuple[float, bool]], *values: float | tuple[float, float]

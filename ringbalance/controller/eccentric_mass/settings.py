@@ -1,4 +1,4 @@
-"""What the strategy is given, and how it follows from a scene."""
+"""Constants of the strategy, derived from a scene."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.control_records import Supervisor
 from ringbalance.controller.eccentric_mass.drive_law import (
-    SLOWEST_RATE,
-    SMOOTHING_TIME,
+    SLOWEST_RATE_RAD_S,
+    SMOOTHING_TIME_S,
     DriveLaw,
     Pair,
     believed_whirl,
@@ -25,27 +25,25 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.origins import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
-_DWELL_TIME = 0.2
-"""For which a mass must have arrived, s."""
-_DECAYS = 2.0
+_DWELL_TIME_S = 0.2
+_LEAST_DECAY_TIMES = 2.0
 """Decay times of the rotor that the imbalance is estimated for at least."""
-_LONGEST_ESTIMATE = 0.5
-"""Share of the estimation's time limit that this may take at most."""
-_NOTICEABLE = 0.25
-"""Share of the arrival angle."""
-_LEAST_DRIVE_TIME = 1.0
-"""Of the friction stage, s: long against the drive's own time constants."""
-_LONGEST_TRIAL_MOVE = 10.0
-"""s."""
-_CERTAIN = 5.0
+_LONGEST_ESTIMATE_FRACTION = 0.5
+"""Fraction of the estimation's time limit that these may take at most."""
+_NOTICEABLE_FRACTION = 0.25
+"""Noticeable travel over the arrival angle."""
+_LEAST_DRIVE_TIME_S = 1.0
+"""Shortest friction stage: long against the drive's own time constants."""
+_LONGEST_TRIAL_MOVE_S = 10.0
+_CERTAIN_SIGMA = 5.0
 """Standard deviations of a smoothed rate beyond which a mass moves."""
 _CONSTANTS = (
     *("motor.torque_constant", "motor.back_emf_constant", "motor.resistance"),
     *("masses.mass", "masses.guide_radius"),
 )
 """Inputs that a friction arm is as well known as."""
-_FRICTION_ERROR = 0.1
-"""Share of the arrival angle that unknown friction may hold a mass off."""
+_FRICTION_ERROR_FRACTION = 0.1
+"""Fraction of the arrival angle that unknown friction may hold a mass off."""
 
 
 class Gates(NamedTuple):
@@ -64,13 +62,17 @@ class Gates(NamedTuple):
     noticeable: float
     """Least angle by which masses that are not held come nearer within a second, rad."""
     dwell: float
-    """For which a mass must have arrived, s."""
+    """Time for which a mass must have arrived, s."""
     imbalance_gate: float
     """Relative standard deviation."""
     friction_gate: float
     """Relative standard deviation."""
     constants: tuple[float, float, float]
-    """Relative variances and covariance of B_add/b and C_add/b, see `_constants_covariance`."""
+    """Relative variance of B_add/b, covariance of it with C_add/b, and variance of that.
+
+    While the masses go round, B_add V = C_add w + mu b (W + w)^2 + load, and the rotor's load has the factor
+    b: a friction arm is as well known as these two, however little noise there is.
+    """
     friction_torque: float
     """Standard deviation of the friction torque that makes no difference to arrival, N m."""
     least_estimate: float
@@ -82,11 +84,11 @@ class Gates(NamedTuple):
     tuning_step: float
     tuning_stop: float
     tuning_near: float
-    """Closest that a mass is brought to a place, rad."""
+    """Closest that a mass is brought to its goal, rad."""
     wait: float
     average: float
     margin: float
-    """By which a trial or a correction must be better, m."""
+    """Amplitude by which a trial or a correction must be better, m."""
     move_time: float
     """Longest move of one trial, s."""
     moment: float
@@ -94,24 +96,32 @@ class Gates(NamedTuple):
     gap: float
     """Angle that one mass takes up, rad."""
     by_trials: bool
-    """Whether the masses are tuned by trials alone, as in the paper."""
+    """True if the masses are tuned by trials alone, as in the paper."""
 
     @classmethod
     def of(cls, scene: EccentricScene, law: DriveLaw) -> Gates:
-        """Limits of a scene."""
-        keys, tuning = scene.supervisor, scene.fine_tuning
+        """Derive the limits of a scene."""
+        keys, tuning, whirl = scene.supervisor, scene.fine_tuning, law.whirl
         averaged = max(tuning.average / scene.sensor.step, 1.0)
+        # Until the rotor's own transient, which hangs most on the assumed bearing, has died down.
+        least_estimate = _LONGEST_ESTIMATE_FRACTION * keys.imbalance_time
+        if whirl.damping > 0:
+            least_estimate = min(_LEAST_DECAY_TIMES * 2 * whirl.mass / whirl.damping, least_estimate)
+        constants, ratios = np.zeros((2, 2)), _drive_ratios(scene)
+        for plant in off_by_one(scene, _CONSTANTS):
+            change = np.divide(_drive_ratios(plant) - ratios, ratios, out=np.zeros(2), where=ratios > 0)
+            constants += np.outer(change, change)
         shared = [name for name in cls._fields if name in Supervisor.__dataclass_fields__]
         return cls(
             **{name: getattr(keys, name) for name in shared},
-            noticeable=max(_NOTICEABLE * keys.arrival_angle, 2 * law.near),
-            dwell=_DWELL_TIME,
+            noticeable=max(_NOTICEABLE_FRACTION * keys.arrival_angle, 2 * law.near),
+            dwell=_DWELL_TIME_S,
             imbalance_gate=scene.imbalance_filter.gate,
             friction_gate=scene.friction_filter.gate,
-            constants=_constants_covariance(scene),
-            friction_torque=_FRICTION_ERROR * law.position_gain * keys.arrival_angle,
-            least_estimate=_least_estimate(scene),
-            least_drive=_LEAST_DRIVE_TIME,
+            constants=(float(constants[0, 0]), float(constants[0, 1]), float(constants[1, 1])),
+            friction_torque=_FRICTION_ERROR_FRACTION * law.position_gain * keys.arrival_angle,
+            least_estimate=least_estimate,
+            least_drive=_LEAST_DRIVE_TIME_S,
             stall_rate=scene.friction_filter.stall_share * scene.friction_filter.drive_speed,
             tuning_step=tuning.step,
             tuning_stop=tuning.stop,
@@ -119,15 +129,15 @@ class Gates(NamedTuple):
             wait=tuning.wait,
             average=tuning.average,
             margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
-            move_time=_LONGEST_TRIAL_MOVE,
+            move_time=_LONGEST_TRIAL_MOVE_S,
             moment=law.track.moment,
-            gap=scene.masses.arc_length / scene.masses.guide_radius,
+            gap=scene.masses.gap,
             by_trials=keys.correction == "trials",
         )
 
 
 class _SensorSettings(NamedTuple):
-    """What the imbalance filter assumes of its sensors: standard deviations."""
+    """Standard deviations that the imbalance filter assumes of its sensors."""
 
     position: float
     velocity: float
@@ -136,17 +146,17 @@ class _SensorSettings(NamedTuple):
 
 
 class _FrictionSettings(NamedTuple):
-    """Of the friction filter and the drive meanwhile."""
+    """Constants of the friction filter and of the drive meanwhile."""
 
     start: Pair
     """Standard deviations of rate, rad/s, and arm, m, before the first sample."""
     noise: FrictionNoise
     track: TrackModel
-    """Whose inertia is less by b^2/M, as the rotor gives way."""
+    """A mass with its drive; the inertia is less by b^2/M, as the rotor gives way."""
     least_motion: float
     """Smoothed rate below which a mass teaches the filter nothing."""
     euler: bool
-    """The paper's transition in place of the exponential one."""
+    """True for the paper's transition in place of the exponential one."""
     every: int
     """Samples between two steps."""
     drive_speed: float
@@ -162,12 +172,12 @@ class _FrictionSettings(NamedTuple):
         inertia = track.inertia - given_way
         # The other mass's acceleration is a difference of two measured rates.
         noise = keys.rate_noise**2 * (1 + 2 * (given_way / inertia) ** 2)
-        smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * SMOOTHING_TIME))
+        smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * SMOOTHING_TIME_S))
         return cls(
             start=(keys.initial_rate, keys.initial_friction),
             noise=FrictionNoise(noise, keys.rate_walk**2, keys.friction_walk**2),
             track=track._replace(inertia=inertia),
-            least_motion=max(_CERTAIN * smooth, SLOWEST_RATE),
+            least_motion=max(_CERTAIN_SIGMA * smooth, SLOWEST_RATE_RAD_S),
             euler=keys.discretisation == "euler",
             every=max(round(keys.step / sensor.step), 1),
             drive_speed=keys.drive_speed,
@@ -177,14 +187,14 @@ class _FrictionSettings(NamedTuple):
 
 
 class StrategySettings(NamedTuple):
-    """All that does not change."""
+    """Constants of the whole strategy."""
 
     step: float
     """Between samples, s."""
     laboratory: bool
-    """Whether the vibration is measured in the fixed frame."""
+    """True if the vibration is measured in the fixed frame."""
     smoothing: float
-    """Share of a new sample in the smoothed angles, rates and vibration."""
+    """Weight of a new sample in the smoothed angles, rates and vibration."""
     voltage_every: int
     """Samples for which a voltage is held."""
     law: DriveLaw
@@ -203,7 +213,7 @@ class StrategySettings(NamedTuple):
         return cls(
             step=sensor.step,
             laboratory=sensor.frame == "laboratory",
-            smoothing=-math.expm1(-sensor.step / SMOOTHING_TIME),
+            smoothing=-math.expm1(-sensor.step / SMOOTHING_TIME_S),
             voltage_every=max(round(scene.lqr.step / sensor.step), 1),
             law=law,
             gates=Gates.of(scene, law),
@@ -220,7 +230,7 @@ class StrategySettings(NamedTuple):
 
 
 def filter_settings(scene: EccentricScene) -> FilterSettings:
-    """Of the imbalance filter."""
+    """Derive the constants of the imbalance filter."""
     keys = scene.imbalance_filter
     return FilterSettings(
         model=believed_whirl(scene),
@@ -233,13 +243,6 @@ def filter_settings(scene: EccentricScene) -> FilterSettings:
     )
 
 
-def _least_estimate(scene: EccentricScene) -> float:
-    """Until the rotor's own transient, which hangs most on the assumed bearing, has died down."""
-    whirl = believed_whirl(scene)
-    longest = _LONGEST_ESTIMATE * scene.supervisor.imbalance_time
-    return min(_DECAYS * 2 * whirl.mass / whirl.damping, longest) if whirl.damping > 0 else longest
-
-
 def off_by_one(scene: EccentricScene, inputs: Collection[str]) -> Iterator[EccentricScene]:
     """Yield the scene with each of these inputs, if stated uncertain, one standard deviation off."""
     for each in scene.uncertainty:
@@ -248,20 +251,7 @@ def off_by_one(scene: EccentricScene, inputs: Collection[str]) -> Iterator[Eccen
             yield with_values_at(scene, {each.quantity: value + each.absolute(value) / NORMAL_95})
 
 
-def _constants_covariance(scene: EccentricScene) -> tuple[float, float, float]:
-    """Relative variance of B_add/b, covariance of it with C_add/b, and variance of that, by what is stated of
-    motor and masses.
-
-    While the masses go round, B_add V = C_add w + mu b (W + w)^2 + load, and the rotor's load has the factor
-    b: a friction arm is as well known as these two, however little noise there is.
-    """
-
-    def ratios(plant: EccentricScene) -> FloatArray:
-        constants = PlantParameters.of(plant)
-        return np.array([constants.drive_gain, constants.drive_damping]) / constants.moment
-
-    middle, found = ratios(scene), np.zeros((2, 2))
-    for plant in off_by_one(scene, _CONSTANTS):
-        change = np.divide(ratios(plant) - middle, middle, out=np.zeros(2), where=middle > 0)
-        found += np.outer(change, change)
-    return float(found[0, 0]), float(found[0, 1]), float(found[1, 1])
+def _drive_ratios(plant: EccentricScene) -> FloatArray:
+    """B_add/b and C_add/b."""
+    constants = PlantParameters.of(plant)
+    return np.array([constants.drive_gain, constants.drive_damping]) / constants.moment

@@ -1,4 +1,4 @@
-"""The order of the stages: estimate, drive round, go, look, correct, rest; and when each is left.
+"""Stages of the strategy, from the estimation of the imbalance to rest, and when each ends.
 
 Every function changes an element of type `MEMORY`; `Motion` is the sample that it is decided on.
 """
@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, Motion, friction_needed
+from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, Motion, rotor_load
 from ringbalance.controller.eccentric_mass.imbalance_filter import mass_vector
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
@@ -47,7 +47,6 @@ from ringbalance.controller.eccentric_mass.targets import (
     assign,
     begin_correction,
     begin_tuning,
-    correction_ends,
     judge_correction,
     next_trial,
     separation,
@@ -58,16 +57,16 @@ from ringbalance.controller.eccentric_mass.targets import (
 from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
-_HOLDS_FOR_SURE: Final = 0.7
-"""Share of the friction known to be there beyond which the drives do not stay off."""
-_HOLDS_AGAIN: Final = 0.5
-"""The same, below which drives that hold are switched off again."""
+_DRIVES_ON_LOAD: Final = 0.7
+"""Fraction of the friction that is certain beyond which the drives hold the masses."""
+_DRIVES_OFF_LOAD: Final = 0.5
+"""Fraction of the friction that is certain below which drives that hold are switched off again."""
 STALLED_SHARE: Final = 0.5
-"""Of the friction stage, beyond which its failure is blamed on the drive."""
-_STILL_TIME: Final = 1.0
-"""For which masses must have come no nearer to their goal to count as held by friction, s."""
-_STEADY: Final = 1e-6
-"""Speed rate that counts as none, rad/s^2."""
+"""Fraction of the friction stage with a stalled mass beyond which its failure is blamed on the drive."""
+_STILL_TIME_S: Final = 1.0
+"""Time for which masses must have come no nearer to their goal to count as held by friction."""
+_STEADY_RAD_S2: Final = 1e-6
+"""Speed rate that counts as none."""
 
 
 @in_place
@@ -76,7 +75,7 @@ def supervise(
 ) -> None:
     """Decide what to do next.
 
-    Args: `visible`: whether the imbalance filter's model holds now.
+    Args: `visible`: True if the imbalance filter's model holds now.
     Source: Fig. 3 of the paper on eccentric masses, with gates on relative uncertainty and ways out.
     """
     if memory.stage == WAITING:
@@ -87,11 +86,22 @@ def supervise(
     elif memory.stage == FRICTION:
         _friction(gates, memory, motion, time)
     elif memory.stage == POSITIONING:
-        _positioning(gates, memory, time)
+        # Until the masses are at their targets, or friction holds them: the check shows what that leaves.
+        _watch_arrival(gates, memory, time, gates.arrival_angle)
+        if _arrived(gates, memory, time) or _held(gates, memory, time):
+            enter(memory, CHECK, time, NONE)
+        elif time - memory.entered >= gates.positioning_time:
+            _stay(memory, FAILED, time, NOT_ARRIVED)
+    elif memory.stage in (CHECK, CORRECTION) and not is_constant(motion):
+        within = abs(memory.residual) <= gates.limit
+        _rest_at(memory, memory.best_goal, time, BALANCED if within else SPEED_CHANGED)
     elif memory.stage == CHECK:
         _check(gates, law, memory, motion, time)
     elif memory.stage == CORRECTION:
-        _correction(gates, memory, motion, time)
+        # Until the masses are at the corrected targets, or where friction leaves them.
+        _watch_arrival(gates, memory, time, gates.tuning_near)
+        if _move_ended(gates, memory, time):
+            enter(memory, CHECK, time, NONE)
     elif memory.stage == FINE_TUNING:
         _fine_tuning(gates, law, memory, motion, time)
     else:
@@ -125,9 +135,9 @@ def _stay(memory: Record, stage: int, time: float, cause: int) -> None:
 
 
 @in_place
-def _return(memory: Record, place: Sequence[float], time: float, cause: int) -> None:
-    """Rest at a place."""
-    set_pair(memory.goal, place[0], place[1])
+def _rest_at(memory: Record, angles: Sequence[float], time: float, cause: int) -> None:
+    """Rest at these angles."""
+    set_pair(memory.goal, angles[0], angles[1])
     enter(memory, REST, time, cause)
 
 
@@ -140,8 +150,8 @@ def _influence_of(law: DriveLaw, speed: float) -> complex:
 
 @in_place
 def is_constant(motion: Motion) -> bool:
-    """Whether the speed is."""
-    return abs(motion.speed_rate) < _STEADY
+    """Return True if the rotor's speed is constant."""
+    return abs(motion.speed_rate) < _STEADY_RAD_S2
 
 
 @in_place
@@ -149,10 +159,10 @@ def _imbalance(
     gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float, visible: bool
 ) -> None:
     """Until the imbalance is known relative to itself, or so well that it makes no difference."""
-    known = memory.deviation <= gates.imbalance_gate * abs(memory.imbalance)
-    settled = 2 * memory.deviation * abs(_influence_of(law, motion.speed)) <= 0.1 * gates.limit
+    precise = memory.deviation <= gates.imbalance_gate * abs(memory.imbalance)
+    little = 2 * memory.deviation * abs(_influence_of(law, motion.speed)) <= 0.1 * gates.limit
     elapsed = time - memory.entered
-    if visible and (known or settled) and elapsed >= gates.least_estimate:
+    if visible and (precise or little) and elapsed >= gates.least_estimate:
         _stay(memory, FRICTION, time, NONE)
     elif elapsed >= gates.imbalance_time:
         cause = IMBALANCE_UNCERTAIN
@@ -168,20 +178,26 @@ def _imbalance(
 @in_place
 def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
     """Until both friction arms are known relative to themselves, or so well that it makes no difference."""
-    elapsed, known = time - memory.entered, True
+    elapsed, precise = time - memory.entered, True
     # Once the drives have had a moment to get going.
     if elapsed >= 0.5 * gates.least_drive:
         memory.driven += 1
         memory.stalled += 1 if min(abs(memory.rate[0]), abs(memory.rate[1])) < gates.stall_rate else 0
     for i in range(2):
-        arm, deviation = memory.friction[i].arm, arm_noise(memory, i)
-        memory.arm_doubt[i] = _doubt_of(gates, memory, motion.speed + memory.rate[i], elapsed, i)
+        arm, deviation, turning = memory.friction[i].arm, arm_noise(memory, i), motion.speed + memory.rate[i]
+        # Deviation that the constants give an arm (T - C w)/(b (W + w)^2) less the rotor's load.
+        memory.arm_doubt[i] = 0.0
+        if elapsed > 0 and turning != 0:
+            motor, back = memory.motor[i] / elapsed, memory.back_emf[i] / elapsed
+            of_motor, of_both, of_back = gates.constants
+            variance = motor * motor * of_motor - 2 * motor * back * of_both + back * back * of_back
+            memory.arm_doubt[i] = math.sqrt(max(variance, 0.0)) / (gates.moment * turning * turning)
         relative = deviation <= gates.friction_gate * arm
         # Friction does not drive: an arm well below zero contradicts the filter's model.
         possible = arm >= -2 * arm_deviation(memory, i)
         little = deviation * gates.moment * motion.speed**2 <= gates.friction_torque
-        known = known and possible and (relative or little)
-    if known and elapsed >= gates.least_drive:
+        precise = precise and possible and (relative or little)
+    if precise and elapsed >= gates.least_drive:
         (first, second), memory.saturated, memory.left = _goal(gates, memory.angle, memory.imbalance)
         set_pair(memory.goal, first, second)
         begin_correction(memory)
@@ -199,52 +215,25 @@ def arm_noise(memory: Record, mass: int) -> float:
 
 @in_place
 def arm_deviation(memory: Record, mass: int) -> float:
-    """The same by noise and by the constants of motor and masses, m."""
+    """Standard deviation of a friction arm by noise and by the constants of motor and masses, m."""
     return math.hypot(arm_noise(memory, mass), memory.arm_doubt[mass])
 
 
 @in_place
-def _doubt_of(gates: Gates, memory: Record, speed: float, elapsed: float, mass: int) -> float:
-    """Standard deviation that the constants give an arm (T - C w)/(b (W + w)^2) less the rotor's load, m.
-
-    Args: `speed`: W + w, rad/s. `elapsed`: of the stage, s.
-    """
-    if elapsed <= 0 or speed == 0:
-        return 0.0
-    motor, back = memory.motor[mass] / elapsed, memory.back_emf[mass] / elapsed
-    of_motor, of_both, of_back = gates.constants
-    variance = motor * motor * of_motor - 2 * motor * back * of_both + back * back * of_back
-    return math.sqrt(max(variance, 0.0)) / (gates.moment * speed * speed)
-
-
-@in_place
 def _goal(gates: Gates, angle: Sequence[float], imbalance: complex) -> tuple[Pair, int, float]:
-    """Targets for an imbalance, and who goes where from these angles.
+    """Targets for an imbalance, each mass going from its angle to the one that `assign` gives it.
 
-    Returns: Goal, whether it is saturated, and the imbalance that it leaves, kg m.
+    Returns: Goal, 1 if it is saturated, and the imbalance that it leaves, kg m.
     """
     targets = target_angles(abs(imbalance), cmath.phase(imbalance), gates.moment, gates.gap)
-    one, two = assign(angle[0], angle[1], targets.first, targets.second)
-    goal = (angle[0] + one + gates.target_error[0], angle[1] + two + gates.target_error[1])
+    first, second = assign(angle[0], angle[1], targets.first, targets.second)
+    goal = (angle[0] + first + gates.target_error[0], angle[1] + second + gates.target_error[1])
     return goal, 1 if targets.saturated else 0, targets.residual
-
-
-@in_place
-def _positioning(gates: Gates, memory: Record, time: float) -> None:
-    """Until the masses are at their targets, or friction holds them: the check tells what that leaves."""
-    _watch_arrival(gates, memory, time, gates.arrival_angle)
-    if _there(gates, memory, time) or _held(gates, memory, time):
-        enter(memory, CHECK, time, NONE)
-    elif time - memory.entered >= gates.positioning_time:
-        _stay(memory, FAILED, time, NOT_ARRIVED)
 
 
 @in_place
 def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
     """Average the vibration once the masses are left to friction, and correct the targets by it."""
-    if not is_constant(motion):
-        _cut_short(gates, memory, time)
-        return
     _rest(gates, law, memory, motion, time)
     if memory.hold == MOVING:
         return
@@ -259,44 +248,53 @@ def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: fl
 
 @in_place
 def _learn(law: DriveLaw, memory: Record, mean: complex, influence: complex) -> None:
-    """Stay here, with the imbalance that the mean vibration shows, U = z/alpha - p, for the drives to go by.
+    """Stay, and let the drives go by the imbalance that the mean vibration shows, U = z/alpha - p.
 
     While the masses go from place to place an error of the filter's estimate holds them off all goals alike.
     """
     set_pair(memory.goal, memory.angle[0], memory.angle[1])
     if influence != 0:
-        place, _ = mass_vector(law.track.moment, (memory.angle[0], memory.angle[1]), (0.0, 0.0))
-        memory.imbalance = mean / influence - place
+        vector, _ = mass_vector(law.track.moment, (memory.angle[0], memory.angle[1]), (0.0, 0.0))
+        memory.imbalance = mean / influence - vector
 
 
 @in_place
 def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, time: float) -> None:
-    """Go on to better targets while that helps, back to the best place, or on to what comes after."""
-    judge_correction(memory, mean, gates.margin, memory.short > gates.tuning_near)
+    """Go on to better targets while that helps, back to the best ones, or on to what comes after."""
+    done = judge_correction(memory, mean, gates.margin, memory.short > gates.tuning_near)
     memory.objective = abs(memory.residual)
     far = memory.short > gates.arrival_angle
-    enough = far and abs(mean) <= gates.limit
-    over = enough or gates.by_trials or influence == 0 or correction_ends(memory, gates.margin)
-    if not over and _step(gates, memory, influence, far):
+    within = far and abs(mean) <= gates.limit
+    done = done or within or gates.by_trials or influence == 0
+    if not done and _aim_better(gates, memory, influence, far):
         enter(memory, CORRECTION, time, NONE)
-    elif memory.residual != mean and not enough:
-        # Where the next mean is the last.
+    elif memory.residual != mean and not within:
+        # Back to the best targets, where the next mean is the last.
         aim_back(memory)
         memory.share = 0.0
         set_pair(memory.goal, memory.aimed[0], memory.aimed[1])
         enter(memory, CORRECTION, time, NONE)
     else:
-        memory.objective = abs(mean)
-        _decide(gates, memory, time)
+        # Content with these targets, or what is left to do from them.
+        memory.objective, hold = abs(mean), memory.hold
+        if memory.objective <= gates.limit or memory.saturated:
+            enter(memory, REST, time, BALANCED if memory.objective <= gates.limit else SATURATED)
+            memory.hold = hold
+        elif far:
+            _stay(memory, FAILED, time, NOT_ARRIVED)
+        else:
+            enter(memory, FINE_TUNING, time, NONE)
+            begin_tuning(memory, gates.tuning_step)
+            _try(gates, memory, time)
 
 
 @in_place
-def _step(gates: Gates, memory: Record, influence: complex, far: bool) -> bool:
-    """Aim at the targets for what the best place leaves. Returns: whether they are others."""
+def _aim_better(gates: Gates, memory: Record, influence: complex, far: bool) -> bool:
+    """Aim at the targets for what the best ones leave. Returns: True if they are others."""
+    best, error = memory.best_goal, gates.target_error
     aim = memory.corrected + memory.share * memory.residual / influence
-    place = (memory.place[0] - gates.target_error[0], memory.place[1] - gates.target_error[1])
-    (first, second), saturated, left = _goal(gates, place, aim)
-    if max(abs(first - memory.place[0]), abs(second - memory.place[1])) <= gates.tuning_near:
+    (first, second), saturated, left = _goal(gates, (best[0] - error[0], best[1] - error[1]), aim)
+    if max(abs(first - best[0]), abs(second - best[1])) <= gates.tuning_near:
         return False
     # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
     if not far:
@@ -308,48 +306,15 @@ def _step(gates: Gates, memory: Record, influence: complex, far: bool) -> bool:
 
 
 @in_place
-def _decide(gates: Gates, memory: Record, time: float) -> None:
-    """After the last correction: content with this place, or what is left to do from here."""
-    hold = memory.hold
-    if memory.objective <= gates.limit or memory.saturated:
-        enter(memory, REST, time, BALANCED if memory.objective <= gates.limit else SATURATED)
-        memory.hold = hold
-    elif memory.short > gates.arrival_angle:
-        _stay(memory, FAILED, time, NOT_ARRIVED)
-    else:
-        enter(memory, FINE_TUNING, time, NONE)
-        begin_tuning(memory, gates.tuning_step)
-        _try(gates, memory, time)
-
-
-@in_place
-def _cut_short(gates: Gates, memory: Record, time: float) -> None:
-    """The speed has changed during a check or a correction: the best place so far is kept."""
-    content = abs(memory.residual) <= gates.limit
-    _return(memory, memory.place, time, BALANCED if content else SPEED_CHANGED)
-
-
-@in_place
-def _correction(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
-    """Until the masses are at the corrected targets, or where friction leaves them."""
-    if not is_constant(motion):
-        _cut_short(gates, memory, time)
-        return
-    _watch_arrival(gates, memory, time, gates.tuning_near)
-    if _over(gates, memory, time):
-        enter(memory, CHECK, time, NONE)
-
-
-@in_place
 def _fine_tuning(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
-    """A trial counts from where friction leaves the masses, even if not quite where they should be."""
+    """Judge each trial from where friction leaves the masses, even if not quite where they should be."""
     if not is_constant(motion):
-        _return(memory, memory.base, time, SPEED_CHANGED)
+        _rest_at(memory, memory.base, time, SPEED_CHANGED)
     elif time - memory.entered >= gates.fine_tuning_time:
-        _return(memory, memory.base, time, TUNING_TIME)
+        _rest_at(memory, memory.base, time, TUNING_TIME)
     elif memory.averaging == NOT_YET:
         _watch_arrival(gates, memory, time, max(0.1 * memory.move_size, gates.tuning_near))
-        if _over(gates, memory, time):
+        if _move_ended(gates, memory, time):
             _average_from(memory, time + gates.wait)
     elif _averaged(gates, memory, motion, time):
         mean = memory.total / memory.averaged
@@ -370,7 +335,7 @@ def _try(gates: Gates, memory: Record, time: float) -> None:
         next_trial(memory, math.inf, gates.margin, gates.tuning_stop)
         first, second = tuning_place(memory)
     if memory.done:
-        _return(memory, memory.base, time, RESIDUAL)
+        _rest_at(memory, memory.base, time, RESIDUAL)
     else:
         set_pair(memory.goal, first, second)
         _set_out(memory, time)
@@ -380,28 +345,26 @@ def _try(gates: Gates, memory: Record, time: float) -> None:
 def _rest(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
     """Bring the masses home; then the drives rest while friction surely holds, and hold while it does not."""
     _watch_arrival(gates, memory, time, gates.tuning_near)
-    if memory.hold == MOVING and _over(gates, memory, time):
+    if memory.hold == MOVING and _move_ended(gates, memory, time):
         memory.hold, memory.short = RELEASED, _distance(memory)
-        # Where friction has the masses is their place from now on, if that is far short of their goal.
+        # Where friction has the masses is their goal from now on, if that is far short of the present one.
         if memory.short > gates.arrival_angle:
             set_pair(memory.goal, memory.angle[0], memory.angle[1])
     if memory.hold == MOVING:
         return
-    astray, load = _distance(memory) > 2 * gates.arrival_angle, _holding_load(law, memory, motion)
-    if astray or load > _HOLDS_FOR_SURE:
-        memory.hold = HELD
-    elif load < _HOLDS_AGAIN and (_there(gates, memory, time) or _held(gates, memory, time)):
-        memory.hold = RELEASED
-
-
-@in_place
-def _holding_load(law: DriveLaw, memory: Record, motion: Motion) -> float:
-    """Largest share of what friction holds for sure that holding takes; infinite when it holds nothing."""
-    first = max(memory.friction[0].arm - 2 * arm_deviation(memory, 0), 0.0)
-    second = max(memory.friction[1].arm - 2 * arm_deviation(memory, 1), 0.0)
+    # Largest fraction of the friction that is certain which holding the masses takes.
+    load = 0.0
     angle = (memory.angle[0], memory.angle[1])
     quiet = Motion(motion.speed, motion.speed_rate, memory.position, memory.velocity, angle, (0.0, 0.0))
-    return friction_needed(law, quiet, memory.imbalance, (first, second))
+    torque = rotor_load(law, quiet, memory.imbalance, (0.0, 0.0))
+    for i in range(2):
+        least_arm = max(memory.friction[i].arm - 2 * arm_deviation(memory, i), 0.0)
+        most = least_arm * law.track.moment * motion.speed * motion.speed
+        load = max(load, abs(torque[i]) / most if most > 0 else math.inf)
+    if _distance(memory) > 2 * gates.arrival_angle or load > _DRIVES_ON_LOAD:
+        memory.hold = HELD
+    elif load < _DRIVES_OFF_LOAD and (_arrived(gates, memory, time) or _held(gates, memory, time)):
+        memory.hold = RELEASED
 
 
 @in_place
@@ -417,36 +380,36 @@ def _watch_arrival(gates: Gates, memory: Record, time: float, closeness: float) 
 
 
 @in_place
-def _there(gates: Gates, memory: Record, time: float) -> bool:
+def _arrived(gates: Gates, memory: Record, time: float) -> bool:
     return bool(memory.arrived != NOT_YET and time - memory.arrived >= gates.dwell)
 
 
 @in_place
 def _held(gates: Gates, memory: Record, time: float) -> bool:
-    """Whether friction holds the masses: slow, and for a while no nearer to their goal."""
+    """Return True if friction holds the masses: slow, and for a while no nearer to their goal."""
     slow = max(abs(memory.rate[0]), abs(memory.rate[1])) <= gates.arrival_rate
-    return bool(slow and time - memory.nearer >= _STILL_TIME)
+    return bool(slow and time - memory.nearer >= _STILL_TIME_S)
 
 
 @in_place
-def _over(gates: Gates, memory: Record, time: float) -> bool:
-    """Whether a move has come to its end, at its goal or short of it."""
+def _move_ended(gates: Gates, memory: Record, time: float) -> bool:
+    """Return True if a move has come to its end, at its goal or short of it."""
     late = time - memory.moving >= gates.move_time
-    return late or _there(gates, memory, time) or _held(gates, memory, time)
+    return late or _arrived(gates, memory, time) or _held(gates, memory, time)
 
 
 @in_place
 def _distance(memory: Record) -> float:
-    """Of the mass farther from its goal, rad."""
+    """Distance of the mass farther from its goal, rad."""
     first, second = memory.angle[0] - memory.goal[0], memory.angle[1] - memory.goal[1]
     return float(max(abs(first), abs(second)))
 
 
 @in_place
 def _averaged(gates: Gates, memory: Record, motion: Motion, time: float) -> bool:
-    """Take a sample into the mean, and say whether that is long enough.
+    """Take a sample into the mean, and return True if that is long enough.
 
-    It is of the rotor-fixed vector: noise averages out of that, but not out of amplitudes.
+    The mean is of the rotor-fixed vector: noise averages out of that, but not out of amplitudes.
     """
     if time >= memory.averaging:
         memory.total += motion.position

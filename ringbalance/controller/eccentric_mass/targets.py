@@ -1,4 +1,4 @@
-"""Where the two masses should lie, which of them goes where, and the search by trial for a better place.
+"""Targets of the two masses, who goes to which, their correction, and the search by trial for a better place.
 
 Angles are rotor-fixed, positive with the rotation.  The masses share one circular track and cannot pass each
 other; `gap` is the angle that one of them takes up, arc length over guide radius.
@@ -34,16 +34,16 @@ class Targets(NamedTuple):
     second: float
     """phi_m - half_angle, rad within (-pi, pi]."""
     half_angle: float
-    """Of each mass from the imbalance, rad."""
+    """Angle of each mass from the imbalance, rad."""
     residual: float
     """Imbalance that is left, kg m."""
     saturated: bool
-    """Whether the imbalance is more than the masses can undo, which takes them side by side."""
+    """True if the imbalance is more than the masses can undo, which takes them side by side."""
 
 
 @in_place
 def wrapped(angle: float) -> float:
-    """An angle within (-pi, pi]. Returns: The same direction, rad."""
+    """Angle of this direction within (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2 * math.pi)
 
 
@@ -97,7 +97,7 @@ MOVES = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 
 @in_place
 def begin_tuning(memory: Record, step: float) -> None:
-    """Search by trial from the present goal. Args: `memory`: of type `MEMORY`. `step`: first move, rad."""
+    """Begin the search by trial from the present goal. Args: `step`: first move, rad."""
     set_pair(memory.base, memory.goal[0], memory.goal[1])
     memory.least, memory.move_size = memory.objective, step
     memory.move, memory.failed, memory.done = 0, 0, 0
@@ -105,17 +105,17 @@ def begin_tuning(memory: Record, step: float) -> None:
 
 @in_place
 def tuning_place(memory: Record) -> Pair:
-    """Angles of both masses to go to now, rad; the best place when the search is done."""
+    """Angles of both masses to go to now, rad; the best ones when the search is done."""
     step = 0.0 if memory.done else memory.move_size
-    one, two = MOVES[memory.move]
-    return memory.base[0] + step * one, memory.base[1] + step * two
+    first, second = MOVES[memory.move]
+    return memory.base[0] + step * first, memory.base[1] + step * second
 
 
 @in_place
 def next_trial(memory: Record, objective: float, margin: float, stop: float) -> None:
-    """Take in what the present trial gave; a move that helped is tried again first.
+    """Take in the result of the present trial; a move that helped is tried again first.
 
-    Args: `objective`: at the place of the trial, m; infinite for one that cannot be taken up.
+    Args: `objective`: mean amplitude of the trial, m; infinite where the masses cannot lie.
     Source: section 3.6 of the paper on eccentric masses, with staying compared and the moves halved.
     """
     if objective < memory.least - margin:
@@ -135,53 +135,48 @@ def separation(first: float, second: float) -> float:
     return abs(math.pi - (math.pi - second + first) % (2 * math.pi))
 
 
-MOST_STEPS: Final = 8
-"""Of one run."""
-_LEAST_SHARE: Final = 0.25
-"""Of a whole step, which a step that does not help is halved down to."""
-_WORTH: Final = 2.0
-"""Times the margin of a mean, which a vibration must exceed for a step to show a gain."""
+MAX_CORRECTION_STEPS: Final = 8
+_LEAST_STEP_FRACTION: Final = 0.25
+"""Fraction of the full step down to which a step that does not help is halved."""
+_SHOWN_MARGINS: Final = 2.0
+"""Margins of a mean that a vibration must exceed for a step to show a gain."""
 
 
 @in_place
 def begin_correction(memory: Record) -> None:
-    """The masses go to the first targets, for the imbalance as estimated; there is no mean yet."""
+    """Begin with the first targets, for the imbalance as estimated; there is no mean yet."""
     memory.residual, memory.share, memory.steps = complex(math.inf, 0.0), 1.0, 0
     memory.corrected, memory.aim = memory.imbalance, memory.imbalance
-    set_pair(memory.place, memory.goal[0], memory.goal[1])
+    set_pair(memory.best_goal, memory.goal[0], memory.goal[1])
     set_pair(memory.aimed, memory.goal[0], memory.goal[1])
 
 
 @in_place
-def judge_correction(memory: Record, residual: complex, margin: float, held: bool) -> None:
-    """Compare a mean vibration with that of staying at the best place so far, and keep the better place.
+def judge_correction(memory: Record, residual: complex, margin: float, held: bool) -> bool:
+    """Compare a mean vibration with that of the best goal so far, and keep the better goal.
 
-    A step that did not help is halved. Args: `held`: whether friction held a mass short of its goal. Where
+    A step that did not help is halved. Args: `held`: True if friction held a mass short of its goal. Where
     nothing got worse a further step adds to the goal, so that the mass breaks away.
+    Returns: True if no further step is worth its time.
     """
-    here, best = abs(residual), abs(memory.residual)
-    better = here < best - margin or memory.share == 0
+    amplitude, best = abs(residual), abs(memory.residual)
+    better = amplitude < best - margin or memory.share == 0
     if not better:
         memory.share *= 0.5
-    if better or (held and here <= best + margin):
+    if better or (held and amplitude <= best + margin):
         memory.residual, memory.corrected = residual, memory.aim
-        set_pair(memory.place, memory.aimed[0], memory.aimed[1])
+        set_pair(memory.best_goal, memory.aimed[0], memory.aimed[1])
     else:
         aim_back(memory)
+    shown = abs(memory.residual) > _SHOWN_MARGINS * margin
+    return bool(not shown or memory.share < _LEAST_STEP_FRACTION or memory.steps >= MAX_CORRECTION_STEPS)
 
 
 @in_place
 def aim_back(memory: Record) -> None:
-    """To the best place so far."""
+    """Aim at the best goal so far."""
     memory.aim = memory.corrected
-    set_pair(memory.aimed, memory.place[0], memory.place[1])
-
-
-@in_place
-def correction_ends(memory: Record, margin: float) -> bool:
-    """Whether no further step is worth its time."""
-    shown = abs(memory.residual) > _WORTH * margin
-    return bool(not shown or memory.share < _LEAST_SHARE or memory.steps >= MOST_STEPS)
+    set_pair(memory.aimed, memory.best_goal[0], memory.best_goal[1])
 
 
 @in_place
@@ -193,7 +188,6 @@ def set_pair(pair: FloatArray, first: float, second: float) -> None:
 def reach_of(scene: EccentricScene) -> float:
     """Largest imbalance that the masses cancel, kg m."""
     moment = PlantParameters.of(scene).moment
-    gap = scene.masses.arc_length / scene.masses.guide_radius
-    # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
+    # The part of an imbalance beyond all reach that the masses do not leave, side by side.
     beyond = 4 * moment
-    return beyond - target_angles(beyond, 0.0, moment, gap).residual
+    return beyond - target_angles(beyond, 0.0, moment, scene.masses.gap).residual

@@ -221,8 +221,8 @@ def consistent_motions(torques: _Torques) -> Iterator[tuple[int, int]]:
     for motion in product(ways, ways):
         a = angular_accelerations(torques, motion)
         needed = (
-            torques.driving[0] - torques.own * a[0] - torques.cross * a[1],
-            torques.driving[1] - torques.own * a[1] - torques.cross * a[0],
+            torques.driving[0] - torques.inertia * a[0] - torques.cross * a[1],
+            torques.driving[1] - torques.inertia * a[1] - torques.cross * a[0],
         )
         held = all(abs(needed[i]) <= most[i] for i in range(2) if motion[i] == HELD)
         if held and all(motion[i] * a[i] > 0 for i in range(2) if motion[i] != HELD):

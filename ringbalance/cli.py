@@ -82,6 +82,8 @@ def _build_app() -> App:
             "Begin with: ringbalance report my_disc.toml (README.md has a scene to copy, docs/ all pages)."
         ),
         version=ringbalance.__version__,
+        # Markdown would load a parser and a highlighter, half the time of `--help`.
+        help_format="plaintext",
         default_parameter=Parameter(negative=(), converter=_converted),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
@@ -106,17 +108,18 @@ def _shell_function(name: str, command: ShellCommand) -> Callable[..., int]:
         )
         return result
 
+    text = command.text.replace("`", "")
     hints: dict[str, Any] = {}
     parameters = []
     for key, option in command.options.items():
         documented = not option.text or f"    {key}: " in command.text
-        help_text = {} if documented else {"help": option.text}
+        help_text = {} if documented else {"help": option.text.replace("`", "")}
         hints[key] = Annotated[option.hint, Parameter(**{**option.parsing, **help_text})]
         several = option.kind is SignatureParameter.VAR_POSITIONAL
         default = SignatureParameter.empty if several else option.default
         parameters.append(SignatureParameter(key, option.kind, default=default, annotation=hints[key]))
     shape = Signature(parameters)
-    run.__signature__, run.__annotations__, run.__doc__ = shape, hints, command.text  # type: ignore[attr-defined]
+    run.__signature__, run.__annotations__, run.__doc__ = shape, hints, text  # type: ignore[attr-defined]
     return run
 
 

@@ -53,8 +53,8 @@ from ringbalance.results.rows import series
 from ringbalance.scene.describe import usual_name
 
 _UNSTATED: Final = (
-    "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
-    "± is known no better than the inputs."
+    "The scene states no uncertainty of its inputs, so ± does not include them; a value without ± is known "
+    "no better than the inputs."
 )
 _ANNEX: Final = "annex.html"
 DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(

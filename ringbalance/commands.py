@@ -156,37 +156,37 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         Args:
             csv: also write every instant of the run to this file, a column for each quantity with its unit.
             plot: also draw the run's figures on one sheet, an SVG file.
-            seed: of all random numbers, in place of the scene's.
+            seed: seed of all random numbers, in place of the scene's.
         """,
         _options("scene law json csv plot seed tolerance"),
         "SCENE --plot run.svg",
-        "the run did not settle, or misses what the scene requires",
+        "the run did not settle, or misses a requirement of the scene",
     ),
     "tune": ShellCommand(
         """Settings of the controller chosen by runs of drawn devices, and the fraction that they serve.
 
         Args:
-            pressure: search the gas pressure of a liquid ring even where the scene's meets what is required.
-            remedies: try valves that can be bought, too, for a scene that gives none. Default: where what is
-                required is not met, changes of the scene; --no-remedies tries nothing but settings.
+            pressure: search the gas pressure of a liquid ring even where the scene's meets the requirement.
+            remedies: also try commercial valves where the scene describes none. Default: changes of the scene
+                where the requirement is not met; --no-remedies tries settings only.
             save: write the scene with the recommended settings.
         """,
         _options("scene law json pressure remedies save tolerance"),
         "SCENE --save tuned.toml",
-        "what the scene requires is not met with the best settings, or it is undecided",
+        "the best settings miss a requirement of the scene, or it is undecided",
         begin="runs ...",
     ),
     "export": ShellCommand(
-        """The flow law for another program: C, FMI, structured text, a Python module, a table.
+        """Flow law, disc or controller for another program: C, FMI, structured text, Python, a table.
 
         Args:
             to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
-                text), python (a module that imports nothing of others), or csv (a grid).
+                text), python (a module without dependencies), or csv (a grid).
             block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
                 and the rotor's vibration), or controller (the scene's algorithm with its settings).
             out: folder for the files.
-            name: of files and functions; default that of the scene.
-            points: of each axis of the grid of csv, 2 to 1001; default 41.
+            name: name of files and functions; default that of the scene.
+            points: points on each axis of the grid of csv, 2 to 1001; default 41.
             all_systems: units with libraries for Linux, macOS and Windows; needs the extra export-all.
         """,
         _options("scene to block out name points all_systems"),
@@ -196,17 +196,17 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         """Many designs: a row of answers for every point of a grid or a sample.
 
         Args:
-            out: folder for table.csv, sweep.json, figures, and the answers that are kept.
+            out: folder for table.csv, sweep.json, figures, and the store from which a sweep resumes.
             vary: axes, such as tube.bore=0.5mm:2mm:30, gas.pressure=0.4MPa,0.7MPa or gas=valves.csv.
             plan: a TOML file with vary and sample instead.
             sample: sobol:N or latin:N points of the axes' ranges instead of every combination.
-            runs: drawn devices that every point is run as in closed loop at most, fewer where they decide; 0
-                for static answers alone.
-            no_intervals: leave out what the uncertain inputs do to static answers: most of their time.
-            check: rows of a liquid ring to calibrate, which measures what the array core leaves out.
-            no_figures: draw none.
-            write: rows whose scenes to write.
-            tolerance: in place of the scene's, such as "0.5 %" or 0.005: rows that err by more are named.
+            runs: largest number of simulated devices for each point, fewer where they decide; 0: static
+                answers alone.
+            no_intervals: no uncertainties of static answers, which take most of their time.
+            check: number of rows to calibrate in full, which measures the error of the fast answers.
+            no_figures: draw no figures.
+            write: numbers of rows whose scenes to write.
+            tolerance: in place of the scene's, such as "0.5 %" or 0.005; rows with a larger error are named.
         """,
         _options(
             "scene out vary plan sample runs no_intervals check workers no_figures write tolerance json",
@@ -215,15 +215,15 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         "SCENE --vary tube.bore=0.5mm:2mm:30 --out sweep",
     ),
     "design": ShellCommand(
-        """The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.
+        """The smallest disc, with bore, pressure, valve and settings, that meets the requirement of a scene.
 
         Args:
             scene: the scene file, with [requirement] and [design].
-            save: write the scene as designed, with its settings.
+            save: write the scene of the design, with its settings.
         """,
         _options("scene save workers json"),
         "SCENE --save designed.toml",
-        "no design meets what the scene requires, or it is undecided",
+        "no design meets the requirement of the scene, or it is undecided",
         begin="designs ...",
     ),
     "fit": ShellCommand(
@@ -232,15 +232,13 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         Args:
             scene: the scene file of the disc as it was designed.
             data: files of measurements (docs/fit.md), one kind in each.
-            parameters: names with commas between, such as "bore,extra_loss"; default those that the kinds of
-                data tell most about.
-            loss: "soft_l1" counts outliers less, and says which rows they are.
-            next: the parameter for which to say what to measure next; default the one that the data identify
-                least.
+            parameters: names separated by commas, such as "bore,extra_loss"; default those that the kinds of
+                data inform most.
+            loss: "soft_l1" gives outliers less weight, and names their rows.
+            next: the parameter that the proposed next measurement is for; default the least certain one.
             save: also write the fitted scene to this file, for all other commands.
             plot: also draw the data against the fit on one sheet, an SVG file.
-            template: print an empty file of measurements of this kind, with explanations, and do nothing
-                else.
+            template: only print an empty file of measurements of this kind, with explanations.
         """,
         _options(
             "scene data parameters loss next save plot json template",
@@ -252,14 +250,14 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         "the fit does not describe its data",
     ),
     "verify": ShellCommand(
-        """The verification cases and the paper's claims, judged.
+        """Run the verification cases and judge the claims of the papers.
 
         Args:
-            case_ids: ids of the cases; none for all.
+            case_ids: ids of cases; default all.
             cases: a folder with cases of your own (docs/verification-cases.md), which join the program's.
             scene: scene file; default the liquid-ring paper's disc.
-            list_: name the cases and run none.
-            mutations: also build in each case's mutations, which must change its verdict.
+            list_: only list the cases.
+            mutations: also run each case with its deliberate errors, which must change its verdict.
             level: "heavy" runs the cases that take long too.
             workers: processes to spread the cases over.
             data: a file of measurements (docs/measurements.md), predicted and judged instead of the cases.
@@ -271,7 +269,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             workers=ShellOption(int, 1, limits=_AT_LEAST_1),
         ),
         "gci_celik2008 --mutations",
-        "a code verification failed, or a mutation was not noticed",
+        "a code verification failed, or a deliberate error was not noticed",
     ),
     "compare": ShellCommand(
         """Two balancers on one rotor, side by side.
@@ -287,12 +285,12 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         """,
         _options("first second law rotor json tolerance"),
         "SCENE other_disc.toml",
-        "one of the two does not settle the fraction of devices that is asked for, or it is undecided",
+        "one of the two does not settle the required fraction of devices, or it is undecided",
         begin="both balancers on one rotor ...",
         headline=False,
     ),
     "trade": ShellCommand(
-        """Speed against accuracy: designs a second and error of every model.
+        """Speed against accuracy: designs per second and error of every model.
 
         Args:
             out: also write the document to trade.json in this folder.
@@ -316,7 +314,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         "an invariant does not hold",
     ),
     "plot": ShellCommand(
-        """The off-screen 3-D pictures alone.
+        """The 3-D pictures of a report alone, and its pressure fields for ParaView.
 
         Args:
             out: folder for figures/*.png and fields/*.vtu.
@@ -326,7 +324,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         "this machine cannot draw; the fields are written",
     ),
     "doctor": ShellCommand(
-        """What this machine gives the program, and what to do where something lacks.
+        """Check this machine: versions, packages, drawing, compiler and processes, with advice.
 
         Args:
             json: print one JSON document instead of a table.

@@ -27,7 +27,7 @@ _EXTREMES: Final = "extremes.json"
 def trade(
     scene: AnyScene, *, level: Level = "heavy", progress: Callable[[str], None] | None = None
 ) -> TradeStudy:
-    """Measure speed against accuracy on a scene: designs a second and error of every model.
+    """Measure speed against accuracy on a scene: designs per second and error of every model.
 
     Args: `level`: "light" leaves out the meshes in three dimensions. `progress`: called with each title.
     Raises: SceneError: a scene that cannot be used.

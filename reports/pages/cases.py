@@ -242,7 +242,7 @@ def case_view(case: Record) -> Record:
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
         "rests_on": inputs,
-        "told": {key: case.get(key) for key in _BOX_KEYS},
+        "box": {key: case.get(key) for key in _BOX_KEYS},
         "mutations": {each["id"]: each for each in case.get("mutations") or []},
         "equations": [
             {"svg": equation_svg(latex, f"Equation in LaTeX: {latex}", f"{anchor(case)}-{n}"), "source": ""}
@@ -299,9 +299,9 @@ def _extremes(_own: Record, evidence: Record) -> Record:
         "text": case.get("explanation", ""),
         "date": case.get("date", ""),
         "table": Table(
-            caption="Each input alone, from end to end, all else as in the paper’s scene: where points begin "
-            "to end in another way, and what is said there.",
-            heads=("Input", "Stretch", "Answer", "Loop", "Said"),
+            caption="Each input alone over its range, all else as in the paper’s scene: parts of the range "
+            "with one kind of answer, and the message there.",
+            heads=("Input", "Range", "Answer", "Loop", "Message"),
             rows=axis_rows(tables["axes"]),
             style="",
         ),

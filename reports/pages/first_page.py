@@ -202,7 +202,7 @@ def _pressure_figure(record: Record) -> Drawing | None:
                 panel.axvline(recommended, color=INK, linewidth=1.4, label="recommended")
             panel.set_title(title, loc="left", fontsize="medium", pad=3)
         required = 100 * (record["recommended"] or record["own"])["asked"]
-        _banded(three[0], (pressure, *fractions), (required, "asked"), marker="o", markersize=3)
+        _banded(three[0], (pressure, *fractions), (required, "required"), marker="o", markersize=3)
         _banded(three[1], (pressure, *moments), (1e6 * record["needed_moment_kg_m"], "unbalance"))
         for values, colour, marker in zip(times.values(), (FOUND, MUTED), "os", strict=True):
             heights = np.array(values, dtype=np.float64)

@@ -191,7 +191,7 @@ def settling(curves: Sequence[tuple[dict[str, Any], Record]], required_fraction:
             time, value, low, high = (np.array(each[key]) for key in ("time_s", "value", "low", "high"))
             axes.step(time, value, where="post", **look)
             axes.fill_between(time, low, high, step="post", color=look["color"], alpha=0.2, linewidth=0)
-        axes.axhline(required_fraction, color=MUTED, linewidth=1, linestyle=":", label="asked")
+        axes.axhline(required_fraction, color=MUTED, linewidth=1, linestyle=":", label="required")
         axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
 
     look: Record = {"x": TIME, "y": ("settled devices in %", "1"), "xlim": (0, None), "ylim": (0, 1.05)}

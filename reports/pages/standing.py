@@ -117,10 +117,10 @@ def _credibility(_own: Record, evidence: Record) -> Record:
 def _standing(evidence: Record, heads: Sequence[str] = HEADS) -> Table:
     rows = standing_rows(summary.checks(evidence), balancer=evidence["balancer"])
     return Table(
-        caption="What stands behind each predicted quantity. Measurements are those of others on parts like "
-        "the device’s; “within” is the share of the judged points that lie within both 95 % intervals, bias "
-        "and scatter are those of predicted over measured values. Points that taught a coefficient are left "
-        "out and not counted as predicted.",
+        caption="Evidence behind each predicted quantity. Measurements are those of others on parts like "
+        "the device’s; “within” is the fraction of the judged points that lie within both 95 % intervals, "
+        "bias and scatter are those of predicted over measured values. Points to which a coefficient was "
+        "fitted are left out.",
         heads=heads,
         rows=[tuple(row[HEADS.index(head)].replace(" -", " −") for head in heads) for row in rows],
         style="dense",

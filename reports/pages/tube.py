@@ -88,7 +88,7 @@ def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Dra
         logarithmic("y", ticks=[tick for tick in ticks if bottom <= tick <= top]),
         transition,
         level(printed, "the paper", **AS_PAPER),
-        curve(velocity, k, "found, 95 % band", band=width, color=FOUND),
+        curve(velocity, k, "calibrated, 95 % band", band=width, color=FOUND),
         curve(
             speeds,
             coefficients,

@@ -132,7 +132,7 @@ def test_the_inputs_that_decide_most_come_first(evidence: Record, said: Said) ->
         for path, index, common in rows
     ]
     text = said(evidence, "summary")
-    first, second = "Bore of the tube (assumed): 30 %, varies between devices", "Loss: 20 %, merely not known"
+    first, second = "Bore of the tube (assumed): 30 %, varies between devices", "Loss: 20 %, not known, but common to all devices"
     assert f"how fast a device settles. {first}. {second}." in text
 
 

@@ -45,7 +45,7 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
     with pytest.MonkeyPatch.context() as patch:
         # The claims of its paper have tests of their own, and so have the intervals of the study.
         patch.setattr(evidence_module, "load_cases", tuple)
-        patch.setattr(plain, "_MOST", 2)
+        patch.setattr(plain, "_MAX_DEVICES", 2)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 

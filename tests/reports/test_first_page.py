@@ -132,8 +132,9 @@ def test_the_inputs_that_decide_most_come_first(evidence: Record, said: Said) ->
         for path, index, common in rows
     ]
     text = said(evidence, "summary")
-    first, second = "Bore of the tube (assumed): 30 %, varies between devices", "Loss: 20 %, not known, but common to all devices"
-    assert f"how fast a device settles. {first}. {second}." in text
+    first = "Bore of the tube (assumed): 30 %, varies between devices"
+    second = "Loss: 20 %, not known, but common to all devices"
+    assert f"settling time. {first}. {second}." in text
 
 
 def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) -> None:
@@ -154,7 +155,7 @@ def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) 
 def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record, said: Said) -> None:
     assert "so those of the paper’s rotor" not in said(evidence, "summary")
     evidence["scene"]["origins"]["rotor.influence_coefficient"] = "default"
-    named = "Not in the scene, so those of the paper’s rotor: influence coefficient."
+    named = "Missing in the scene and taken from the paper’s rotor: influence coefficient."
     assert named in said(evidence, "summary")
 
 

@@ -21,7 +21,7 @@ from ringbalance.reduced_model.documents import (
 from ringbalance.reduced_model.gas_line import line_text
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.regime import cavity_pressure
-from ringbalance.results.numbers import believed, given, rounded
+from ringbalance.results.numbers import believed, format_given, rounded
 from ringbalance.results.result import Rows, Table, models_table
 from ringbalance.results.rows import Finding, sentences
 from ringbalance.scene.models import Scene
@@ -39,7 +39,7 @@ def calibration_rows(calibration: Calibration) -> Rows:
     """Quantities with their expanded uncertainties (95 %), findings, and tables over fill and velocity."""
     scene = calibration.scene
     where = (
-        f"{given(scene.gas.pressure, 'Pa')}, equal fills of {scene.disc.max_fill_ratio / 2:g}: "
+        f"{format_given(scene.gas.pressure, 'Pa')}, equal fills of {scene.disc.max_fill_ratio / 2:g}: "
         f"{calibration.regime.label}"
     )
     return Rows(

@@ -30,7 +30,7 @@ from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
 from ringbalance.reports.section import Record, Work, ring_of
 from ringbalance.reports.sections import sections_of
-from ringbalance.results.numbers import given, short, with_unit
+from ringbalance.results.numbers import format_given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.keys.declaration import Entries, keys_of
 from ringbalance.scene.keys.fields import ValueReader
@@ -265,11 +265,11 @@ def _written(value: Any, takes: ValueReader | Entries, *, digits: int = 6) -> st
     if isinstance(value, tuple):
         return ", ".join(_written(item, takes, digits=digits) for item in value)
     if isinstance(value, SpeedPoint):
-        return f"{given(value.speed, 'rad/s')} from {given(value.time, 's')}"
+        return f"{format_given(value.speed, 'rad/s')} from {format_given(value.time, 's')}"
     if isinstance(value, bool | str):
         return str(value)
     unit = DIMENSIONS[takes.dimension].si_unit.replace("*", " ") if takes.dimension else ""
-    return given(value, unit, digits=digits) if unit else short(float(value), digits=digits)
+    return format_given(value, unit, digits=digits) if unit else short(float(value), digits=digits)
 
 
 _ROWS: Final[Mapping[str, Callable[..., list[Record]]]] = MappingProxyType(

@@ -14,7 +14,7 @@ from matplotlib.colors import ListedColormap
 from ringbalance.design.axes import unit_of_path
 from ringbalance.design.sweep import Sweep
 from ringbalance.reports.figure import FIFTH, FOUND, INK, MAP, MUTED, AxisLabel, Drawing, draw
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import format_given
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.platform.files import write_whole
 
@@ -135,7 +135,9 @@ def _coloured(
     """
     finite = shown[np.isfinite(shown)]
     low, high = float(finite.min()), float(finite.max())
-    ends = f"{title}: {given(low, unit, digits=3)} (light) to {given(high, unit, digits=3)} (dark)"
+    ends = (
+        f"{title}: {format_given(low, unit, digits=3)} (light) to {format_given(high, unit, digits=3)} (dark)"
+    )
     _noted(panel, view.note, ends)
     sizes = [len(np.unique(each)) for each in keys]
     if view.sweep.plan.sample or min(sizes) < 2 or math.prod(sizes) != shown.size:

@@ -187,7 +187,7 @@ def printed(
     if form == "measured":
         text = numbers.shown(number, unit, None if width is None else float(width), digits=digits or 4)
     elif form == "given":
-        text = numbers.given(number, unit, digits=digits or 6)
+        text = numbers.format_given(number, unit, digits=digits or 6)
     elif form == "fixed":
         text = numbers.fixed(number, digits or 0)
     else:

@@ -14,7 +14,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.pages.drag_coefficient import SECTION
 from ringbalance.reports.pages.drag_map import DragMap, read_by_eq_18
 from ringbalance.reports.section import Record, Work
-from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
+from ringbalance.results.numbers import MISSING, format_given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.runner import paper_scene, run_case
 
@@ -58,7 +58,7 @@ def _liquid_cells(record: Record) -> Sequence[str]:
         record["name"],
         shown(record["kinematic_viscosity_m2_s"], "m^2/s", digits=3),
         f"{record['density_kg_m3']:.0f}",
-        f"{given(record['gas_pressure_Pa'], 'Pa', digits=3)}{star}",
+        f"{format_given(record['gas_pressure_Pa'], 'Pa', digits=3)}{star}",
         f"{record['regime']}, {record['flow_state']}" if runs else "nothing flows",
         shown(record["velocity_m_s"], "m/s", record["velocity_uncertainty"]) if runs else MISSING,
         measured(record["k"], record["k_uncertainty"]) if runs else MISSING,

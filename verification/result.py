@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import format_given
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.verification.assumptions import Assumption
@@ -109,8 +109,10 @@ class QuantityResult:
         quantity, unit = self.quantity, self.quantity.unit
         bound = {"at_most": "≤ ", "at_least": "≥ "}.get(quantity.metric)
         reference = None if self.reference is None else self.reference.value
-        against = given(reference, unit) if bound is None else bound + given(quantity.limit, unit)
-        width = given(self.half_width, unit, digits=2) if self.half_width else ""
+        against = (
+            format_given(reference, unit) if bound is None else bound + format_given(quantity.limit, unit)
+        )
+        width = format_given(self.half_width, unit, digits=2) if self.half_width else ""
         return quantity.title, self.row().text, against, width, self.verdict.value
 
 

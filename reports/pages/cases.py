@@ -33,7 +33,7 @@ from ringbalance.results.numbers import (
     MISSING,
     THIN_SPACE,
     display_unit,
-    given,
+    format_given,
     last_place,
     number,
     short,
@@ -147,7 +147,7 @@ def _width(quantity: JudgedQuantity) -> str:
     """Half-width of the comparison; a range where assumed inputs make it lopsided."""
     value, half_width = quantity.get("value"), quantity.get("uncertainty")
     if value and half_width and half_width < (digit := _last_digit(value)) / 2:
-        return f"<{THIN_SPACE}{given(digit, quantity.get('unit') or '1', digits=1)}"
+        return f"<{THIN_SPACE}{format_given(digit, quantity.get('unit') or '1', digits=1)}"
     if ends := _range(quantity):
         return ends
     if not half_width:

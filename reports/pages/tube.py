@@ -33,7 +33,7 @@ from ringbalance.reports.figure import (
 )
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import budgets_of
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import format_given
 from ringbalance.scene.arrays import stretches
 from ringbalance.scene.models import Scene
 
@@ -214,7 +214,7 @@ def _crest(record: Record, _evidence: Record) -> Record | None:
     lines: list[Paint] = []
     for state in states:
         path, pressure = np.asarray(state["path_m"]), np.asarray(state["pressure_Pa"])
-        label: str | None = f"{state['regime']}, {given(state['gas_pressure_Pa'], 'Pa', digits=3)}"
+        label: str | None = f"{state['regime']}, {format_given(state['gas_pressure_Pa'], 'Pa', digits=3)}"
         for full, part in stretches(state["full"]):
             look = {"color": REGIME_COLOURS[state["regime"]], "linestyle": "-" if full else (0, (1, 2))}
             lines.append(curve(path[part], pressure[part], label if full else None, **look))

@@ -22,7 +22,7 @@ from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG, neglected_in_injections
-from ringbalance.results.numbers import given, plain
+from ringbalance.results.numbers import format_given, plain
 from ringbalance.results.result import Rows, Table, models_table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
@@ -257,8 +257,8 @@ def line_runs_table(runs: Mapping[str, Simulation]) -> Table:
             (
                 end,
                 run.verdict.value,
-                given(run.settling_time, "s", digits=3),
-                given(float(run.amplitude[-1]), "m", digits=3),
+                format_given(run.settling_time, "s", digits=3),
+                format_given(float(run.amplitude[-1]), "m", digits=3),
             )
             for end, run in runs.items()
         ],

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.design.choices import NAME, as_toml, read_choices
-from ringbalance.results.numbers import given as given_text
+from ringbalance.results.numbers import format_given as given_text
 from ringbalance.results.numbers import plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles

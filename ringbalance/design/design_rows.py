@@ -14,7 +14,7 @@ from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
 from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.tuning import if_exact, required_table
 from ringbalance.design.designing import VALVE, Design
-from ringbalance.results.numbers import MISSING, given, percent
+from ringbalance.results.numbers import MISSING, format_given, percent
 from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
@@ -172,10 +172,10 @@ def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
     reached = _reached(judgement, worst, part)
     values: dict[str, Value] = {
         "what": worst.code.replace("_", " "),
-        "required": f"{worst.sense} {given(worst.required, worst.unit, digits=4)}",
+        "required": f"{worst.sense} {format_given(worst.required, worst.unit, digits=4)}",
         "share": judgement.fraction_of(worst).value,
         "asked": part,
-        "reached": given(reached, worst.unit, digits=3) if math.isfinite(reached) else MISSING,
+        "reached": format_given(reached, worst.unit, digits=3) if math.isfinite(reached) else MISSING,
     }
     yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
     if causes := judgement.causes:
@@ -248,9 +248,9 @@ def _front_table(design: Design) -> Table:
     paths = [path for path in design.space.paths if path not in design.space.valve_paths]
     rows = [
         (
-            given(each.size, "m^3", digits=4),
-            given(finite(each.race.time(asked)), "s", digits=3),
-            given(finite(each.race.gas), "J", digits=3),
+            format_given(each.size, "m^3", digits=4),
+            format_given(finite(each.race.time(asked)), "s", digits=3),
+            format_given(finite(each.race.gas), "J", digits=3),
             *([design.space.valve(each.point)] if design.space.valves else []),
             *(setting_text(path, each.point.get(path)) for path in paths),
         )

@@ -256,7 +256,7 @@ def shown(value: float | None, unit: str, width: Width = None, *, digits: int = 
     return with_unit(f"({text})" if wants_brackets else text, display.symbol)
 
 
-def given(value: float | None, unit: str, *, digits: int = 6) -> str:
+def format_given(value: float | None, unit: str, *, digits: int = 6) -> str:
     """A prescribed SI quantity, as short as it may be, such as 0.7 MPa or 0.25.
 
     Raises: ValueError: a value that is not finite.

@@ -16,7 +16,7 @@ from importlib.resources import files
 from string import Formatter
 from typing import Any, Literal, TypeVar
 
-from ringbalance.results.numbers import MISSING, Width, believed, given, percent, plain, shown
+from ringbalance.results.numbers import MISSING, Width, believed, format_given, percent, plain, shown
 from ringbalance.results.requirements import Proportion
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -84,7 +84,7 @@ class Quantity:
         """Value and interval in the unit that suits them, such as (72.043 ± 0.032) mm."""
         if self.width is not None:
             return shown(self.value, self.unit, self.width)
-        return given(self.value, self.unit, digits=self.digits)
+        return format_given(self.value, self.unit, digits=self.digits)
 
     def with_unit(self, make: Callable[[float | None, str], Made]) -> Made:
         """The value with its unit, such as `with_unit(pint.UnitRegistry().Quantity)`."""
@@ -219,5 +219,5 @@ class _Filled:
             text = percent(value, digits=int(digits or 4))
         else:
             exact = len(str(value)) if isinstance(value, int) else 0
-            text = given(value, unit or "1", digits=max(int(digits or 4), exact))
+            text = format_given(value, unit or "1", digits=max(int(digits or 4), exact))
         return self.mark(self.name, text)

@@ -84,9 +84,9 @@ RULES: Mapping[str, Callable[[ast.Module], Iterator[str]]] = {
     "constants": unclear_constants,
 }
 CEILINGS = {
-    "ringbalance": {"names": 19, "texts": 9, "constants": 2},
+    "ringbalance": {"names": 0, "texts": 0, "constants": 0},
     "scene": {"names": 126, "texts": 73, "constants": 13},
-    "results": {"names": 9, "texts": 11, "constants": 1},
+    "results": {"names": 0, "texts": 0, "constants": 0},
     "mesh": {"names": 37, "texts": 30, "constants": 2},
     "physics": {"names": 16, "texts": 32, "constants": 3},
     "reduced_model": {"names": 122, "texts": 220, "constants": 20},
@@ -95,7 +95,7 @@ CEILINGS = {
     "export": {"names": 44, "texts": 44, "constants": 6},
     "design": {"names": 69, "texts": 5, "constants": 6},
     "verification": {"names": 194, "texts": 145, "constants": 32},
-    "reports": {"names": 133, "texts": 86, "constants": 11},
+    "reports": {"names": 0, "texts": 0, "constants": 0},
 }
 """What is left in each room: these numbers become smaller, never larger."""
 SHARED_CLASS_NAMES = """

@@ -29,7 +29,7 @@ from ringbalance.design.static import UNITS, _row
 from ringbalance.design.store import Store
 from ringbalance.design.work import bundle_size
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import format_given
 from ringbalance.scene.models import Scene
 
 VARY = {"tube.bore": "0.6mm:2mm:4:log", "gas.pressure": np.linspace(0.3e6, 0.9e6, 3)}
@@ -501,7 +501,7 @@ def test_a_map_of_more_axes_shows_those_with_most_values(
     reach = found.plot(tmp_path)[0].read_text()
     assert "gas.name = slow as in row" in reach
     values = [value for value in found.columns()["reach [kg m]"][:12] if value is not None]
-    assert f"{given(max(values), 'kg m', digits=3)} (dark)" in reach
+    assert f"{format_given(max(values), 'kg m', digits=3)} (dark)" in reach
     alone = rb.sweep(paper_scene, dict(list(vary.items())[1:]), intervals=False)
     assert reach.count("<use") == alone.plot(tmp_path / "alone")[0].read_text().count("<use")
 

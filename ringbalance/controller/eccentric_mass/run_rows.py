@@ -11,7 +11,7 @@ import numpy as np
 from ringbalance.controller.balancer import RunResult
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import format_given
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Quantity, around
 from ringbalance.scene.arrays import FloatArray
@@ -146,7 +146,7 @@ def eccentric_rows(run: EccentricRun) -> Rows:
         )
     ends = np.searchsorted(run.time, [stage.end for stage in run.stages])
     stages = [
-        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
+        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", format_given(float(amplitude), "m", digits=4))
         for stage, amplitude in zip(run.stages, run.amplitude[ends], strict=True)
     ]
     return Rows(

@@ -14,7 +14,7 @@ from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import Along
 from ringbalance.controller.rotor import assumed_rotor
 from ringbalance.controller.trials import Information
-from ringbalance.results.numbers import given, percent
+from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.results.result import Cells, Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
@@ -148,9 +148,9 @@ class Tuning(Result):
             settings.append((path, before, setting_text(path, value)))
         levels = [
             (
-                given(each.level, self.along_unit, digits=4),
+                format_given(each.level, self.along_unit, digits=4),
                 *_fraction_and_times(each.judgement),
-                given(each.usable_moment[1], "kg m", digits=4),
+                format_given(each.usable_moment[1], "kg m", digits=4),
             )
             for each in self.along
         ]
@@ -258,8 +258,8 @@ def required_table(judgement: Judgement) -> Table:
     rows = []
     for demand in judgement.demands:
         what = demand.code.replace("_", " ")
-        what += "" if demand.amplitude is None else f" to {given(demand.amplitude, 'm', digits=4)}"
-        required = f"{demand.sense} {given(demand.required, demand.unit, digits=4)}"
+        what += "" if demand.amplitude is None else f" to {format_given(demand.amplitude, 'm', digits=4)}"
+        required = f"{demand.sense} {format_given(demand.required, demand.unit, digits=4)}"
         rows.append((what, required, percent(judgement.fraction_of(demand).value)))
     return Table(caption="Required of every device", heads=("what", "required", "met by"), rows=rows)
 
@@ -271,7 +271,7 @@ def _fraction_and_times(judgement: Judgement) -> Cells:
     """Cells below the heads `_FRACTION_AND_TIMES`."""
     share = judgement.fraction
     fraction = f"{percent(share.value)} ({percent(share.low)} to {percent(share.high)})"
-    return (fraction, *(given(time, "s", digits=3) for time in judgement.settling_times.values()))
+    return (fraction, *(format_given(time, "s", digits=3) for time in judgement.settling_times.values()))
 
 
 def _changes_text(changes: Mapping[str, Any], separator: str = "\n") -> str:

@@ -193,12 +193,12 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
     """
     *steps, name = path.split(".")
     content, keys = document, schema.top
-    for place, step in enumerate(steps):
+    for count, step in enumerate(steps):
         default = keys[step].presence.default if step in keys else None
-        keys = schema.keys_in(steps[: place + 1])
+        keys = schema.keys_in(steps[: count + 1])
         inside = content.get(step, default if isinstance(default, Mapping) else {})
         if not isinstance(inside, Mapping):
-            content[".".join((*steps[place:], name))] = value
+            content[".".join((*steps[count:], name))] = value
             return
         content[step] = dict(inside)
         content = content[step]
@@ -208,35 +208,30 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
         takes = (
             schema.tables[path].keys if path in schema.tables else keys[name].takes if name in keys else None
         )
-        value, deviation = _plain(value, takes)
+        dimension = takes.dimension if isinstance(takes, ValueReader) else None
+        try:
+            value, deviation = plain_number(value, DIMENSIONS[dimension].si_unit if dimension else "")
+        except ValueError:
+            # A quantity that no key takes stands there as text, for the error of reading it.
+            value, deviation = str(value), 0.0
         content[name] = _written(value, takes, like=content.get(name, _as_usual(keys.get(name))))
         if deviation:
             width = _written(NORMAL_95 * deviation, takes)
             _place(document, f"uncertainty.{name}", width, schema=schema, origin=origin)
     if steps and ORIGIN not in (name, *steps[1:]):
-        _note_origin(document[steps[0]], (*steps[1:], name)[0], None if value is None else origin)
-
-
-def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None:
-    """Note the origin of a changed value in place of that of the value before."""
-    before = table.pop(ORIGIN, {})
-    stated = (
-        {name: each for name, each in before.items() if name != key} if isinstance(before, Mapping) else {}
-    )
-    if origin is not None and origin != "given":
-        stated[key] = origin
-    if stated:
-        # The same object, where nothing was said of the value, need not be read again.
-        table[ORIGIN] = before if stated == before else stated
-
-
-def _plain(value: Any, takes: ValueReader | Entries | Mapping[str, Key] | None) -> tuple[Any, float]:
-    """A number in SI with its standard deviation; a quantity that no key takes as text, for its error."""
-    unit = DIMENSIONS[takes.dimension].si_unit if isinstance(takes, ValueReader) and takes.dimension else ""
-    try:
-        return plain_number(value, unit)
-    except ValueError:
-        return str(value), 0.0
+        # The origin of the changed value in place of that of the value before.
+        table, key = document[steps[0]], (*steps[1:], name)[0]
+        before = table.pop(ORIGIN, {})
+        stated = (
+            {other: each for other, each in before.items() if other != key}
+            if isinstance(before, Mapping)
+            else {}
+        )
+        if value is not None and origin != "given":
+            stated[key] = origin
+        if stated:
+            # The same object, where nothing was said of the value, need not be read again.
+            table[ORIGIN] = before if stated == before else stated
 
 
 def _as_usual(key: Key | None) -> str | None:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.declaration import Key, Shown, descriptions_of, keys_of
+from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Bend, Scene
@@ -64,38 +64,57 @@ _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """Tables, and single paths, of which the groups consist."""
 
 
-def _declared() -> Iterator[_SceneLine]:
+def _described_lines() -> Iterator[_SceneLine]:
     for name, table in LIQUID_RING.tables.items():
-        if table.record is not None:
-            keys = keys_of(table.record)
-            for key, entry in descriptions_of(table.record).items():
-                yield _line(f"{name}.{key}", entry, keys.get(key))
-    for key, entry in descriptions_of(Scene).items():
-        yield _line(key, entry, None)
+        keys = keys_of(table.record) if table.record is not None else {}
+        for key, shown in descriptions_of(table.record).items() if table.record is not None else ():
+            dimension = shown.dimension or (keys[key].takes.dimension if key in keys else None)
+            yield _SceneLine(path=f"{name}.{key}", shown=shown, dimension=dimension or "")
+    for path, shown in descriptions_of(Scene).items():
+        yield _SceneLine(path=path, shown=shown, dimension=shown.dimension or "")
 
 
-def _line(path: str, entry: Shown, key: Key | None) -> _SceneLine:
-    dimension = key.takes.dimension if key is not None else None
-    return _SceneLine(path=path, shown=entry, dimension=entry.dimension or dimension or "")
-
-
-_LINES: Mapping[str, _SceneLine] = MappingProxyType({line.path: line for line in _declared()})
+_LINES: Mapping[str, _SceneLine] = MappingProxyType({line.path: line for line in _described_lines()})
 
 
 def scene_table(scene: Scene) -> tuple[Row, ...]:
     """A scene line by line, in groups; a value that the file does not give has the origin "default"."""
-    return tuple(
-        row
-        for group, parts in _GROUPS.items()
-        for line in _lines_of(parts)
-        if line.shown.only_for in ("", scene.controller.kind)
-        for row in _rows(scene, group, line)
-    )
-
-
-def _lines_of(parts: tuple[str, ...]) -> Iterator[_SceneLine]:
-    paths = (path for part in parts for path in _LINES if path == part or path.startswith(f"{part}."))
-    return (_LINES[path] for path in dict.fromkeys(paths))
+    liquid = scene.liquid
+    sources = {"liquid.name": liquid.source}
+    relative = {
+        "liquid.density": liquid.density_uncertainty,
+        "liquid.kinematic_viscosity": liquid.viscosity_uncertainty,
+    }
+    stated = {f"{UNCERTAIN_QUANTITIES[each.quantity]}.{each.quantity}": each for each in scene.uncertainty}
+    rows = []
+    for group, parts in _GROUPS.items():
+        paths = (path for part in parts for path in _LINES if path == part or path.startswith(f"{part}."))
+        for path in dict.fromkeys(paths):
+            line, value = _LINES[path], _value(scene, path)
+            if line.shown.only_for not in ("", scene.controller.kind) or (
+                value is None and not line.shown.absent
+            ):
+                continue
+            width = stated.get(path)
+            if width is not None and not width.relative and line.dimension:
+                uncertainty = format_quantity(width.half_width, line.dimension, line.shown.unit)
+            elif width is not None and not width.relative:
+                uncertainty = f"{width.half_width:g}"
+            else:
+                fraction = relative.get(path, width.half_width if width is not None else 0.0)
+                uncertainty = f"{100 * fraction:.3g} %" if fraction else ""
+            rows.append(
+                Row(
+                    group=group,
+                    quantity=line.shown.name,
+                    value=line.shown.absent if value is None else _written(line, value),
+                    note="; ".join(note for note in (line.shown.note, sources.get(path, "")) if note),
+                    origin=scene.origin_of(path),
+                    uncertainty=uncertainty,
+                    path=path,
+                )
+            )
+    return tuple(rows)
 
 
 def _line_at(path: str) -> _SceneLine:
@@ -172,23 +191,6 @@ def scene_lines(scene: AnyScene) -> Iterator[str]:
         yield ", ".join(f"{path} {setting_text(path, _value(scene, path))}" for path in paths)
 
 
-def _rows(scene: Scene, group: str, line: _SceneLine) -> Iterator[Row]:
-    value = _value(scene, line.path)
-    if value is None and not line.shown.absent:
-        return
-    written = line.shown.absent if value is None else _written(line, value)
-    source = scene.liquid.source if line.path == "liquid.name" else ""
-    yield Row(
-        group=group,
-        quantity=line.shown.name,
-        value=written,
-        note="; ".join(note for note in (line.shown.note, source) if note),
-        origin=scene.origin_of(line.path),
-        uncertainty=_spread(scene, line),
-        path=line.path,
-    )
-
-
 def _value(scene: AnyScene, path: str) -> Any:
     value: Any = scene
     for part in path.split("."):
@@ -204,27 +206,11 @@ def _written(line: _SceneLine, value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, tuple):
-        return ", ".join(_bend(item) if isinstance(item, Bend) else str(item) for item in value) or "none"
+        texts = [
+            f"{format_quantity(each.angle, 'angle', 'deg')} on {format_quantity(each.radius, 'length', 'mm')}"
+            if isinstance(each, Bend)
+            else str(each)
+            for each in value
+        ]
+        return ", ".join(texts) or "none"
     return str(value)
-
-
-def _bend(bend: Bend) -> str:
-    radius = format_quantity(bend.radius, "length", "mm")
-    return f"{format_quantity(bend.angle, 'angle', 'deg')} on {radius}"
-
-
-def _spread(scene: Scene, line: _SceneLine) -> str:
-    given = [
-        each
-        for each in scene.uncertainty
-        if f"{UNCERTAIN_QUANTITIES[each.quantity]}.{each.quantity}" == line.path
-    ]
-    if given and not given[0].relative:
-        width = given[0].half_width
-        shown_width = format_quantity(width, line.dimension, line.shown.unit) if line.dimension else ""
-        return shown_width or f"{width:g}"
-    relative = {
-        "liquid.density": scene.liquid.density_uncertainty,
-        "liquid.kinematic_viscosity": scene.liquid.viscosity_uncertainty,
-    }.get(line.path, given[0].half_width if given else 0.0)
-    return f"{100 * relative:.3g} %" if relative else ""

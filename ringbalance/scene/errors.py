@@ -155,11 +155,6 @@ class Uncertainty:
     change: Mapping[str, float] = field(default_factory=dict)
     """Changes of the scene with one standard deviation, as `moved` takes them; empty: it is in no scene."""
 
-    @property
-    def is_model(self) -> bool:
-        """True for an error of a model, false for one of an input."""
-        return self.name.startswith(MODEL)
-
     def deviation(self, quantile: Any) -> Any:
         """Standard deviations at quantiles; of a uniform one 1.96 lie at the end of the range."""
         if self.distribution == "uniform":

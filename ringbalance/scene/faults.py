@@ -35,16 +35,13 @@ class Fault:
 
     def __str__(self) -> str:
         """The error on one line: file: [table] key = value: what is wrong; allowed: ..."""
+        path = " ".join(part for part in (f"[{self.table}]" if self.table else "", self.key) if part)
+        if path:
+            path += (
+                f" is {MISSING}: " if self.value == MISSING else f" = {self.value}: " if self.value else ": "
+            )
         end = f"; allowed: {self.allowed}" if self.allowed else ""
-        return f"{self.file}: {self._place()}{self.problem}{end}"
-
-    def _place(self) -> str:
-        parts = [f"[{self.table}]" if self.table else "", self.key]
-        place = " ".join(part for part in parts if part)
-        if not place:
-            return ""
-        shown = f" is {MISSING}" if self.value == MISSING else f" = {self.value}" if self.value else ""
-        return f"{place}{shown}: "
+        return f"{self.file}: {path}{self.problem}{end}"
 
 
 class SceneError(Exception):

@@ -88,13 +88,10 @@ def check(
 def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[Fault]:
     """One error for each check that fails; `checks` in order, each after those that make it pointless."""
     failed: set[Rule] = set()
-    values = reading.values
     for each in checks:
-        arguments = [values[path] for path in each.needs if path in values]
-        known = len(arguments) == len(each.needs)
-        if not known or not each.when(reading) or (failed and failed & set(each.moot)):
+        if not reading.known(*each.needs) or not each.when(reading) or (failed and failed & set(each.moot)):
             continue
-        finding = each.rule(*arguments)
+        finding = each.rule(*(reading.values[path] for path in each.needs))
         if finding is not None:
             failed.add(each.rule)
             yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)

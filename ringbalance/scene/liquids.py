@@ -219,40 +219,33 @@ def with_liquid(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]
     return reading.adding(_liquid_values(reading, looked_up)), faults
 
 
-def _incomplete(reading: SceneReading) -> bool:
-    return reading.lacks(_DENSITY) or reading.lacks(_VISCOSITY)
-
-
 def _faults(reading: SceneReading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
+    """At most one error: of the temperature of a known liquid, else of what an unknown one lacks."""
+    incomplete = reading.lacks(_DENSITY) or reading.lacks(_VISCOSITY)
     if liquid is not None:
-        return _temperature_faults(reading, liquid)
-    if not _incomplete(reading) or "liquid.name" in reading.broken:
-        return ()
-    if reading.known("liquid.name"):
-        error = _unknown_liquid(name=reading.values["liquid.name"])
-        return (reading.fault("liquid.name", problem=error.problem, allowed=error.allowed),)
-    if reading.lacks(_DENSITY) and reading.lacks(_VISCOSITY):
-        allowed = f"a known liquid's name with its temperature, or {_OUTRIGHT}"
-        return (reading.fault("liquid.name", problem="the liquid is not named", allowed=allowed),)
-    path = _DENSITY if reading.lacks(_DENSITY) else _VISCOSITY
-    allowed = f"{reading.allowed(path)}; or the name of a known liquid"
-    return (reading.fault(path, problem="it is needed for a liquid without a known name", allowed=allowed),)
-
-
-def _temperature_faults(reading: SceneReading, liquid: KnownLiquid) -> tuple[Fault, ...]:
-    held = f"{liquid.name} at {liquid.held}"
-    path = "liquid.temperature"
-    if reading.known(path):
-        temperature = reading.values[path]
-        if liquid.holds(temperature) or not (_incomplete(reading) or reading.lacks(_VAPOUR)):
+        path, held = "liquid.temperature", f"{liquid.name} at {liquid.held}"
+        if reading.known(path):
+            if liquid.holds(reading.values[path]) or not (incomplete or reading.lacks(_VAPOUR)):
+                return ()
+            problem = f"there are no data for {liquid.name} at this temperature"
+            allowed = f"{held}; or density, kinematic_viscosity and vapour_pressure given outright"
+        elif len(liquid.temperatures) == 1 or not reading.lacks(path) or not incomplete:
             return ()
-        problem = f"there are no data for {liquid.name} at this temperature"
-        allowed = f"{held}; or density, kinematic_viscosity and vapour_pressure given outright"
-        return (reading.fault(path, problem=problem, allowed=allowed),)
-    if len(liquid.temperatures) == 1 or not reading.lacks(path) or not _incomplete(reading):
+        else:
+            problem, allowed = "the properties of a known liquid depend on it", f"{held}; or {_OUTRIGHT}"
+    elif not incomplete or "liquid.name" in reading.broken:
         return ()
-    problem = "the properties of a known liquid depend on it"
-    return (reading.fault(path, problem=problem, allowed=f"{held}; or {_OUTRIGHT}"),)
+    elif reading.known("liquid.name"):
+        path, error = "liquid.name", _unknown_liquid(name=reading.values["liquid.name"])
+        problem, allowed = error.problem, error.allowed
+    elif reading.lacks(_DENSITY) and reading.lacks(_VISCOSITY):
+        path, problem = "liquid.name", "the liquid is not named"
+        allowed = f"a known liquid's name with its temperature, or {_OUTRIGHT}"
+    else:
+        path = _DENSITY if reading.lacks(_DENSITY) else _VISCOSITY
+        problem = "it is needed for a liquid without a known name"
+        allowed = f"{reading.allowed(path)}; or the name of a known liquid"
+    return (reading.fault(path, problem=problem, allowed=allowed),)
 
 
 def _liquid_values(reading: SceneReading, looked_up: Liquid | None) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean
 from ringbalance.scene.keys.reading import SceneReading, TableRead
-from ringbalance.scene.keys.schema import ORIGIN, Schema
+from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import CheckedValues, InputUncertainty, ShownOrigin
@@ -62,8 +62,17 @@ def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyS
     Args: `folder`: from which files that it names are looked for; that of `file` by default.
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
+    try:
+        document = read_toml(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        problem = f"line {line} is not UTF-8 text; save the file with UTF-8 encoding"
+        raise SceneError.of_file(file, problem) from error
+    except (ValueError, RecursionError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise SceneError.of_file(file, f"this is not TOML: {' '.join(reason.split())}") from error
     return scene_of(
-        _document(content, file),
+        document,
         file=file,
         source=PurePath(file).name,
         folder=(Path(file).parent if folder is None else folder).absolute(),
@@ -90,15 +99,37 @@ def scene_of(
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
     reading = _checked_reading(document, file=file, folder=folder, derived=derived, before=before)
+    decisive = {
+        path: value.digest if path == "disc.geometry" else value
+        for path, value in reading.values.items()
+        if path != "name"
+        and not path.startswith("disc.mesh")
+        and not path.endswith(f".{ORIGIN}")
+        and not path.startswith(_DECIDE_NOTHING)
+    }
+    # What was looked up for a known liquid is no default.
+    defaulted = tuple(
+        path
+        for path in reading.values
+        if not reading.given(path)
+        and path not in reading.derived
+        and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
+    )
+    origins: list[tuple[str, ShownOrigin]] = []
+    for name, table in reading.schema.tables.items():
+        stated = reading.values.get(f"{name}.{ORIGIN}", {})
+        for key in (key for key in table.keys if key != ORIGIN):
+            absent: ShownOrigin = "derived" if (path := f"{name}.{key}") in reading.derived else "default"
+            origins.append((path, stated.get(key, "given") if reading.given(path) else absent))
     parts: dict[str, Any] = {
         **_records(reading, before),
         "name": reading.values["name"],
         "source": source,
         "file": file,
         "sha256": sha256(),
-        "values_sha256": _values_hash(reading),
-        "defaulted": _defaulted(reading),
-        "origins": tuple(_origins(reading)),
+        "values_sha256": hashlib.sha256(repr(sorted(decisive.items())).encode()).hexdigest(),
+        "defaulted": defaulted,
+        "origins": tuple(origins),
     }
     of_mesh = {path: reading.values[path] for path in reading.derived}
     checked = CheckedValues(
@@ -126,12 +157,23 @@ def _checked_reading(
     derived: Mapping[str, Any],
     before: CheckedValues | None,
 ) -> SceneReading:
+    """Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last."""
     kind = _kind(document)
     tables: Mapping[str, TableRead] = before.tables if before and _kind(before.document) == kind else {}
-    reading, found = scene_kind(kind).read(document, file=file, folder=folder, derived=derived, before=tables)
-    found = (*found, *_origin_faults(reading, found), *fitted_faults(reading))
-    if found:
-        raise SceneError(_sorted(found, reading.schema))
+    reading, faults = scene_kind(kind).read(
+        document, file=file, folder=folder, derived=derived, before=tables
+    )
+    faults = (*faults, *_origin_faults(reading, faults), *fitted_faults(reading))
+    if faults:
+        schema = reading.schema
+        keys = {"": schema.names_at(()), **{name: list(each.keys) for name, each in schema.tables.items()}}
+
+        def rank(fault: Fault) -> tuple[int, int]:
+            names, key = keys.get(fault.table, []), fault.key.split("[")[0].split(".")[0]
+            table = list(keys).index(fault.table) if fault.table in keys else len(keys)
+            return table, names.index(key) if key in names else len(names)
+
+        raise SceneError(sorted(faults, key=rank))
     return reading
 
 
@@ -187,41 +229,6 @@ def _uncertainty(reading: SceneReading) -> Iterator[InputUncertainty]:
             yield InputUncertainty(quantity=quantity, half_width=width, relative=relative)
 
 
-def _defaulted(reading: SceneReading) -> tuple[str, ...]:
-    """Paths "table.key" whose value is a default; what was looked up for a known liquid is none."""
-    return tuple(
-        path
-        for path in reading.values
-        if not reading.given(path)
-        and path not in reading.derived
-        and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
-    )
-
-
-def _values_hash(reading: SceneReading) -> str:
-    """SHA-256 of the values that decide results."""
-    values = {
-        path: value.digest if path == "disc.geometry" else value
-        for path, value in reading.values.items()
-        if path != "name"
-        and not path.startswith("disc.mesh")
-        and not path.endswith(f".{ORIGIN}")
-        and not path.startswith(_DECIDE_NOTHING)
-    }
-    return hashlib.sha256(repr(sorted(values.items())).encode()).hexdigest()
-
-
-def _origins(reading: SceneReading) -> Iterator[tuple[str, ShownOrigin]]:
-    """Origin of each key, by path."""
-    for name, table in reading.schema.tables.items():
-        stated = reading.values.get(f"{name}.{ORIGIN}", {})
-        for key in table.keys:
-            path = f"{name}.{key}"
-            if key != ORIGIN:
-                absent: ShownOrigin = "derived" if path in reading.derived else "default"
-                yield path, stated.get(key, "given") if reading.given(path) else absent
-
-
 def _origin_faults(reading: SceneReading, found: Iterable[Fault]) -> Iterator[Fault]:
     """One error for each origin of a value that does not stand in the file, unless the value has one."""
     told = {(fault.table, fault.key) for fault in found}
@@ -261,29 +268,3 @@ def bundled_scene(name: str) -> Path:
         problem = f"no scene of that name comes with the program{did_you_mean(stem, names)}"
         raise SceneError.of_file(name, problem, ", ".join(names))
     return folder / f"{stem}.toml"
-
-
-def _sorted(faults: Iterable[Fault], schema: Schema) -> list[Fault]:
-    """Errors in the order of the reference of the scene file; what it does not know comes last."""
-    tables = ("", *schema.tables)
-    keys = {"": schema.names_at(()), **{name: list(table.keys) for name, table in schema.tables.items()}}
-
-    def place(fault: Fault) -> tuple[int, int]:
-        known, key = keys.get(fault.table, []), fault.key.split("[")[0].split(".")[0]
-        table = tables.index(fault.table) if fault.table in keys else len(tables)
-        return table, known.index(key) if key in known else len(known)
-
-    return sorted(faults, key=place)
-
-
-def _document(content: bytes, file: str) -> Mapping[str, Any]:
-    try:
-        return read_toml(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        problem = f"line {line} is not UTF-8 text; save the file with UTF-8 encoding"
-        raise SceneError.of_file(file, problem) from error
-    except (ValueError, RecursionError) as error:
-        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        problem = f"this is not TOML: {' '.join(reason.split())}"
-        raise SceneError.of_file(file, problem) from error

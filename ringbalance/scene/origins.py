@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeVar, cast
 
@@ -225,14 +225,18 @@ def raw_value_at(scene: SceneFile, path: str) -> Any:
 
 
 def with_values_at(scene: _SomeScene, values: Mapping[str, Any]) -> _SomeScene:
-    """A copy with values in place of its own, text and whole lists as they are; nothing is checked again."""
+    """A copy with values in place of its own, text and whole lists as they are; nothing is checked again.
+
+    A number replaces one entry of a list, or every one where the path names none.
+    """
     for path, value in values.items():
-        if isinstance(value, int | float):
-            scene = moved_at(scene, path, partial(_first, value))
-        else:
-            table, key, _ = _placed(path)
-            changed: dict[str, Any] = {table: replace(getattr(scene, table), **{key: value})}
-            scene = replace(scene, **changed)
+        table, key, entry = _placed(path)
+        record, new = getattr(scene, table), value
+        before = getattr(record, key)
+        if isinstance(value, int | float) and isinstance(before, tuple):
+            new = tuple(value if entry in (None, i) else each for i, each in enumerate(before))
+        changed: dict[str, Any] = {table: replace(record, **{key: new})}
+        scene = replace(scene, **changed)
     return scene
 
 
@@ -248,10 +252,6 @@ def moved_at(scene: _SomeScene, path: str, move: Callable[[float], float]) -> _S
         moved = move(value)
     changed: dict[str, Any] = {table: replace(record, **{key: moved})}
     return replace(scene, **changed)
-
-
-def _first(value: float, _: float) -> float:
-    return value
 
 
 def _placed(path: str) -> tuple[str, str, int | None]:

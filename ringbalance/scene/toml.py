@@ -101,23 +101,19 @@ def toml_text(value: object) -> str:
 def _toml_text(value: object, *, depth: int) -> str:
     if isinstance(value, str):
         return _quoted(value[: 2 * _LONGEST_VALUE])
-    if isinstance(value, Mapping | Sequence):
-        return _nested(value, depth=depth + 1)
+    if isinstance(value, Mapping | Sequence) and depth == _DEEPEST:
+        return "..."
+    if isinstance(value, Mapping):
+        few = list(value.items())[:_LONGEST_LIST]
+        pairs = (f"{toml_key(str(key))} = {_toml_text(item, depth=depth + 1)}" for key, item in few)
+        return "{ " + ", ".join(pairs) + " }"
+    if isinstance(value, Sequence):
+        return "[" + ", ".join(_toml_text(item, depth=depth + 1) for item in value[:_LONGEST_LIST]) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int) and abs(value) >= 10**30:
         return f"a whole number of {value.bit_length()} bits"
     return str(value)
-
-
-def _nested(value: Mapping[Any, Any] | Sequence[Any], *, depth: int) -> str:
-    if depth > _DEEPEST:
-        return "..."
-    if isinstance(value, Mapping):
-        few = list(value.items())[:_LONGEST_LIST]
-        pairs = (f"{toml_key(str(key))} = {_toml_text(item, depth=depth)}" for key, item in few)
-        return "{ " + ", ".join(pairs) + " }"
-    return "[" + ", ".join(_toml_text(item, depth=depth) for item in value[:_LONGEST_LIST]) + "]"
 
 
 def toml_key(key: str) -> str:

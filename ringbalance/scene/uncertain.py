@@ -187,13 +187,11 @@ def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
     return with_model_errors(scene, errors) if errors else scene
 
 
-def with_model_error(scene: Scene, name: str, change: float) -> Scene:
-    """The scene with one error of its models larger, by standard deviations, within what models allow."""
-    return with_model_errors(scene, {name: change})
-
-
 def with_model_errors(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """The same with several errors; a cause keeps its place, so that scenes differ in numbers alone."""
+    """The scene with errors of its models larger, by standard deviations, within what models allow.
+
+    A cause keeps its place in the list, so that scenes differ in numbers alone.
+    """
     sums: dict[ErrorCause, list[Any]] = {}
     for each in scene.tube.model_errors:
         parts = sums.setdefault(each.cause, [0.0, 0.0])
@@ -201,14 +199,12 @@ def with_model_errors(scene: Scene, changes: Mapping[str, Any]) -> Scene:
     for name, change in changes.items():
         cause, part = error_part(name)
         parts = sums.setdefault(cause, [0.0, 0.0])
-        parts[part] = _limited(parts[part], change)
+        now = parts[part]
+        if isinstance(now, float) and isinstance(change, float):
+            largest = max(LARGEST_ERROR, abs(now))
+            parts[part] = min(max(now + change, -largest), largest)
+        else:
+            most = np.maximum(LARGEST_ERROR, np.abs(now))
+            parts[part] = plain(np.clip(now + change, -most, most))
     errors = tuple(ModelError(cause=c, even=even, odd=odd) for c, (even, odd) in sums.items())
     return replace(scene, tube=replace(scene.tube, model_errors=errors))
-
-
-def _limited(now: Any, change: Any) -> Any:
-    if isinstance(now, float) and isinstance(change, float):
-        largest = max(LARGEST_ERROR, abs(now))
-        return min(max(now + change, -largest), largest)
-    most = np.maximum(LARGEST_ERROR, np.abs(now))
-    return plain(np.clip(now + change, -most, most))

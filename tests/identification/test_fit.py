@@ -22,7 +22,7 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.scene.uncertain import with_model_error, with_value
+from ringbalance.scene.uncertain import with_model_errors, with_value
 from scenes import with_tables
 
 UNBALANCE = 1e-4 * np.array([0, 1, 1, 2, 2, 1, 0, 2])
@@ -152,7 +152,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
     kind, models = KINDS["injection"], Models.of(scene)
     covariance = sd**2 * np.eye(2 * len(data))
     for name in MODEL_ERRORS:
-        low, high = (kind.predict(with_model_error(scene, name, n), data, models) for n in (-1, 1))
+        low, high = (kind.predict(with_model_errors(scene, {name: n}), data, models) for n in (-1, 1))
         covariance += np.outer(high - low, high - low) / 4
     precision = np.linalg.inv(covariance)
     values = np.array([p.value for p in result.parameters])

@@ -91,21 +91,26 @@ def faces(kind: str) -> tuple[tuple[int, ...], ...]:
 
 @cache
 def shape_gradients(kind: str) -> FloatArray:
-    """Gradients of the shape functions, shape (places, nodes, 3), at places that decide on a cell's sign.
+    """Gradients of the shape functions, shape (points, nodes, 3), at points that decide on a cell's sign.
 
     The Jacobian of a straight tetrahedron is constant; elsewhere it is a polynomial, of degree 3 on a
     tetra10 and up to 2 (5) in each coordinate of a hexahedron of first (second) order, and is looked at on a
-    lattice with as many places in each direction as it has coefficients, or more.
+    lattice with as many points in each direction as it has coefficients, or more.
     """
     powers, coefficients = _polynomials(kind)
-    at = _lattice(kind)
-    found = np.empty((len(at), NODES[kind], 3))
+    steps = {"tetra": 1, "tetra10": 4, "hexahedron": 2}.get(kind, 5)
+    lattice = np.array(list(product(range(steps + 1), repeat=3)), dtype=np.float64) / steps
+    if kind == "tetra":
+        lattice = lattice[:1]
+    elif kind == "tetra10":
+        lattice = lattice[lattice.sum(axis=1) <= 1 + 1e-9]
+    gradients = np.empty((len(lattice), NODES[kind], 3))
     for axis in range(3):
         lower = powers.copy()
         lower[:, axis] = np.maximum(lower[:, axis] - 1, 0)
-        slopes = powers[:, axis] * np.prod(at[:, None, :] ** lower, axis=2)
-        found[:, :, axis] = slopes @ coefficients
-    return found
+        slopes = powers[:, axis] * np.prod(lattice[:, None, :] ** lower, axis=2)
+        gradients[:, :, axis] = slopes @ coefficients
+    return gradients
 
 
 def shape_values(kind: str, place: FloatArray) -> FloatArray:
@@ -117,26 +122,15 @@ def shape_values(kind: str, place: FloatArray) -> FloatArray:
 @cache
 def _polynomials(kind: str) -> tuple[FloatArray, FloatArray]:
     """Exponents of the monomials, shape (n, 3), and coefficients of the shape functions, shape (n, nodes)."""
-    powers = np.array(_powers(kind), dtype=np.float64)
-    return powers, np.linalg.inv(np.prod(reference_nodes(kind)[:, None, :] ** powers, axis=2))
-
-
-def _powers(kind: str) -> list[tuple[int, ...]]:
-    """Exponents of the monomials that the shape functions are made of."""
     if CORNERS[kind] == 4:
         degree = 1 if kind == "tetra" else 2
-        return [each for each in product(range(3), repeat=3) if sum(each) <= degree]
-    highest = 1 if kind == "hexahedron" else 2
-    squares = {"hexahedron": 0, "hexahedron20": 1, "hexahedron27": 3}[kind]
-    return [each for each in product(range(highest + 1), repeat=3) if each.count(2) <= squares]
-
-
-def _lattice(kind: str) -> FloatArray:
-    steps = {"tetra": 1, "tetra10": 4, "hexahedron": 2}.get(kind, 5)
-    places = np.array(list(product(range(steps + 1), repeat=3)), dtype=np.float64) / steps
-    if kind == "tetra":
-        return places[:1]
-    return places[places.sum(axis=1) <= 1 + 1e-9] if kind == "tetra10" else places
+        exponents = [each for each in product(range(3), repeat=3) if sum(each) <= degree]
+    else:
+        highest = 1 if kind == "hexahedron" else 2
+        squares = {"hexahedron": 0, "hexahedron20": 1, "hexahedron27": 3}[kind]
+        exponents = [each for each in product(range(highest + 1), repeat=3) if each.count(2) <= squares]
+    powers = np.array(exponents, dtype=np.float64)
+    return powers, np.linalg.inv(np.prod(reference_nodes(kind)[:, None, :] ** powers, axis=2))
 
 
 def corners_of(kind: str) -> int:

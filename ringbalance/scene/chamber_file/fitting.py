@@ -54,22 +54,32 @@ def placed(
         across the shaft, from the next of the file's axes: from x for a shaft along z, from y for x, from z
         for y; None for the middle of what the nodes take up.
     """
-    turned = _turned(body.points, axis)
-    angle = np.arctan2(turned[:, 1], turned[:, 0])
+    # The shaft along z; directions keep their handedness.
+    third = "xyz".index(axis[-1])
+    order = [(third + 1) % 3, (third + 2) % 3, third]
+    signs = np.array([1.0, -1.0, -1.0]) if axis.startswith("-") else np.ones(3)
+    x, y, z = (body.points[:, order] * signs).T
     # The nodes take up all of the circle but the widest gap.
-    ordered = np.sort(angle[np.unique(body.cells)])
+    ordered = np.sort(np.arctan2(y, x)[np.unique(body.cells)])
     gaps = np.diff(np.append(ordered, ordered[0] + 2 * math.pi))
     widest = int(gaps.argmax())
     start = float(ordered[(widest + 1) % len(ordered)])
     extent = 2 * math.pi - float(gaps[widest])
     centre = start + extent / 2 if middle is None else middle
     c, s = math.cos(-centre), math.sin(-centre)
-    x, y, z = turned.T
     points = np.column_stack([c * x - s * y, s * x + c * y, z])
-    inner, where = _nearest(points, surface, corners_of(body.kind))
+    inner, node = _nearest(points, surface, corners_of(body.kind))
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     points[:, 2] -= (low + high) / 2
     outer = float(np.hypot(points[:, 0], points[:, 1]).max())
+    wrong = []
+    if extent > math.pi * (1 + DRAWING_ROUNDING) or inner <= 1e-6 * outer:
+        what = "touches the shaft's axis" if inner <= 1e-6 * outer else "reaches round the shaft's axis"
+        problem = f"the chamber {what}: it takes {written(extent, 'deg')}, and its node nearest to the axis "
+        problem += f"lies {body.at(np.array([node]))}"
+        allowed = "one chamber beside the axis; see mesh_axis and the origin"
+        wrong.append(Contradiction(problem=problem, allowed=allowed))
+    wrong += _walls(points, boundaries)
     dimensions = {
         "outer_radius": outer,
         "inner_radius": inner,
@@ -77,18 +87,9 @@ def placed(
         "central_angle": extent,
         "plate_thickness": 0.0,
     }
-    found = [*_about_axis(body, inner, outer, extent, where), *_walls(points, boundaries)]
     # As many digits as a file's rounding leaves.
     rounded = {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
-    return Placed(points=points, dimensions=rounded), tuple(found)
-
-
-def _turned(points: FloatArray, axis: Axis) -> FloatArray:
-    """Points with the shaft along z; directions keep their handedness."""
-    third = "xyz".index(axis[-1])
-    order = [(third + 1) % 3, (third + 2) % 3, third]
-    signs = np.array([1.0, -1.0, -1.0]) if axis.startswith("-") else np.ones(3)
-    return np.asarray(points[:, order] * signs, dtype=np.float64)
+    return Placed(points=points, dimensions=rounded), tuple(wrong)
 
 
 def _nearest(points: FloatArray, surface: IntArray, corners: int) -> tuple[float, int]:
@@ -113,16 +114,6 @@ def _from_origin(first: FloatArray, last: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(nearest[:, 0], nearest[:, 1]), dtype=np.float64)
 
 
-def _about_axis(body: Body, inner: float, outer: float, extent: float, node: int) -> Iterator[Contradiction]:
-    if extent > math.pi * (1 + DRAWING_ROUNDING) or inner <= 1e-6 * outer:
-        what = "touches the shaft's axis" if inner <= 1e-6 * outer else "reaches round the shaft's axis"
-        problem = f"the chamber {what}: it takes {written(extent, 'deg')}, and its node nearest to the axis "
-        problem += f"lies {body.at(np.array([node]))}"
-        yield Contradiction(
-            problem=problem, allowed="one chamber beside the axis; see mesh_axis and the origin"
-        )
-
-
 def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[Contradiction]:
     """The outer wall reaches farther out than the inner wall, and has the outermost nodes."""
     if OUTER_WALL not in boundaries:
@@ -130,25 +121,23 @@ def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[C
     radius = np.hypot(points[:, 0], points[:, 1])
     wall = radius[boundaries[OUTER_WALL]]
     highest = max(float(radius[each].max()) for each in boundaries.values())
+    allowed = f'"{OUTER_WALL}" at the outside of the chamber'
     if wall.max() < highest * (1 - 1e-6):
         name = next(name for name, each in boundaries.items() if radius[each].max() == highest)
         problem = f'"{OUTER_WALL}" reaches to a radius of {written(float(wall.max()), "mm")}, but "{name}" '
         problem += f"to {written(highest, 'mm')}: names exchanged, or the shaft is not mesh_axis"
-        yield Contradiction(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
-    elif _facing(points, boundaries[OUTER_WALL]) < _LEAST_FACING:
-        problem = (
-            f'"{OUTER_WALL}" lies along the radius, no part of it holds liquid outward: a plate or an end'
-        )
-        yield Contradiction(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
-
-
-def _facing(points: FloatArray, facets: IntArray) -> float:
-    """Mean size of the radial part of a boundary's normals, by its corners."""
-    corner = points[facets[:, :3]]
+        yield Contradiction(problem=problem, allowed=allowed)
+        return
+    # Mean size of the radial part of the wall's normals, by its corners.
+    corner = points[boundaries[OUTER_WALL][:, :3]]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     middle = corner.mean(axis=1)[:, :2]
     radial = np.abs((normal[:, :2] * middle).sum(axis=1)) / np.linalg.norm(middle, axis=1)
-    return float(radial.sum() / np.linalg.norm(normal, axis=1).sum())
+    if float(radial.sum() / np.linalg.norm(normal, axis=1).sum()) < _LEAST_FACING:
+        problem = (
+            f'"{OUTER_WALL}" lies along the radius, no part of it holds liquid outward: a plate or an end'
+        )
+        yield Contradiction(problem=problem, allowed=allowed)
 
 
 def port_radius(points: FloatArray, boundaries: Mapping[str, IntArray]) -> float | None:
@@ -171,27 +160,38 @@ def unfitting(
     reading: SceneReading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
 ) -> Iterator[Contradiction]:
     """Contradictions between the mesh and other keys of the scene."""
-    extent = found.dimensions["central_angle"]
+    points, extent = found.points, found.dimensions["central_angle"]
     if reading.lacks("disc.chambers") and even_number_of_chambers(extent) is None:
         problem = f"chambers is needed: the mesh takes {written(extent, 'deg')}, no even part of 360 deg"
         yield Contradiction(problem=problem, allowed="chambers in [disc]")
     chambers = reading.values.get("disc.chambers") or even_number_of_chambers(extent)
     if chambers is not None:
-        yield from _opening_findings(body, found.points, chambers=chambers)
-    port, own = reading.values.get(PORT_RADIUS), port_radius(found.points, boundaries)
-    wrong = tuple(_scale_findings(reading, found.dimensions, unit=unit, port=own))
-    if wrong:
-        yield from wrong
+        # No node lies outside the sector that a chamber has at most.
+        half = math.pi / chambers
+        angle = np.abs(np.arctan2(points[:, 1], points[:, 0]))
+        outside = np.flatnonzero(angle > half * (1 + DRAWING_ROUNDING))
+        if len(outside):
+            problem = f"nodes lie outside the opening angle, 360 deg / {chambers} chambers about the middle "
+            problem += f"({len(outside)}); farthest: {body.at(outside[np.argsort(-angle[outside])])}"
+            allowed = f"within {written(half, 'deg')} on both sides of the middle (mesh_middle)"
+            yield Contradiction(problem=problem, allowed=allowed)
+    port, mesh_port = reading.values.get(PORT_RADIUS), port_radius(points, boundaries)
+    wrong_scale = tuple(_scale_findings(reading, found.dimensions, unit=unit, port=mesh_port))
+    if wrong_scale:
+        yield from wrong_scale
         return
-    if port is not None:
-        yield from _port_findings(found.points, boundaries, found.dimensions, port=port)
-    radii = {
-        "port_radius": port or own,
-        "inlet_radius": reading.values.get("gas.inlet_radius"),
-    }
+    if port is not None and PORT in boundaries:
+        radius = np.hypot(points[:, 0], points[:, 1])[boundaries[PORT]]
+        low, high = float(radius.min()), float(radius.max())
+        rounding = 1e-6 * found.dimensions["outer_radius"]
+        if not low - rounding <= port <= high + rounding:
+            span = f"from {written(low, 'mm')} to {written(high, 'mm')}"
+            problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {span}'
+            yield Contradiction(problem=problem, allowed="a radius on the port, or no port_radius")
+    radii = {"port_radius": port or mesh_port, "inlet_radius": reading.values.get("gas.inlet_radius")}
     yield from _covered_findings(
         body,
-        found.points,
+        points,
         radii={name: value for name, value in radii.items() if value is not None},
         fill=reading.values.get("disc.max_fill_ratio", 0.5),
     )
@@ -233,36 +233,6 @@ def _scale_findings(
         problem=f"{problem}wrong scale; {reason}",
         allowed=allowed or f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m",
     )
-
-
-def _opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Iterator[Contradiction]:
-    """Nodes outside the sector that a chamber has at most. Args: `points`: as placed."""
-    half = math.pi / chambers
-    angle = np.abs(np.arctan2(points[:, 1], points[:, 0]))
-    wrong = np.flatnonzero(angle > half * (1 + DRAWING_ROUNDING))
-    if len(wrong):
-        worst = wrong[np.argsort(-angle[wrong])]
-        problem = f"nodes lie outside the opening angle, 360 deg / {chambers} chambers about the middle "
-        problem += f"({len(wrong)}); farthest: {body.at(worst)}"
-        limit = written(half, "deg")
-        yield Contradiction(
-            problem=problem, allowed=f"within {limit} on both sides of the middle (mesh_middle)"
-        )
-
-
-def _port_findings(
-    points: FloatArray, boundaries: Mapping[str, IntArray], dimensions: Mapping[str, float], *, port: float
-) -> Iterator[Contradiction]:
-    """A port's radius beside the named port."""
-    if PORT not in boundaries:
-        return
-    radius = np.hypot(points[:, 0], points[:, 1])[boundaries[PORT]]
-    low, high = float(radius.min()), float(radius.max())
-    rounding = 1e-6 * dimensions["outer_radius"]
-    if not low - rounding <= port <= high + rounding:
-        where = f"from {written(low, 'mm')} to {written(high, 'mm')}"
-        problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {where}'
-        yield Contradiction(problem=problem, allowed="a radius on the port, or no port_radius")
 
 
 def _covered_findings(

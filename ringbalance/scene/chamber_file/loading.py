@@ -6,7 +6,6 @@ import hashlib
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 from ringbalance.scene.chamber_file.body import Body, Contents, MeshFileError
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, Placed, placed, port_radius, unfitting
-from ringbalance.scene.chamber_file.mesh_file import FORMATS, READERS, read_mesh_file
+from ringbalance.scene.chamber_file.mesh_file import FORMATS, READERS
 from ringbalance.scene.chamber_file.record import ChamberGeometry, MeshKeys
 from ringbalance.scene.chamber_file.soundness import Facets, boundaries_of, oriented
 from ringbalance.scene.faults import Fault
@@ -43,14 +42,34 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
         problem, allowed = "it has no meaning without mesh", "mesh as well, or leave the key out"
         stated = filter(reading.given, keys)
         return reading, tuple(reading.fault(key, problem=problem, allowed=allowed) for key in stated)
-    superfluous, unit = tuple(_superfluous(reading)), tuple(_unit_faults(reading))
+    allowed = "either mesh or this key; the mesh decides"
+    superfluous = tuple(
+        reading.fault(f"disc.{key}", problem="it follows from the mesh", allowed=allowed)
+        for key in SHAPE
+        if reading.given(f"disc.{key}")
+    )
+    unit: tuple[Fault, ...] = ()
+    if reading.known("disc.mesh"):
+        path, step = "disc.mesh_unit", _is_step(Path(reading.values["disc.mesh"]))
+        if step and reading.given(path):
+            problem, allowed = "a STEP file has its own unit", "leave the key out"
+            unit = (reading.fault(path, problem=problem, allowed=allowed),)
+        elif not step and reading.lacks(path):
+            unit = (reading.missing(path, "the file's coordinates have no unit"),)
     unknown = replace(reading, broken=reading.broken | {f"disc.{key}" for key in (*SHAPE, "geometry")})
     if unit or reading.broken & set(keys) or not reading.known("accuracy.tolerance"):
         return unknown, (*superfluous, *unit)
     try:
         geometry, found = _chamber(reading, folder)
     except (MeshFileError, MemoryError) as error:
-        return unknown, (*superfluous, *_mesh_faults(reading, error))
+        problem = "memory does not suffice to check a mesh of this size"
+        scarce = Contradiction(problem=problem, allowed="a coarser mesh")
+        faults = list(superfluous)
+        for each in error.findings if isinstance(error, MeshFileError) else (scarce,):
+            # What a file calls its parts may not be printable.
+            problem = "".join(letter if letter.isprintable() else "?" for letter in each.problem)
+            faults.append(reading.fault("disc.mesh", problem=problem, allowed=each.allowed))
+        return unknown, tuple(faults)
     if superfluous:
         return unknown, superfluous
     values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
@@ -60,46 +79,20 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
     return reading.following({**values, "disc.geometry": geometry}), ()
 
 
-def _mesh_faults(reading: SceneReading, error: MeshFileError | MemoryError) -> Iterator[Fault]:
-    """One error for each finding; what a file calls its parts is printable in it."""
-    scarce = Contradiction(
-        problem="memory does not suffice to check a mesh of this size", allowed="a coarser mesh"
-    )
-    for each in error.findings if isinstance(error, MeshFileError) else (scarce,):
-        problem = "".join(letter if letter.isprintable() else "?" for letter in each.problem)
-        yield reading.fault("disc.mesh", problem=problem, allowed=each.allowed)
-
-
-def _superfluous(reading: SceneReading) -> Iterator[Fault]:
-    for key in SHAPE:
-        if reading.given(f"disc.{key}"):
-            allowed = "either mesh or this key; the mesh decides"
-            yield reading.fault(f"disc.{key}", problem="it follows from the mesh", allowed=allowed)
-
-
-def _unit_faults(reading: SceneReading) -> Iterator[Fault]:
-    path = "disc.mesh_unit"
-    if not reading.known("disc.mesh"):
-        return
-    step = _is_step(Path(reading.values["disc.mesh"]))
-    if step and reading.given(path):
-        yield reading.fault(path, problem="a STEP file has its own unit", allowed="leave the key out")
-    elif not step and reading.lacks(path):
-        problem = "the file's coordinates have no unit"
-        yield reading.fault(path, problem=problem, allowed=reading.allowed(path))
-
-
 def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
-    path = folder / name
-    content = _content_of(path)
-    unit = _STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
-    tolerance = reading.values["accuracy.tolerance"]
-    if _is_step(path):
-        contents = _meshed_step(content, tolerance=tolerance)
-    else:
-        contents = read_mesh_file(content, ending=path.suffix.lower())
+    path, ending, step = folder / name, Path(name).suffix, _is_step(Path(name))
+    if ending.lower() not in (*READERS, *_STEP_ENDINGS):
+        raise MeshFileError.of(f"a name that ends with {ending[:20] or 'no .ending'} is not read", FORMATS)
+    content, problem = read_bounded(path, what="mesh", most=_LARGEST_FILE, regular=True)
+    if problem:
+        raise MeshFileError.of(f"{path}: {problem}", "a path from the folder of the scene file")
+    if not content.strip():
+        raise MeshFileError.of("the file is empty", FORMATS)
+    unit = _STEP_UNIT if step else reading.values["disc.mesh_unit"]
+    tolerance = reading.values["accuracy.tolerance"] if step else 0.0
+    contents = _meshed_step(content, tolerance=tolerance) if step else READERS[ending.lower()](content)
     body = Body.of(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
     body, misshapen = oriented(body)
     facets = Facets.of(body)
@@ -123,10 +116,10 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
     points, cells = found.points[used], new[body.cells]
     for array in (points, cells, *arrays.values()):
         array.flags.writeable = False
-    way = (unit, axis, middle, tolerance if _is_step(path) else 0.0)
+    reading_options = (unit, axis, middle, tolerance)
     geometry = ChamberGeometry(
         file=name,
-        digest=hashlib.sha256(content + repr(way).encode()).hexdigest(),
+        digest=hashlib.sha256(content + repr(reading_options).encode()).hexdigest(),
         kind=body.kind,
         points=points,
         cells=cells,
@@ -138,20 +131,6 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
 def _is_step(path: Path) -> bool:
     """True for a file of a solid, which is yet to be meshed and has its own unit."""
     return path.suffix.lower() in _STEP_ENDINGS
-
-
-def _content_of(path: Path) -> bytes:
-    """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
-    if path.suffix.lower() not in (*READERS, *_STEP_ENDINGS):
-        raise MeshFileError.of(
-            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS
-        )
-    content, problem = read_bounded(path, what="mesh", most=_LARGEST_FILE, regular=True)
-    if problem:
-        raise MeshFileError.of(f"{path}: {problem}", "a path from the folder of the scene file")
-    if not content.strip():
-        raise MeshFileError.of("the file is empty", FORMATS)
-    return content
 
 
 def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
@@ -185,4 +164,4 @@ def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
             lines = child.stderr.decode("utf-8", errors="replace").strip().splitlines()
             reason = "".join(each for each in (lines or ["it ended"])[-1] if each.isprintable())[:200]
             raise MeshFileError.of(f"Gmsh cannot mesh the solid: {reason}", "one solid with a closed surface")
-        return read_mesh_file(target.read_bytes(), ending=".msh")
+        return READERS[".msh"](target.read_bytes())

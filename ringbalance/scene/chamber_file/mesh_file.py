@@ -21,7 +21,7 @@ from typing import Final
 import meshio
 import numpy as np
 
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.body import Contents, Mark, MeshFileError
 from ringbalance.scene.chamber_file.elements import (
     CELL_KINDS,
@@ -63,14 +63,6 @@ _COMPRESSED: Final = re.compile(rb"<VTKFile[^>]*\bcompressor=")
 _INLINE: Final = re.compile(rb"<DataArray[^>]*\bformat=.binary.[^>]*>\s*")
 _APPENDED: Final = re.compile(rb"<AppendedData\s+encoding=.(raw|base64).\s*>\s*_")
 _OFFSET: Final = re.compile(rb"<DataArray[^>]*\boffset=.(\d{1,12}).")
-
-
-def read_mesh_file(content: bytes, *, ending: str) -> Contents:
-    """The contents of a mesh file's bytes; `ending` is that of its name, one of `READERS`.
-
-    Raises: MeshFileError: it is no such file, or damaged.
-    """
-    return READERS[ending](content)
 
 
 def _by_meshio(
@@ -137,7 +129,9 @@ def _groups(mesh: meshio.Mesh) -> Iterator[Mark]:
     """
     for name, sets in mesh.cell_sets.items():
         for block, rows in enumerate(sets if not name.startswith("gmsh:") else ()):
-            yield Mark(name=_known(name), block=block, where=_mask(rows, len(mesh.cells[block])))
+            mask = np.zeros(len(mesh.cells[block]), dtype=np.bool_)
+            mask[np.asarray(rows, dtype=np.int64)] = True
+            yield Mark(name=_known(name), block=block, where=mask)
     names = {(int(of), int(number)): name for name, (number, of) in mesh.field_data.items()}
     for block, numbers in enumerate(mesh.cell_data.get("gmsh:physical", ())):
         of = dimension(mesh.cells[block].type)
@@ -151,12 +145,6 @@ def _known(name: str) -> str:
     """A name of a boundary or the volume, which a file may have in any case; other names as they are."""
     lower = name.strip().lower()
     return lower if lower in (*KNOWN_NAMES, VOLUME) else name
-
-
-def _mask(rows: object, count: int) -> BoolArray:
-    mask = np.zeros(count, dtype=np.bool_)
-    mask[np.asarray(rows, dtype=np.int64)] = True
-    return mask
 
 
 def _read_vtu(content: bytes) -> Contents:
@@ -279,7 +267,6 @@ def _read_abaqus(content: bytes) -> Contents:
         if keyword == "step":
             break
         if not _PASSED.fullmatch(keyword):
-            _refuse_unread(keyword, options)
             _add(parts, keyword, options, data)
     if not parts.nodes or not parts.elements:
         raise MeshFileError.of(
@@ -322,7 +309,7 @@ def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
         yield " ".join(word.lower().split()), {key: value for key, value in options.items() if key}, data
 
 
-def _refuse_unread(keyword: str, options: dict[str, str]) -> None:
+def _add(parts: _MeshContent, keyword: str, options: dict[str, str], data: list[str]) -> None:
     """Raises: MeshFileError: a keyword or an option that might change the mesh, and that is not read."""
     if keyword == "include":
         raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
@@ -334,9 +321,6 @@ def _refuse_unread(keyword: str, options: dict[str, str]) -> None:
             option = f"{key}={value}".rstrip("=").upper()[:40]
             names = ", ".join(each.upper() for each in _READ[keyword]) or "none"
             raise MeshFileError.of(f"*{keyword.upper()} has the option {option}, which is not read", names)
-
-
-def _add(parts: _MeshContent, keyword: str, options: dict[str, str], data: list[str]) -> None:
     if keyword == "instance" and data:
         raise MeshFileError.of(
             "*INSTANCE moves the part", "a part in its final place, or a mesh without parts"
@@ -344,7 +328,10 @@ def _add(parts: _MeshContent, keyword: str, options: dict[str, str], data: list[
     if keyword == "node":
         parts.nodes.append(_table(data, 4, "*NODE"))
     elif keyword == "element":
-        kind = _kind(options.get("type", ""))
+        name = options.get("type", "").upper()
+        kind = next((kind for pattern, kind in _KINDS if re.fullmatch(pattern, name)), None)
+        if kind is None:
+            raise MeshFileError.of(f"*ELEMENT has the unknown type {name[:20] or 'none'}", _ALLOWED)
         rows = _whole(_table(data, 1 + _NODES[kind], "*ELEMENT"), "*ELEMENT")
         parts.elements.append((kind, options.get("elset", ""), rows))
     elif keyword == "elset":
@@ -378,13 +365,6 @@ def _whole(values: FloatArray, what: str) -> IntArray:
     if not ((numbers == values) & (np.abs(values) < 2**53)).all():
         raise MeshFileError.of(f"{what} has a fraction where a whole number belongs")
     return numbers
-
-
-def _kind(name: str) -> str:
-    kind = next((kind for pattern, kind in _KINDS if re.fullmatch(pattern, name.upper())), None)
-    if kind is None:
-        raise MeshFileError.of(f"*ELEMENT has the unknown type {name[:20].upper() or 'none'}", _ALLOWED)
-    return kind
 
 
 def _set(data: list[str], generate: bool, parts: _MeshContent) -> IntArray:

@@ -77,13 +77,25 @@ class Facets:
         ordered = np.sort(body.cells, axis=1)
         twice = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
         yield from _about(body, "cells have a node twice", body.corners[twice], "cells with different nodes")
-        crowded = [*_same_cells(body), *_crowded_facets(body, self)]
+        again = body.corners[_same_rows(np.sort(body.corners, axis=1))]
+        shared = np.flatnonzero(self.shared)
+        shared = shared[np.unique(self.keys[shared], return_index=True)[1]]
+        rows = self.nodes[shared, : self.corners]
+        crowded = [
+            *_about(body, "cells stand in the file twice", again, "each cell once"),
+            *_about(body, "facets belong to more than two cells", rows, "at most two cells at a facet"),
+        ]
         doubled = [*_doubled_nodes(body, self)]
         hanging = [] if doubled else [*_hanging_nodes(body, self)]
         parts = [*_several_volumes(body, self)]
         yield from (*crowded, *doubled, *hanging, *parts)
         if not (crowded or doubled or hanging or parts):
-            yield from _pinched(body, self)
+            # Edges at which the outer surface meets itself.
+            edges = np.sort(edges_of(self.nodes[self.outer, : self.corners]).reshape(-1, 2), axis=1)
+            different, counts = np.unique(edges, axis=0, return_counts=True)
+            what = "the surface is open or touches itself along edges"
+            allowed = "a closed surface, two facets at each edge"
+            yield from _about(body, what, different[counts != 2], allowed)
         unused = np.setdiff1d(np.arange(len(body.points)), np.append(body.cells.ravel(), body.drawing))
         allowed = "nodes of cells only (export the named volume alone)"
         yield from _about(body, "nodes belong to no cell", unused, allowed)
@@ -103,18 +115,6 @@ def _same_rows(rows: IntArray) -> IntArray:
     order = np.argsort(code, kind="stable")
     same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
     return np.asarray(order[1:][same], dtype=np.int64)
-
-
-def _same_cells(body: Body) -> Iterator[Contradiction]:
-    again = _same_rows(np.sort(body.corners, axis=1))
-    yield from _about(body, "cells stand in the file twice", body.corners[again], "each cell once")
-
-
-def _crowded_facets(body: Body, facets: Facets) -> Iterator[Contradiction]:
-    shared = np.flatnonzero(facets.shared)
-    _, first = np.unique(facets.keys[shared], return_index=True)
-    rows = facets.nodes[shared[first], : facets.corners]
-    yield from _about(body, "facets belong to more than two cells", rows, "at most two cells at a facet")
 
 
 def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
@@ -141,6 +141,7 @@ def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
 
 
 def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> IntArray:
+    """Nodes that lie on triangles, away from the corners of these."""
     nodes = np.unique(triangles)
     if not len(nodes):
         return nodes
@@ -156,21 +157,17 @@ def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> 
     candidates = nodes[np.fromiter((node for each in lists for node in each), dtype=np.int64)]
     foreign = (owners[which] != candidates[:, None]).all(axis=1)
     which, candidates = which[foreign], candidates[foreign]
-    first, one, two = corners[which].transpose(1, 0, 2)
-    inside = _inside(points[candidates] - first, one - first, two - first)
-    return np.unique(candidates[inside])
-
-
-def _inside(at: FloatArray, one: FloatArray, two: FloatArray) -> BoolArray:
-    """True for places that, from a corner, lie on the triangles of two sides, away from their corners."""
-    normal = np.cross(one, two)
+    first, second, third = corners[which].transpose(1, 0, 2)
+    # Barycentric coordinates of each candidate, and its height over the plane.
+    node, side, other = points[candidates] - first, second - first, third - first
+    normal = np.cross(side, other)
     area = np.maximum((normal**2).sum(axis=1), 1e-300)
-    height = np.abs((at * normal).sum(axis=1)) / np.sqrt(area)
-    share_one = (np.cross(at, two) * normal).sum(axis=1) / area
-    share_two = (np.cross(one, at) * normal).sum(axis=1) / area
-    shares = np.column_stack([1 - share_one - share_two, share_one, share_two])
+    height = np.abs((node * normal).sum(axis=1)) / np.sqrt(area)
+    at_second = (np.cross(node, other) * normal).sum(axis=1) / area
+    at_third = (np.cross(side, node) * normal).sum(axis=1) / area
+    shares = np.column_stack([1 - at_second - at_third, at_second, at_third])
     flat = height < _ON * np.sqrt(np.sqrt(area))
-    return np.asarray(flat & (shares > -_ON).all(axis=1) & (shares < 1 - _ON).all(axis=1), dtype=np.bool_)
+    return np.unique(candidates[flat & (shares > -_ON).all(axis=1) & (shares < 1 - _ON).all(axis=1)])
 
 
 def _several_volumes(body: Body, facets: Facets) -> Iterator[Contradiction]:
@@ -183,14 +180,6 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Contradiction]:
         _, first = np.unique(part, return_index=True)
         problem = f"it falls into {count} separate volumes, which begin {body.at(body.corners[first])}"
         yield Contradiction(problem=problem, allowed="one chamber, whose cells meet at facets")
-
-
-def _pinched(body: Body, facets: Facets) -> Iterator[Contradiction]:
-    """Edges at which the outer surface meets itself."""
-    edges = np.sort(edges_of(facets.nodes[facets.outer, : facets.corners]).reshape(-1, 2), axis=1)
-    different, counts = np.unique(edges, axis=0, return_counts=True)
-    what, allowed = "the surface is open or touches itself along edges", "two facets at each edge"
-    yield from _about(body, what, different[counts != 2], f"a closed surface, {allowed}")
 
 
 _AT_ONCE: Final = 4096
@@ -248,18 +237,16 @@ def _misshapen(
     word = "are inverted" if fewer else "have another orientation than the others"
     allowed = "cells that all have the same orientation"
     yield from _about(body, f"cells {word}", body.corners[inverted], allowed)
-    middles = len(between(body.kind)) > CORNERS[body.kind]
+    corners = between(body.kind)
     for each in _about(body, "cells fold over", body.corners[folded], "a positive Jacobian everywhere"):
-        node = [_farthest_middle(body, int(np.flatnonzero(folded)[0]))] if middles else []
-        hint = f"; farthest from the middle of its side is the node {body.at(np.array(node))}" if node else ""
+        hint = ""
+        if len(corners) > CORNERS[body.kind]:
+            nodes = body.cells[np.flatnonzero(folded)[0]]
+            points = body.points[nodes]
+            straight = np.array([points[list(ends)].mean(axis=0) for ends in corners])
+            farthest = nodes[[np.linalg.norm(points - straight, axis=1).argmax()]]
+            hint = f"; farthest from the middle of its side is the node {body.at(farthest)}"
         yield replace(each, problem=each.problem + hint)
-
-
-def _farthest_middle(body: Body, cell: int) -> int:
-    """The mid-side node of a cell that is farthest from where a straight cell would have it."""
-    points = body.points[body.cells[cell]]
-    straight = np.array([points[list(corners)].mean(axis=0) for corners in between(body.kind)])
-    return int(body.cells[cell][np.linalg.norm(points - straight, axis=1).argmax()])
 
 
 @cache

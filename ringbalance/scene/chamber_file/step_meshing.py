@@ -23,7 +23,12 @@ _Entity = tuple[int, int]
 
 def _mesh_step(source: str, target: str, share: float) -> None:
     """Write the mesh of a STEP file in metres. Args: `share`: size of cells over the solid's extent."""
-    _start()
+    gmsh.initialize(["gmsh", "-nopopup"], readConfigFiles=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+    gmsh.option.setNumber("General.NumThreads", 1)
+    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.model.occ.importShapes(source)
     gmsh.model.occ.synchronize()
     volumes = gmsh.model.getEntities(3)
@@ -39,53 +44,34 @@ def _mesh_step(source: str, target: str, share: float) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMin", size / 50)
     gmsh.model.mesh.generate(3)
     faces = gmsh.model.getEntities(2)
-    named = {face: name for face in faces if (name := _name(face))} or dict(_placed(faces))
+    # A name is the last part of a label such as "Shapes/Body/outer_wall".
+    labels = {face: str(gmsh.model.getEntityName(*face)).rsplit("/", 1)[-1].strip().lower() for face in faces}
+    named = {face: label for face, label in labels.items() if label in KNOWN_NAMES} or dict(_placed(faces))
     for name in dict.fromkeys(named.values()):
         gmsh.model.addPhysicalGroup(2, [tag for (_, tag), each in named.items() if each == name], name=name)
     gmsh.model.addPhysicalGroup(3, [tag for _, tag in volumes], name="chamber")
     gmsh.write(target)
 
 
-def _start() -> None:
-    """Start Gmsh, silent and in metres."""
-    gmsh.initialize(["gmsh", "-nopopup"], readConfigFiles=False)
-    for option, value in (
-        ("General.Terminal", 0),
-        ("Geometry.OCCImportLabels", 1),
-        ("General.NumThreads", 1),
-    ):
-        gmsh.option.setNumber(option, value)
-    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-    gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-
-
-def _name(face: _Entity) -> str:
-    """The last part of a label such as "Shapes/Body/outer_wall", where it is a name of a boundary."""
-    label = str(gmsh.model.getEntityName(*face)).rsplit("/", 1)[-1].strip().lower()
-    return label if label in KNOWN_NAMES else ""
-
-
 def _placed(faces: list[_Entity]) -> Iterator[tuple[_Entity, str]]:
     """Names that follow from where faces lie about the z axis."""
-    places = {face: _nodes(face) for face in faces}
-    radii = [radius for each in places.values() for radius, _ in each]
-    heights = [height for each in places.values() for _, height in each]
+    nodes = {}
+    for face in faces:
+        _, xyz, _ = gmsh.model.mesh.getNodes(*face, includeBoundary=True)
+        rows = zip(xyz[::3], xyz[1::3], xyz[2::3], strict=True)
+        nodes[face] = [(math.hypot(x, y), z) for x, y, z in rows]
+    radii = [radius for each in nodes.values() for radius, _ in each]
+    heights = [height for each in nodes.values() for _, height in each]
     near = _SAME * max(radii)
-    for face, each in places.items():
-        for name, of, value in (
+    for face, each in nodes.items():
+        for name, axis, value in (
             ("outer_wall", 0, max(radii)),
             ("inner_wall", 0, min(radii)),
             ("end_back", 1, min(heights)),
             ("end_front", 1, max(heights)),
         ):
-            if all(abs(place[of] - value) < near for place in each):
+            if all(abs(node[axis] - value) < near for node in each):
                 yield face, name
-
-
-def _nodes(face: _Entity) -> list[tuple[float, float]]:
-    """Radius and height of the nodes on a face and its edges."""
-    _, xyz, _ = gmsh.model.mesh.getNodes(*face, includeBoundary=True)
-    return [(math.hypot(x, y), z) for x, y, z in zip(xyz[::3], xyz[1::3], xyz[2::3], strict=True)]
 
 
 if __name__ == "__main__":

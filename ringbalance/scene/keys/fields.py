@@ -212,13 +212,13 @@ def each_of(reader: ValueReader, *, example: str, count: int = 0) -> ValueReader
     def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list) or count not in (0, len(value)):
             raise FieldError(f"it is not {size}", allowed)
-        return tuple(_entry(item, place) for place, item in enumerate(value, start=1))
-
-    def _entry(item: object, place: int) -> Any:
-        try:
-            return reader.read(item)
-        except FieldError as error:
-            raise FieldError(f"entry {place}: {error.problem}", error.allowed) from error
+        values = []
+        for number_in_list, item in enumerate(value, start=1):
+            try:
+                values.append(reader.read(item))
+            except FieldError as error:
+                raise FieldError(f"entry {number_in_list}: {error.problem}", error.allowed) from error
+        return tuple(values)
 
     summary = f"{size}, each {reader.summary}"
     return ValueReader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)

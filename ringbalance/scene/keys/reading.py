@@ -157,12 +157,12 @@ def read_document(
     """
     tables = {}
     for name, table in schema.tables.items():
-        content, known = document.get(name), before.get(name) if before else None
-        if known is None or known.content is not content:
-            inside, wrong = _read_table({} if content is None else content, table.keys, (name,), known)
-            found = {f"{name}.{key}": value for key, value in inside.items()}
-            known = TableRead(content=content, values=found, rejected=tuple(wrong))
-        tables[name] = known
+        content, read = document.get(name), before.get(name) if before else None
+        if read is None or read.content is not content:
+            inside, wrong = _read_table({} if content is None else content, table.keys, (name,), read)
+            by_path = {f"{name}.{key}": value for key, value in inside.items()}
+            read = TableRead(content=content, values=by_path, rejected=tuple(wrong))
+        tables[name] = read
     values, rejected = _read_keys(document, schema.top, ())
     for each in tables.values():
         values.update(each.values)
@@ -170,15 +170,16 @@ def read_document(
     rejected += _unknown_keys(document, (*schema.top, *schema.tables), ())
     unknown = [each for each in rejected if each.kind == "unknown"][:_MOST_GUESSED]
     meant = {each.place: _meant(each, schema) for each in unknown}
-    broken = frozenset(".".join(map(str, each.place[:2])) for each in rejected) | {
-        path
-        for place, path in meant.items()
-        if path and len(place) <= 2 and not _stands_there(document, path)
-    }
+    broken = {".".join(map(str, each.place[:2])) for each in rejected}
+    for steps, path in meant.items():
+        table_name, _, key = path.rpartition(".")
+        content = document.get(table_name, {}) if table_name else document
+        if path and len(steps) <= 2 and not (isinstance(content, Mapping) and key in content):
+            broken.add(path)
     if broken:
         values = {path: value for path, value in values.items() if not {path, path.split(".")[0]} & broken}
     reading = SceneReading(
-        file=file, document=document, values=values, broken=broken, schema=schema, tables=tables
+        file=file, document=document, values=values, broken=frozenset(broken), schema=schema, tables=tables
     )
     # A key that is missing where a misspelt one was meant for it is one error, not two.
     reported = [
@@ -187,12 +188,6 @@ def read_document(
         if each.kind != "missing" or ".".join(map(str, each.place)) not in meant.values()
     ]
     return reading, tuple(_fault(each, file, schema, meant=meant.get(each.place)) for each in reported)
-
-
-def _stands_there(document: Mapping[str, Any], path: str) -> bool:
-    table, _, key = path.rpartition(".")
-    content = document.get(table, {}) if table else document
-    return isinstance(content, Mapping) and key in content
 
 
 def _read_table(
@@ -260,45 +255,41 @@ def _read_value(content: object, key: Key, place: Place) -> tuple[Any, list[_Rej
 
 def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None) -> Fault:
     """Args: `meant`: path that an unknown key was probably meant for; None where that was not looked for."""
-    place, tables = rejected.place, schema.tables
-    is_table = str(place[0]) in tables or (len(place) == 1 and isinstance(rejected.content, Mapping))
-    table, keys = (str(place[0]), place[1:]) if is_table else ("", place)
-    problem, allowed = rejected.problem, rejected.allowed
+    steps, problem, allowed = rejected.place, rejected.problem, rejected.allowed
+    unknown_table = len(steps) == 1 and isinstance(rejected.content, Mapping)
+    is_table = str(steps[0]) in schema.tables or unknown_table
+    table, keys = (str(steps[0]), steps[1:]) if is_table else ("", steps)
+    value = toml_text(rejected.content)
     if rejected.kind == "missing":
-        problem, allowed = "it is needed here", schema.key_at(place).takes.allowed
+        problem, allowed, value = "it is needed here", schema.key_at(steps).takes.allowed, MISSING
     elif rejected.kind == "unknown":
-        problem, allowed = ("unknown", "") if meant is None else _unknown(rejected, schema, meant)
-    value = MISSING if rejected.kind == "missing" else toml_text(rejected.content)
+        value = value if keys else ""
+        problem, allowed = "unknown", ""
+        if meant is not None:
+            kind, names = (
+                ("table", list(schema.tables)) if unknown_table else ("key", schema.names_at(steps[:-1]))
+            )
+            home, _, key = meant.rpartition(".")
+            hint = meant_text(key) if meant else ""
+            if meant and key == steps[-1]:
+                hint = (
+                    f" (it belongs in [{home}])"
+                    if home
+                    else " (it belongs at the top, before the first table)"
+                )
+            problem, allowed = f"unknown {kind}{hint}", ", ".join(names)
+    # Named as in "bends[2].radius"; entries of a list are counted from one.
+    path = ""
+    for step in keys:
+        path += f"[{step + 1}]" if isinstance(step, int) else ("." if path else "") + toml_key(step)
     return Fault(
         file=file,
-        table=table if table in tables else toml_key(table) if table else "",
-        key=_key_text(keys),
-        value=value if keys or rejected.kind != "unknown" else "",
+        table=table if table in schema.tables else toml_key(table) if table else "",
+        key=path,
+        value=value,
         problem=problem,
         allowed=allowed,
     )
-
-
-def _key_text(keys: Place) -> str:
-    """Name a key as in "bends[2].radius"; entries of a list are counted from one."""
-    text = ""
-    for key in keys:
-        text += f"[{key + 1}]" if isinstance(key, int) else ("." if text else "") + toml_key(key)
-    return text
-
-
-def _unknown(rejected: _Rejected, schema: Schema, meant: str) -> tuple[str, str]:
-    """Message on an unknown key or table, and the names that are allowed there."""
-    place = rejected.place
-    whole = len(place) == 1 and isinstance(rejected.content, Mapping)
-    kind, known = ("table", list(schema.tables)) if whole else ("key", schema.names_at(place[:-1]))
-    table, _, key = meant.rpartition(".")
-    hint = ""
-    if meant and key == place[-1]:
-        hint = f" (it belongs in [{table}])" if table else " (it belongs at the top, before the first table)"
-    elif meant:
-        hint = meant_text(key)
-    return f"unknown {kind}{hint}", ", ".join(known)
 
 
 def _meant(rejected: _Rejected, schema: Schema) -> str:

@@ -98,21 +98,33 @@ class Schema:
         """The schema of a kind of balancer, with what every scene file has.
 
         Args: `balancer`: how that key may be absent. `uncertainty`: that table, by default with a table of
-        half-widths for each table, where tables share names of keys.
+            half-widths for each table, where tables share names of keys.
         """
-        whole = {**tables, "uncertainty": uncertainty or _uncertainty_by_table(tables), **_RUN}
-        return cls(
-            top=MappingProxyType(
-                {
-                    "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
-                    "balancer": Key(takes=one_of(balancers), presence=balancer),
+        if uncertainty is None:
+            by_table = {}
+            for name, table in tables.items():
+                inside = {
+                    key: _half_width_of(name, each) for key, each in table.keys.items() if each.uncertain
                 }
-            ),
-            tables=MappingProxyType(
-                {n: replace(each, keys={**each.keys, ORIGIN: _origins(each)}) for n, each in whole.items()}
-            ),
-            scene=scene,
-        )
+                if inside:
+                    presence = unused("exact", f"expanded uncertainties of quantities in [{name}]")
+                    by_table[name] = Key(
+                        takes=Entries(record=dict, keys=inside, example=""), presence=presence
+                    )
+            uncertainty = TableSchema(text=_UNCERTAINTY, keys=by_table)
+        origin = Key(takes=choice(Origin), presence=unused("given", "where the value comes from"))
+        with_origins = {}
+        for name, table in {**tables, "uncertainty": uncertainty, **_RUN}.items():
+            origins = Key(
+                takes=Entries(record=dict, keys=dict.fromkeys(table.keys, origin), example=""),
+                presence=unused("every value that stands here is given", "where values come from, by key"),
+            )
+            with_origins[name] = replace(table, keys={**table.keys, ORIGIN: origins})
+        top = {
+            "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
+            "balancer": Key(takes=one_of(balancers), presence=balancer),
+        }
+        return cls(top=MappingProxyType(top), tables=MappingProxyType(with_origins), scene=scene)
 
 
 def _half_width_of(table: str, key: Key) -> Key:
@@ -120,34 +132,6 @@ def _half_width_of(table: str, key: Key) -> Key:
     return Key(
         takes=half_width(key.takes.dimension),
         presence=unused(rule, f"expanded uncertainty of the quantity in [{table}]"),
-    )
-
-
-def _uncertainty_by_table(tables: Mapping[str, TableSchema]) -> TableSchema:
-    """[uncertainty] with a table of half-widths for each table, where tables share names of keys."""
-    keys = {
-        table: {name: _half_width_of(table, key) for name, key in content.keys.items() if key.uncertain}
-        for table, content in tables.items()
-    }
-    return TableSchema(
-        text=_UNCERTAINTY,
-        keys={
-            table: Key(
-                takes=Entries(record=dict, keys=inside, example=""),
-                presence=unused("exact", f"expanded uncertainties of quantities in [{table}]"),
-            )
-            for table, inside in keys.items()
-            if inside
-        },
-    )
-
-
-def _origins(table: TableSchema) -> Key:
-    meaning = unused("given", "where the value comes from")
-    each = Key(takes=choice(Origin), presence=meaning)
-    return Key(
-        takes=Entries(record=dict, keys=dict.fromkeys(table.keys, each), example=""),
-        presence=unused("every value that stands here is given", "where values come from, by key"),
     )
 
 

@@ -93,7 +93,9 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
         # NUMBA_DISABLE_JIT is set: it is the function itself.
         return cast(Callable[P, R], dispatcher)
     if _Dispatcher is not object:
-        kind = _Guarded if _calls_python(function) else _Called
+        # By its annotation the result may hold an array or a named tuple, unless all of its words are plain.
+        result = str(function.__annotations__.get("return", "unknown"))
+        kind = _Called if set(re.findall(r"\w+", result)) <= _PLAIN else _Guarded
         dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)
     try:
         dispatcher._cache = KeptCode(function, _digest())
@@ -101,12 +103,6 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
         # A numba that keeps code in another way, or a function without a file: compile in every process.
         return cast(Callable[P, R], dispatcher)
     return cast(Callable[P, R], dispatcher)
-
-
-def _calls_python(function: Callable[..., Any]) -> bool:
-    """True when, by the annotation, the result may hold an array or a named tuple."""
-    told = str(function.__annotations__.get("return", "unknown"))
-    return not set(re.findall(r"\w+", told)) <= _PLAIN
 
 
 class _Called(_Dispatcher):  # type: ignore[misc]

@@ -59,7 +59,30 @@ def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path
     folder = _through_links(path.parent)
     folder.mkdir(parents=True, exist_ok=True)
     _remove_abandoned(folder)
-    _replace_whole(folder / path.name, content, mode=0o600 if private else 0o666)
+    target, draft, mode = folder / path.name, _draft_path(folder), 0o600 if private else 0o666
+    try:
+        with open(draft, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as stream:
+            _lock(stream, without_locks=True)
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+            if fcntl is not None:
+                # Under the lock, so that nobody takes the draft for an abandoned one.
+                os.replace(draft, target)
+        if fcntl is None:
+            os.replace(draft, target)
+    except BaseException as error:
+        draft.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(draft)):
+            error.filename = str(target)
+        raise
+    # The new name reaches the disk too, but for some file systems, and Windows, which cannot sync a folder.
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
     return path
 
 
@@ -143,11 +166,17 @@ def staged(folder: Path, *, files: Sequence[str] = (), folders: Sequence[str] = 
     with ExitStack() as stack:
         with _refused(folder):
             target = _folder(folder, files, folders)
-            place = _nearest(target)
-            for each in {place, target.parent}:
+            nearest = _nearest(target)
+            for each in {nearest, target.parent}:
                 _remove_abandoned(each)
-            stage = stack.enter_context(draft_folder(place))
-            _try_moves(stage, [target, *(target / name for name in folders)])
+            stage = stack.enter_context(draft_folder(nearest))
+            for each in filter(Path.exists, [target, *(target / name for name in folders)]):
+                probe, moved = stage / "probe", _draft_path(each)
+                probe.touch()
+                try:
+                    _move(probe, moved)
+                finally:
+                    moved.unlink(missing_ok=True)
         yield stage
         try:
             _move_all(stage, target, files)
@@ -208,16 +237,6 @@ def _refused(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _try_moves(stage: Path, folders: Sequence[Path]) -> None:
-    for folder in filter(Path.exists, folders):
-        probe, moved = stage / "probe", _draft_path(folder)
-        probe.touch()
-        try:
-            _move(probe, moved)
-        finally:
-            moved.unlink(missing_ok=True)
-
-
 def _move_all(stage: Path, target: Path, last: Sequence[str]) -> None:
     finished = {path.relative_to(stage).as_posix(): path for path in stage.rglob("*") if path.is_file()}
     for name in sorted(finished, key=lambda name: (last.index(name) if name in last else -1, name)):
@@ -267,70 +286,25 @@ def draft_folder(folder: Path) -> Iterator[Path]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def _replace_whole(target: Path, content: bytes, *, mode: int = 0o666) -> None:
-    """Write a file through a draft beside it. Raises: OSError: it cannot be; nothing is left behind."""
-    draft = _draft_path(target.parent)
-    try:
-        with open(draft, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as stream:
-            _lock(stream, without_locks=True)
-            stream.write(content)
-            stream.flush()
-            # After a power cut the old content or the new one is there: the content reaches the disk first.
-            os.fsync(stream.fileno())
-            if fcntl is not None:
-                # Under the lock, so that nobody takes the draft for an abandoned one.
-                os.replace(draft, target)
-        if fcntl is None:
-            os.replace(draft, target)
-    except BaseException as error:
-        draft.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, str(draft)):
-            error.filename = str(target)
-        raise
-    _sync_folder(target.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Bring a new name to the disk, where the system can: some file systems, and Windows, cannot."""
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
 def _remove_abandoned(folder: Path) -> None:
     """Remove the drafts of killed processes; those of living ones stay, and what cannot be removed."""
     with suppress(OSError):
-        names = [name for name in os.listdir(folder) if _NAME.fullmatch(name)]
-        for path in (folder / name for name in names):
+        for path in [folder / name for name in os.listdir(folder) if _NAME.fullmatch(name)]:
             with suppress(OSError):
-                _remove_if_abandoned(path)
-
-
-def _remove_if_abandoned(path: Path) -> None:
-    if path.is_symlink():
-        return
-    age = time.time() - path.stat().st_mtime
-    lock = path / _LOCK if path.is_dir() else path
-    if not lock.exists():
-        if age > _BEGINNING:
-            _remove(path)
-    elif fcntl is None:
-        if age > _LONGEST_WORK:
-            _remove(path)
-    else:
-        with open(lock, "r+b") as stream:
-            if age > 1.0 and _lock(stream, without_locks=age > _LONGEST_WORK):
-                _remove(path)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink()
+                if path.is_symlink():
+                    continue
+                age = time.time() - path.stat().st_mtime
+                lock = path / _LOCK if path.is_dir() else path
+                if not lock.exists():
+                    if age > _BEGINNING:
+                        discard(path)
+                elif fcntl is None:
+                    if age > _LONGEST_WORK:
+                        discard(path)
+                else:
+                    with open(lock, "r+b") as stream:
+                        if age > 1.0 and _lock(stream, without_locks=age > _LONGEST_WORK):
+                            discard(path)
 
 
 def _lock(stream: BinaryIO, *, without_locks: bool) -> bool:

@@ -101,29 +101,25 @@ class Workers(ProcessPoolExecutor):
 
 
 def dealt(executor: Executor, calls: Sequence[Callable[[], _R]]) -> Iterator[tuple[int, _R]]:
-    """Places and answers of calls as they come; what a lost worker had to do is done again in this process.
+    """Numbers and answers of calls as they come; what a lost worker had to do is done again in this process.
 
     Args: `executor`: any, its workers may be on other machines. `calls`: can be pickled.
     """
-    places: dict[Future[_R], int] = {}
+    numbers: dict[Future[_R], int] = {}
     try:
-        for place, call in enumerate(calls):
-            places[_submitted(executor, call)] = place
-        for future in as_completed(list(places)):
-            yield places[future], _result(executor, future, calls[places[future]])
+        for number, call in enumerate(calls):
+            try:
+                future = executor.submit(call)
+            except BrokenExecutor as error:
+                future = Future()
+                future.set_exception(error)
+            numbers[future] = number
+        for future in as_completed(list(numbers)):
+            yield numbers[future], _result(executor, future, calls[numbers[future]])
     finally:
         # Nobody wants the rest when the caller stops early.
-        for future in places:
+        for future in numbers:
             future.cancel()
-
-
-def _submitted(executor: Executor, call: Callable[[], _R]) -> Future[_R]:
-    try:
-        return executor.submit(call)
-    except BrokenExecutor as error:
-        lost: Future[_R] = Future()
-        lost.set_exception(error)
-        return lost
 
 
 def _result(executor: Executor, future: Future[_R], again: Callable[[], _R]) -> _R:

@@ -25,7 +25,12 @@ class ProgressLine:
     """
 
     def __init__(self) -> None:
-        self._update = _notebook_line()
+        ipython = sys.modules.get("IPython")
+        self._update: Callable[..., Any] | None = None
+        if ipython is not None and hasattr(ipython.get_ipython(), "kernel"):
+            # A line that replaces one in the output of a cell.
+            handle = ipython.display.display({"text/plain": ""}, raw=True, display_id=True)
+            self._update = handle.update
         in_place = self._update is not None or sys.stderr.isatty()
         self._wait = _IN_PLACE if in_place else _LINES
         self._next = monotonic() + (0.0 if in_place else _LINES)
@@ -36,25 +41,11 @@ class ProgressLine:
         if monotonic() < self._next:
             return
         self._next = monotonic() + self._wait
-        text = _text(how_far)
+        words = [getattr(each, "text", str(each)) for each in how_far if not isinstance(each, int | float)]
+        amounts = [f"{each:.4g}" for each in how_far if isinstance(each, int | float)]
+        text = ": ".join([*words, *([" of ".join(amounts)] if amounts else [])])
         if self._update is not None:
             self._update({"text/plain": text}, raw=True)
         else:
             sys.stderr.write(f"{text}{self._end}" if self._end else f"\r\x1b[K{text}")
             sys.stderr.flush()
-
-
-def _text(how_far: tuple[object, ...]) -> str:
-    """Words first; of an object its `text`, if it has one."""
-    words = [getattr(each, "text", str(each)) for each in how_far if not isinstance(each, int | float)]
-    amounts = [f"{each:.4g}" for each in how_far if isinstance(each, int | float)]
-    return ": ".join([*words, *([" of ".join(amounts)] if amounts else [])])
-
-
-def _notebook_line() -> Callable[..., Any] | None:
-    """Line that replaces one in the output of a cell; None outside a notebook."""
-    ipython = sys.modules.get("IPython")
-    if ipython is None or not hasattr(ipython.get_ipython(), "kernel"):
-        return None
-    update: Callable[..., Any] = ipython.display.display({"text/plain": ""}, raw=True, display_id=True).update
-    return update

@@ -49,13 +49,10 @@ class _Terminal(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Text as the stream will write it, so that columns are as wide as what stands in them."""
-        return super().render_str(self._as_written(text), **options)
-
-    def _as_written(self, text: str) -> str:
         errors = getattr(self.file, "errors", None) or "strict"
-        if text.isascii() or errors in {"strict", "surrogateescape"}:
-            return text
-        return text.encode(self.encoding, errors).decode(self.encoding, "surrogateescape")
+        if not text.isascii() and errors not in {"strict", "surrogateescape"}:
+            text = text.encode(self.encoding, errors).decode(self.encoding, "surrogateescape")
+        return super().render_str(text, **options)
 
 
 def results_console() -> Console:

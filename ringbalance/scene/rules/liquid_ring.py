@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,36 +34,30 @@ def _read(
         reading, mesh_faults = registered("function", "with_chamber")(reading, folder=folder)
         faults = (*faults, *mesh_faults)
     reading = reading.completed()
-    reading, liquid_faults = with_liquid(reading.adding(_shortest_length(reading)))
+    port_radius, hump_radius = reading.values.get("tube.port_radius"), reading.values.get("tube.hump_radius")
+    if (
+        port_radius is not None
+        and reading.known("tube.drag_coefficient")
+        and reading.lacks("tube.length")
+        and (reading.lacks("tube.hump_radius") if hump_radius is None else hump_radius < port_radius)
+    ):
+        # With a prescribed k the length matters for the liquid's inertia only: the shortest tube serves.
+        length = shortest_path(port_radius=port_radius, hump_radius=hump_radius, separation=math.pi)
+        reading = reading.adding({"tube.length": length})
+    reading, liquid_faults = with_liquid(reading)
     failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS))
-    missing = (*reading.missing_faults(), *_needed_by_others(reading))
-    return reading, (*faults, *missing, *liquid_faults, *failed, *working.uncertainty_faults(reading))
-
-
-def _shortest_length(reading: SceneReading) -> Mapping[str, float]:
-    """Length of the shortest tube: with a given k it matters for the liquid's inertia only."""
-    hump_settled = reading.known("tube.hump_radius") or reading.lacks("tube.hump_radius")
-    settled = reading.known("tube.drag_coefficient", "tube.port_radius") and hump_settled
-    if not settled or not reading.lacks("tube.length"):
-        return {}
-    port_radius, hump_radius = reading.values["tube.port_radius"], reading.values.get("tube.hump_radius")
-    if hump_radius is not None and hump_radius >= port_radius:
-        return {}
-    length = shortest_path(port_radius=port_radius, hump_radius=hump_radius, separation=math.pi)
-    return {"tube.length": length}
-
-
-def _needed_by_others(reading: SceneReading) -> Iterator[Fault]:
+    missing = [*reading.missing_faults()]
     if reading.given("tube") and reading.lacks("tube.length") and reading.lacks("tube.drag_coefficient"):
-        yield reading.missing("tube.length", "k cannot be calculated without it")
+        missing.append(reading.missing("tube.length", "k cannot be calculated without it"))
     if reading.values.get("tube.entrance") == "rounded" and reading.lacks("tube.entrance_radius"):
-        yield reading.missing("tube.entrance_radius", "a rounded entrance needs its radius")
+        missing.append(reading.missing("tube.entrance_radius", "a rounded entrance needs its radius"))
     if not reading.lacks("requirement.grade") and reading.lacks("rotor.mass"):
-        yield reading.missing("rotor.mass", "requirement.grade asks for nothing without it")
+        missing.append(reading.missing("rotor.mass", "requirement.grade asks for nothing without it"))
     pair = ("gas.conductance", "gas.critical_ratio")
     for present, absent in (pair, pair[::-1]):
         if not reading.lacks(present) and reading.lacks(absent):
-            yield reading.missing(absent, f"{present.split('.')[1]} has no meaning without it")
+            missing.append(reading.missing(absent, f"{present.split('.')[1]} has no meaning without it"))
+    return reading, (*faults, *missing, *liquid_faults, *failed, *working.uncertainty_faults(reading))
 
 
 KIND: Final = SceneKind(

@@ -216,7 +216,8 @@ def uncertainty_faults(reading: SceneReading) -> Iterator[Fault]:
             problem = "the mesh has the plates in its shape, and no thickness of its own"
             yield reading.fault(path, problem=problem, allowed="central_angle's uncertainty in its place")
             continue
-        if reading.lacks(quantity) and _may_be_unused(reading, quantity):
+        presence = reading.schema.tables[table].keys[key].presence
+        if reading.lacks(quantity) and presence.kind == "unused":
             problem = f"[{table}] has no {key} that could be uncertain"
             yield reading.fault(path, problem=problem, allowed=f"a scene with [{table}] {key}")
         elif (
@@ -227,7 +228,3 @@ def uncertainty_faults(reading: SceneReading) -> Iterator[Fault]:
         ):
             problem = f"the uncertainty is larger than {key} itself"
             yield reading.fault(path, problem=problem, allowed="at most the quantity itself, or below 100 %")
-
-
-def _may_be_unused(reading: SceneReading, path: str) -> bool:
-    return reading.schema.key_at(tuple(path.split("."))).presence.kind == "unused"

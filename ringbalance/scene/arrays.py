@@ -22,18 +22,18 @@ Record = Any
 
 
 def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:
-    """As np.clip, which takes three times as long for a few numbers."""
+    """Values within limits, in a third of the time that np.clip takes for a few numbers."""
     return np.minimum(np.maximum(values, low), high)
 
 
 def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
     """Stretches of equal values, each reaching to the first of the next so that a line has no gap."""
-    found, start = [], 0
+    parts, start = [], 0
     for value, members in groupby(values):
         stop = start + len(list(members))
-        found.append((value, slice(start, min(stop + 1, len(values)))))
+        parts.append((value, slice(start, min(stop + 1, len(values)))))
         start = stop
-    return found
+    return parts
 
 
 def plain(values: npt.ArrayLike) -> Any:

@@ -43,19 +43,19 @@ def with_values(scene: SceneFile, values: Mapping[str, object], *, origin: Origi
 
 
 def _changed(
-    scene: SceneFile, known: CheckedValues, values: Mapping[str, object], origin: Origin
+    scene: SceneFile, checked: CheckedValues, values: Mapping[str, object], origin: Origin
 ) -> AnyScene:
-    document = _changed_document(scene, known, values, origin)
-    if document == known.document:
+    document = _changed_document(scene, checked, values, origin)
+    if document == checked.document:
         return scene
     changed = scene_of(
         document,
         file=scene.file,
         source=scene.source.removesuffix(CHANGED) + CHANGED,
-        folder=known.folder,
-        sha256=lambda: _digest(document, known),
-        derived={} if _concerned(_OF_CHECKS, values) else known.derived,
-        before=known,
+        folder=checked.folder,
+        sha256=lambda: _digest(document, checked),
+        derived={} if _concerned(_OF_CHECKS, values) else checked.derived,
+        before=checked,
     )
     return _with_same_mesh(scene, changed, values)
 
@@ -67,23 +67,23 @@ def nameless(scene: Kind, values: Mapping[str, object]) -> tuple[Kind, str]:
     Args: `scene`: one that `checked_scene` passes. `values`: see `SceneFile.with_values`.
     Raises: SceneError: as `with_values`.
     """
-    known = _known(scene)
-    document = _changed_document(scene, known, values, "given")
-    derived = {} if _concerned(_OF_CHECKS, values) else known.derived
-    changed = nameless_scene(document, file=scene.file, derived=derived, before=known)
-    digest = scene.sha256 if document == known.document else _digest(document, known)
+    checked = _known(scene)
+    document = _changed_document(scene, checked, values, "given")
+    derived = {} if _concerned(_OF_CHECKS, values) else checked.derived
+    changed = nameless_scene(document, file=scene.file, derived=derived, before=checked)
+    digest = scene.sha256 if document == checked.document else _digest(document, checked)
     return scene_as(type(scene), _with_same_mesh(scene, changed, values)), digest
 
 
-def _digest(document: Mapping[str, Any], known: CheckedValues) -> str:
-    return hashlib.sha256(toml_bytes(document, known.texts)).hexdigest()
+def _digest(document: Mapping[str, Any], checked: CheckedValues) -> str:
+    return hashlib.sha256(toml_bytes(document, checked.texts)).hexdigest()
 
 
 def _changed_document(
-    scene: SceneFile, known: CheckedValues, values: Mapping[str, object], origin: Origin
+    scene: SceneFile, checked: CheckedValues, values: Mapping[str, object], origin: Origin
 ) -> dict[str, Any]:
     """The document with other values; what none of them concerns are the same objects."""
-    schema, document = scene_kind(scene.balancer).schema, dict(known.document)
+    schema, document = scene_kind(scene.balancer).schema, dict(checked.document)
     for path, value in values.items():
         if not isinstance(path, str):
             raise TypeError(f'a value is named by its path, such as "tube.bore", and not by {path!r}')
@@ -153,10 +153,10 @@ def file_text(scene: SceneFile, *, to: Path) -> bytes:
 
     Raises: SceneError: a scene that was not read.
     """
-    known = _known(scene)
-    document = deepcopy(dict(known.document))
+    checked = _known(scene)
+    document = deepcopy(dict(checked.document))
     if mesh := document.get("disc", {}).get("mesh"):
-        document["disc"]["mesh"] = Path(os.path.relpath(known.folder / mesh, to)).as_posix()
+        document["disc"]["mesh"] = Path(os.path.relpath(checked.folder / mesh, to)).as_posix()
     return toml_bytes(document)
 
 

@@ -24,19 +24,19 @@ class Row:
     """One line of the table of a scene."""
 
     group: str
-    """Such as "Disc"."""
+    """Heading of the group, such as "Disc"."""
     quantity: str
-    """Such as "outer radius R2"."""
+    """Name with symbol, such as "outer radius R2"."""
     value: str
-    """With its unit."""
+    """Value with its unit."""
     note: str
-    """What the value means; may be empty."""
+    """Meaning of the value; may be empty."""
     origin: str
     """"given", "inferred", "assumed", "measured" or "default"."""
     uncertainty: str
     """Expanded (95 %), with its unit; empty where none is stated."""
     path: str
-    """Of the value in the scene, such as "tube.bore"."""
+    """Path of the value in the scene, such as "tube.bore"."""
 
 
 @dataclass(frozen=True, kw_only=True)

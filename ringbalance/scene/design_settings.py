@@ -1,4 +1,4 @@
-"""What a design may be: the keys of the table [design] of a liquid ring."""
+"""Keys of the table [design] of a liquid ring: limits of what a design may be."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -29,7 +29,7 @@ class _ValveAtHand:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """What `ringbalance design` may choose; of it `tune` looks at the pressure alone."""
+    """Ranges from which `ringbalance design` chooses; `tune` reads the pressure alone."""
 
     outer_radius: Annotated[
         PositiveLength | None,

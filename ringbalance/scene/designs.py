@@ -143,12 +143,12 @@ def _alike(first: Any, second: Any) -> bool:
 def alike(scenes: Sequence[Scene]) -> list[list[int]]:
     """Places of scenes that differ in numbers alone, kind by kind."""
     batches: list[list[int]] = []
-    for place, scene in enumerate(scenes):
+    for number, scene in enumerate(scenes):
         same = next((rows for rows in batches if _alike(scenes[rows[0]], scene)), None)
         if same is None:
-            batches.append([place])
+            batches.append([number])
         else:
-            same.append(place)
+            same.append(number)
     return batches
 
 
@@ -165,11 +165,11 @@ def in_batches(
     for rows in batches:
         value = function(Designs.stacked([scenes[i] for i in rows], each=each or 1))
         # Where no number of the batch differs, or none that the function knows, one value is that of all.
-        whole = np.broadcast_to(value, (*value.shape[:-1], len(rows) * (each or 1)))
-        parts.append(whole.reshape(*value.shape[:-1], len(rows), -1))
+        all_rows = np.broadcast_to(value, (*value.shape[:-1], len(rows) * (each or 1)))
+        parts.append(all_rows.reshape(*value.shape[:-1], len(rows), -1))
     order = np.argsort(np.concatenate(batches))
-    found = np.concatenate(parts, axis=-2)[..., order, :]
-    return found[..., 0] if each is None else found
+    values = np.concatenate(parts, axis=-2)[..., order, :]
+    return values[..., 0] if each is None else values
 
 
 def changes_of(
@@ -189,11 +189,11 @@ def changes_of(
         where a side does not have the quantity, zero by what is no change of the scene.
     Source: ASME V&V 20-2009, one input at a time.
     """
-    places = [place for place, error in enumerate(errors) if error.change]
+    numbers = [number for number, error in enumerate(errors) if error.change]
     base = with_places(scene, errors)
-    scenes = [base, *(side for place in places for side in errors[place].sides(base))]
+    scenes = [base, *(side for number in numbers for side in errors[number].sides(base))]
     values = in_batches(scenes, function, each=each or 1)
-    here, moved = values[..., 0, :], np.moveaxis(values[..., 1:, :], -2, 0)
-    changes = np.zeros((len(errors), 2, *here.shape))
-    changes[places] = moved.reshape(-1, 2, *here.shape) - here
-    return (here, changes) if each is not None else (here[..., 0], changes[..., 0])
+    nominal, moved = values[..., 0, :], np.moveaxis(values[..., 1:, :], -2, 0)
+    changes = np.zeros((len(errors), 2, *nominal.shape))
+    changes[numbers] = moved.reshape(-1, 2, *nominal.shape) - nominal
+    return (nominal, changes) if each is not None else (nominal[..., 0], changes[..., 0])

@@ -31,13 +31,13 @@ _NOISE: Final = 3
 
 def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
     """Quantile of an input in its distribution, in (0, 1), for devices by number."""
-    wanted = np.asarray(numbers, dtype=np.int64)
-    block, place = np.divmod(wanted, BLOCK)
-    drawn = np.empty(wanted.size)
+    devices = np.asarray(numbers, dtype=np.int64)
+    block, row = np.divmod(devices, BLOCK)
+    values = np.empty(devices.size)
     for each in np.unique(block):
-        here = block == each
-        drawn[here] = _column(name, int(each), seed)[place[here]]
-    return np.clip(drawn, _LAST, 1.0 - _LAST)
+        in_block = block == each
+        values[in_block] = _column(name, int(each), seed)[row[in_block]]
+    return np.clip(values, _LAST, 1.0 - _LAST)
 
 
 def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:

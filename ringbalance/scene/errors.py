@@ -35,9 +35,9 @@ from ringbalance.scene.uncertain import (
 )
 
 Distribution: TypeAlias = Literal["normal", "lognormal", "uniform"]
-"""Lognormal: of a factor 1 + U at the expanded uncertainty (95 %) U."""
+"""Shape of a distribution; lognormal: a factor 1 + U at the expanded uncertainty (95 %) U."""
 Varies: TypeAlias = Literal["devices", "chambers", "not known"]
-"""Between what it varies; "not known": all have it alike."""
+"""Population over which a quantity varies; "not known": all devices have it alike."""
 NOT_KNOWN: Final = "not known"
 ASSUMED_INFLUENCE: Final = 0.05
 """Relative expanded uncertainty (95 %) of an influence coefficient for which the scene states none."""
@@ -48,13 +48,13 @@ ASSUMED_AMPLITUDE: Final = 0.05
 FITTED: Final = "fitted"
 """Group of all inputs that were fitted together."""
 FITTED_DIRECTION: Final = "fitted together, direction"
-"""What the names of their directions begin with; a number follows."""
+"""Beginning of the name of a direction of fitted inputs; a number follows."""
 LOSS: Final = f"{MODEL}loss of the tube"
-"""Of a law that is not the scene's own: on its velocity, or on the paper's k."""
+"""Error of a flow law other than the scene's: of its velocity, or of the paper's k."""
 WAVES: Final = f"{MODEL}waves"
 MOMENT: Final = f"{MODEL}moment"
 VOLUME: Final = f"{MODEL}volume"
-"""Of a chamber's liquid what no model holds: on its pressure and on its moment; by facets on its volume."""
+"""Errors of a chamber's liquid that no model holds: of its pressure and moment; by facets of its volume."""
 AMPLITUDE: Final = "rotor.initial_amplitude"
 PHASE: Final = "rotor.initial_phase"
 _PARTS: Final = ("even", "odd")
@@ -70,7 +70,7 @@ class ModelKind:
     distribution: Distribution = "normal"
     varies: Varies = "not known"
     by_fit: bool = False
-    """Whether only data of a device that was built say something of it, so that a design has none."""
+    """True if only data of a built device inform it, so that a design has no such error."""
     applies: Callable[[Scene], bool] = lambda _: True
 
     def names(self, cause: str) -> tuple[str, ...]:
@@ -144,9 +144,9 @@ class Uncertainty:
     """One quantity that is not known exactly."""
 
     name: str
-    """Of a quantity of the scene its key, of a model's error as `ModelError.named` takes it."""
+    """Key of a quantity of the scene, or name of a model's error as `ModelError.named` takes it."""
     group: str
-    """Under which its effect is reported: the name, "fitted", or the cause of a model's error."""
+    """Heading of its effect in reports: the name, "fitted", or the cause of a model's error."""
     acts_on: str
     varies: Varies
     distribution: Distribution = "normal"
@@ -194,12 +194,12 @@ def uncertainties(
     alone = tuple(
         of_input(name, width) for name, width in independent_half_widths(scene).items() if name in among
     )
-    found = (*alone, *directions(scene, among=among, errors=fitted_models))
-    return (*found, *model_uncertainties(scene), of_chamber(WAVES), of_chamber(MOMENT)) if models else found
+    inputs = (*alone, *directions(scene, among=among, errors=fitted_models))
+    return (*inputs, *model_uncertainties(scene), of_chamber(WAVES), of_chamber(MOMENT)) if models else inputs
 
 
 def of_flow(scene: Scene) -> tuple[Uncertainty, ...]:
-    """Those of `uncertainties` that may move the flow in the tube by a change of the scene."""
+    """Uncertainties that may move the flow in the tube by a change of the scene."""
     among = [name for name, table in UNCERTAIN_QUANTITIES.items() if table != "rotor" or name == "speed"]
     return tuple(each for each in uncertainties(scene, among=among) if each.change)
 
@@ -236,13 +236,13 @@ def directions(
     names = [keys[i] for i in which]
     return tuple(
         Uncertainty(
-            name=f"{FITTED_DIRECTION} {place + 1}",
+            name=f"{FITTED_DIRECTION} {number + 1}",
             group=FITTED,
             acts_on=", ".join(names),
             varies="not known",
             change=dict(zip(names, change, strict=True)),
         )
-        for place, change in enumerate(changes)
+        for number, change in enumerate(changes)
     )
 
 
@@ -285,20 +285,20 @@ def of_chamber(name: str, half_width: float | None = None) -> Uncertainty:
 
 
 def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
-    """What runs of devices have beside `uncertainties`: an unstated rotor's, and the vibration before."""
-    rotor, known = scene.rotor, {each.key for each in scene.fitted.quantities}
-    known |= {each.quantity for each in scene.uncertainty}
+    """Further uncertainties of runs of devices: an unstated rotor's, and the initial vibration's."""
+    rotor, stated = scene.rotor, {each.key for each in scene.fitted.quantities}
+    stated |= {each.quantity for each in scene.uncertainty}
     assumed = {
         "influence_coefficient": ASSUMED_INFLUENCE * rotor.influence_coefficient,
         "lag_angle": ASSUMED_LAG,
     }
-    found = [of_input(name, width) for name, width in assumed.items() if name not in known]
+    errors = [of_input(name, width) for name, width in assumed.items() if name not in stated]
     starts: tuple[tuple[str, Distribution, float], ...] = (
         (AMPLITUDE, "lognormal", ASSUMED_AMPLITUDE),
         (PHASE, "uniform", scene.requirement.phase_range),
     )
     for name, distribution, width in starts:
-        found.append(
+        errors.append(
             Uncertainty(
                 name=name,
                 group=name,
@@ -308,7 +308,7 @@ def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
                 half_width=width,
             )
         )
-    return tuple(found)
+    return tuple(errors)
 
 
 def with_places(scene: Scene, errors: Collection[Uncertainty]) -> Scene:
@@ -332,6 +332,6 @@ def by_group(errors: Sequence[Uncertainty], changes: FloatArray) -> dict[str, Fl
 
 def both_sides(changes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """By how much all together may lower and raise a value (95 %), of changes as `by_group` takes them."""
-    known = np.nan_to_num(changes)
-    lowered, raised = np.max(np.maximum(-known, 0.0), axis=1), np.max(np.maximum(known, 0.0), axis=1)
+    finite = np.nan_to_num(changes)
+    lowered, raised = np.max(np.maximum(-finite, 0.0), axis=1), np.max(np.maximum(finite, 0.0), axis=1)
     return np.sqrt(np.sum(lowered**2, axis=0)), np.sqrt(np.sum(raised**2, axis=0))

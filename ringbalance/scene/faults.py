@@ -1,4 +1,4 @@
-"""What is wrong with a scene file: one sentence per error, all errors of a file together."""
+"""Errors of a scene file: one sentence for each, all errors of a file together."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Fault:
     key: str = ""
     """Key in the table; empty when the whole table or file is in error."""
     value: str = ""
-    """What stands there, as TOML has it; "missing" when nothing does; empty when it does not apply."""
+    """Present value as TOML writes it; "missing" without one; empty where it does not apply."""
     problem: str
-    """What is wrong."""
+    """Description of the error."""
     allowed: str = ""
-    """What would be accepted; empty when the problem says it all."""
+    """Accepted values; empty when the problem says it all."""
 
     def __str__(self) -> str:
         """The error on one line: file: [table] key = value: what is wrong; allowed: ..."""
@@ -83,16 +83,16 @@ class SceneError(Exception):
         return cls([Fault(file=COMMAND_LINE, key=option, value=value, problem=problem, allowed=allowed)])
 
 
-def closest(word: str, known: Iterable[str]) -> str:
+def closest(word: str, words: Iterable[str]) -> str:
     """The known word that was probably meant; an empty string when nothing is close."""
-    folded = {name.casefold(): name for name in known}
+    folded = {name.casefold(): name for name in words}
     close = difflib.get_close_matches(word.casefold()[:_LONGEST_VALUE], list(folded), n=1, cutoff=0.6)
     return folded[close[0]] if close else ""
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
+def did_you_mean(word: str, words: Iterable[str]) -> str:
     """' (did you mean "x"?)' with the known word that is closest; empty when none is close."""
-    return meant_text(closest(word, known))
+    return meant_text(closest(word, words))
 
 
 def meant_text(name: str) -> str:

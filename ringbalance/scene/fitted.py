@@ -1,6 +1,4 @@
-"""What a fit leaves: the joint distribution of inputs and of errors of models, and keys that correct
-models.
-"""
+"""A fit in a scene file: the joint distribution of inputs and model errors, and keys that correct models."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ from ringbalance.scene.units import unit_factor
 
 NO_UNIT: Final = "1"
 MODEL: Final = "model: "
-"""What the name of an error of a model begins with; the rest is its cause and, of k's, its part."""
+"""Beginning of the name of an error of a model; its cause follows and, for errors of k, its part."""
 
 
 GaugeCorrection = Annotated[
@@ -53,7 +51,7 @@ class FittedQuantity:
 
     @property
     def key(self) -> str:
-        """As uncertain inputs are named where keys of tables differ: "bore" of "tube.bore"."""
+        """Name of an uncertain input where keys of tables differ: "bore" of "tube.bore"."""
         return self.quantity if self.quantity.startswith(MODEL) else self.quantity.split(".")[1]
 
 
@@ -93,8 +91,8 @@ class Fitted:
             return np.zeros((0, 0))
         size = self.deviations[chosen]
         values, vectors = np.linalg.eigh(self.covariance[np.ix_(chosen, chosen)] / np.outer(size, size))
-        kept = values > _ROUND_OFF * values[-1]
-        return np.asarray((size[:, None] * vectors[:, kept] * np.sqrt(values[kept]))[:, ::-1])
+        significant = values > _ROUND_OFF * values[-1]
+        return np.asarray((size[:, None] * vectors[:, significant] * np.sqrt(values[significant]))[:, ::-1])
 
     def drawn(self, random: np.random.Generator) -> FloatArray:
         """One draw of the changes of all quantities, SI, shape (n,)."""
@@ -103,7 +101,7 @@ class Fitted:
 
 
 _ROUND_OFF: Final = 1e-10
-"""Of the largest eigenvalue of the correlations, which files have with nine digits."""
+"""Fraction of the largest eigenvalue of the correlations, which files have with nine digits."""
 
 
 CLEARING_ERROR: Final = "clearing of the crest"
@@ -126,7 +124,7 @@ ErrorCause = Literal[
     "start of the flow",
     "end of the crest",
 ]
-"""What a model may be off by: the keys of `scene.errors.MODEL_KINDS`."""
+"""Cause of an error of a model: the keys of `scene.errors.MODEL_KINDS`."""
 ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")
 """Name of one standard deviation of a cause's even part, where none is named, or of its odd part."""
 LARGEST_ERROR: Final = 2.5

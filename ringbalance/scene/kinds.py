@@ -1,4 +1,4 @@
-"""What a kind of scene file is: its keys, the rules that values meet, and how it is read and described."""
+"""A kind of scene file: its keys, the rules that values meet, its reader and its description."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class SceneKind:
     main: tuple[tuple[str, ...], ...]
     """Paths of the values that stand for the scene in a terminal, line by line."""
     usual_units: Mapping[str, str] = field(default_factory=dict)
-    """By dimension, of values whose declaration names no unit to show; else the SI unit."""
+    """Unit by dimension for values whose declaration names no unit to show; else the SI unit."""
     arrays: bool = False
-    """Whether its numbers may be arrays: many designs at once, as `ringbalance.scene.designs` has them."""
+    """True if its numbers may be arrays: many designs at once, as `ringbalance.scene.designs` has them."""
 
 
 def scene_kind(name: str) -> SceneKind:
@@ -70,7 +70,7 @@ class Check:
     needs: tuple[str, ...]
     """Paths of the rule's arguments; the first is the one to be changed."""
     when: Callable[[SceneReading], bool]
-    """Whether the rule applies to a scene."""
+    """Condition on a scene, without which the rule does not apply."""
     moot: tuple[Rule, ...]
     """Rules before it whose failure makes this one pointless, so that one error does not raise others."""
 

@@ -251,13 +251,13 @@ def _faults(reading: SceneReading, liquid: KnownLiquid | None) -> tuple[Fault, .
 def _liquid_values(reading: SceneReading, looked_up: Liquid | None) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if looked_up is not None:
-        found = {
+        properties = {
             _DENSITY: looked_up.density,
             _VISCOSITY: looked_up.kinematic_viscosity,
             _VAPOUR: looked_up.vapour_pressure,
             "liquid.temperature": looked_up.temperature,
         }
-        values |= {path: value for path, value in found.items() if reading.lacks(path)}
+        values |= {path: value for path, value in properties.items() if reading.lacks(path)}
     elif reading.lacks(_VAPOUR):
         values[_VAPOUR] = 0.0
     if reading.lacks("liquid.name"):

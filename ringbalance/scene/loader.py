@@ -188,23 +188,23 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
     if vibration is not None:
         values["rotor.initial_amplitude"] = vibration.amplitude
         values["rotor.initial_phase"] = vibration.phase
-    known = before.parts if before else {}
+    parts_before = before.parts if before else {}
     records = {}
     for name, table in reading.schema.tables.items():
         if (kind := table.record) is None:
             continue
-        given = {field: values.get(path, absent) for field, path, absent in _fields(kind, name)}
-        record = known.get(name)
+        field_values = {field: values.get(path, absent) for field, path, absent in _fields(kind, name)}
+        record = parts_before.get(name)
         # A mesh, and what else has parts, is compared by identity alone.
         if type(record) is not kind or not all(
             value is (other := getattr(record, key))
             or (type(value) is type(other) is float and value == other)
-            for key, value in given.items()
+            for key, value in field_values.items()
         ):
-            record = kind(**given)
+            record = kind(**field_values)
         records[name] = record
     same = before is not None and before.tables.get("uncertainty") is reading.tables["uncertainty"]
-    uncertainty = known["uncertainty"] if same else tuple(_uncertainty(reading))
+    uncertainty = parts_before["uncertainty"] if same else tuple(_uncertainty(reading))
     return {**records, "tolerance": values["accuracy.tolerance"], "uncertainty": uncertainty}
 
 
@@ -229,13 +229,13 @@ def _uncertainty(reading: SceneReading) -> Iterator[InputUncertainty]:
             yield InputUncertainty(quantity=quantity, half_width=width, relative=relative)
 
 
-def _origin_faults(reading: SceneReading, found: Iterable[Fault]) -> Iterator[Fault]:
+def _origin_faults(reading: SceneReading, faults: Iterable[Fault]) -> Iterator[Fault]:
     """One error for each origin of a value that does not stand in the file, unless the value has one."""
-    told = {(fault.table, fault.key) for fault in found}
+    faulty = {(fault.table, fault.key) for fault in faults}
     for name in reading.schema.tables:
         content = reading.tables[name].content
         for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
-            if key not in content and (name, key) not in told:
+            if key not in content and (name, key) not in faulty:
                 yield Fault(
                     file=reading.file,
                     table=name,

@@ -156,25 +156,25 @@ def required_amplitude(
     Args: `mass`: m, kg, without which a grade G, m/s, asks for no amplitude.
     Returns: None where nothing is asked.
     """
-    asked = [] if residual is None else [residual]
+    amplitudes = [] if residual is None else [residual]
     if grade is not None and mass is not None:
         unbalance = permissible_unbalance(grade=grade, mass=mass, speed=speed)
-        asked.append(unbalance * influence_coefficient)
-    return min(asked, default=None)
+        amplitudes.append(unbalance * influence_coefficient)
+    return min(amplitudes, default=None)
 
 
 def _limit(
     speed: float, influence: float, mass: float | None, residual: float | None, grade: float | None
 ) -> float:
-    asked = required_amplitude(
+    required = required_amplitude(
         speed=speed, influence_coefficient=influence, mass=mass, residual=residual, grade=grade
     )
-    return _UNASKED_LIMIT if asked is None else asked
+    return _UNASKED_LIMIT if required is None else required
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerSettings:
-    """What the scene says of the control algorithm."""
+    """Settings of the control algorithm."""
 
     kind: Annotated[
         ControllerKind,
@@ -297,8 +297,8 @@ class ControllerSettings:
 
     def offsets(self, chambers: int) -> tuple[float, ...]:
         """`gas_time_offset` of every chamber, s."""
-        given = self.gas_time_offset or (0.0,)
-        return given * chambers if len(given) == 1 else given
+        times = self.gas_time_offset or (0.0,)
+        return times * chambers if len(times) == 1 else times
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,7 +313,7 @@ class RunSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class RequirementSettings:
-    """What the balancer is wanted for, and in which fraction of drawn devices; None: nothing is required."""
+    """Requirements of the balancer, and the fraction of drawn devices that must meet them; None: none."""
 
     settling_time: Annotated[
         PositiveTime | None,

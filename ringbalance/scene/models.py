@@ -191,7 +191,7 @@ class Liquid:
     viscosity_uncertainty: float
     """Expanded uncertainty (95 %), relative to the kinematic viscosity."""
     source: str
-    """Where the properties come from, for the report."""
+    """Source of the properties, for the report."""
 
 
 @dataclass(frozen=True, kw_only=True)

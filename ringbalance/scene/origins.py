@@ -1,4 +1,4 @@
-"""What a scene keeps of its file, whatever its balancer: names, hashes, and where each value comes from.
+"""Data that a scene of any balancer keeps of its file: names, hashes, and the origin of each value.
 
 `Measured` has the measurements that it was fitted to; no result depends on it.
 """
@@ -86,9 +86,9 @@ class Measured:
 
 
 Origin = Literal["given", "inferred", "assumed", "measured"]
-"""In the documents of the machine; concluded from other values; chosen, as nothing is known; measured."""
+"""In the documents of the machine; inferred from other values; chosen, as nothing is known; measured."""
 ShownOrigin = Origin | Literal["derived", "default"]
-"""Also: read off the mesh that the scene names; not in the file."""
+"""`Origin`, or "derived": read off the mesh that the scene names; or "default": not in the file."""
 KEY_OF_FIELD = {
     "rotor.initial_amplitude": "rotor.initial_vibration",
     "rotor.initial_phase": "rotor.initial_vibration",
@@ -118,7 +118,7 @@ class CheckedValues:
     """Values as they were read and checked: a record that differs was changed without a check."""
 
     document: Mapping[str, Any]
-    """Of the scene file, as TOML has it."""
+    """Content of the scene file as TOML has it."""
     folder: Path
     """Absolute; from which a mesh is read."""
     parts: Mapping[str, object]
@@ -137,7 +137,7 @@ class CheckedValues:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneFile:
-    """What scenes of both kinds of balancer have."""
+    """Fields that scenes of all kinds of balancer have."""
 
     name: str
     run: RunSettings
@@ -148,9 +148,9 @@ class SceneFile:
     file: str = field(compare=False)
     """The file as it was named; for messages."""
     sha256: str
-    """Of the scene file's bytes."""
+    """SHA-256 of the scene file's bytes."""
     values_sha256: str = ""
-    """Of the values that decide results, defaults included; not of remarks, names and origins."""
+    """SHA-256 of the values that decide results, defaults included; not of remarks, names and origins."""
     defaulted: tuple[str, ...] = ()
     """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""
     measured: Measured = field(default_factory=Measured)
@@ -161,7 +161,7 @@ class SceneFile:
     checked: CheckedValues | None = field(default=None, compare=False, repr=False)
     """None for a scene that was not read from a file."""
     uncertainty: tuple[InputUncertainty, ...] = ()
-    """Of its inputs, as the file states them."""
+    """Uncertainties of its inputs, as the file states them."""
     balancer: ClassVar[str]
     """Kind of balancer, as the scene file names it."""
 
@@ -188,7 +188,7 @@ class SceneFile:
         return cast(Self, registered("function", "with_values")(self, values, origin=origin))
 
     def origin_of(self, path: str) -> ShownOrigin:
-        """Where the value at a path such as "tube.bore" comes from.
+        """Origin of the value at a path such as "tube.bore".
 
         Returns: What the table's `origin` states, "given" where it states nothing, "derived" for a dimension
             of a mesh, and "default" for a value that the file does not give.
@@ -196,10 +196,10 @@ class SceneFile:
         """
         if not self.origins:
             return "given"
-        found = dict(self.origins).get(KEY_OF_FIELD.get(path, path))
-        if found is None:
+        origin = dict(self.origins).get(KEY_OF_FIELD.get(path, path))
+        if origin is None:
             raise ValueError(f"a scene file has no key {path!r}")
-        return found
+        return origin
 
 
 def summary_text(lines: Iterable[str]) -> str:
@@ -247,7 +247,7 @@ def moved_at(scene: _SomeScene, path: str, move: Callable[[float], float]) -> _S
     value = getattr(record, key)
     moved: Any
     if isinstance(value, tuple):
-        moved = tuple(move(old) if entry in (None, place) else old for place, old in enumerate(value))
+        moved = tuple(move(old) if entry in (None, i) else old for i, old in enumerate(value))
     else:
         moved = move(value)
     changed: dict[str, Any] = {table: replace(record, **{key: moved})}

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 _LONGEST_VALUE, _LONGEST_LIST, _DEEPEST = 60, 10, 4
 MOST_PARTS: Final = 50
-"""Of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for one key of 30,000 parts."""
+"""Parts of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for 30,000 parts."""
 _JSON: Final = json.JSONEncoder(ensure_ascii=False)
 _QUOTED: Final = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
 _LONG_KEY: Final = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
@@ -61,15 +61,16 @@ class TableText:
         )
 
 
-def toml_bytes(document: Mapping[str, Any], known: Mapping[str, TableText] = MappingProxyType({})) -> bytes:
+def toml_bytes(document: Mapping[str, Any], written: Mapping[str, TableText] = MappingProxyType({})) -> bytes:
     """A document of texts, numbers, truth values, lists and tables, which `tomllib` reads back as it was.
 
-    Args: `known`: tables of a document that has most values in common with this one.
+    Args: `written`: tables of a document that has most values in common with this one.
     """
     tables = {name: value for name, value in document.items() if isinstance(value, dict)}
     top = "".join(_line(key, value) for key, value in document.items() if key not in tables)
     parts = (
-        (known.get(name) or TableText(name=name, content={})).changed(table) for name, table in tables.items()
+        (written.get(name) or TableText(name=name, content={})).changed(table)
+        for name, table in tables.items()
     )
     return (top + "".join(parts) or "\n").encode()
 

@@ -81,7 +81,7 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
     Returns: SI half-width by quantity; only those above zero.
     """
     liquid = scene.liquid
-    found = {
+    widths = {
         "roughness": _ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
         "draw_down_factor": _ASSUMED_DRAW_DOWN_UNCERTAINTY * scene.tube.draw_down_factor,
         "density": liquid.density_uncertainty * liquid.density,
@@ -90,10 +90,10 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
     for stated in scene.uncertainty:
         value = nominal_value(scene=scene, quantity=stated.quantity)
         if value is not None:
-            found[stated.quantity] = stated.absolute(value)
+            widths[stated.quantity] = stated.absolute(value)
     fitted = zip(scene.fitted.quantities, scene.fitted.deviations.tolist(), strict=True)
-    found |= {each.key: NORMAL_95 * size for each, size in fitted if each.key in UNCERTAIN_QUANTITIES}
-    return {name: width for name, width in found.items() if np.any(np.greater(width, 0))}
+    widths |= {each.key: NORMAL_95 * size for each, size in fitted if each.key in UNCERTAIN_QUANTITIES}
+    return {name: width for name, width in widths.items() if np.any(np.greater(width, 0))}
 
 
 def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:

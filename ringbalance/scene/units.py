@@ -36,7 +36,7 @@ class _Dimension:
     """A kind of quantity with its units."""
 
     name: str
-    """With its article, such as "a length"."""
+    """Name with its article, such as "a length"."""
     example: str
     """A quantity as one would write it."""
     units: Mapping[str, _Unit] = field(repr=False)
@@ -205,7 +205,7 @@ def written_like(value: float, like: object, dimension: str) -> str:
 
 @lru_cache(1024)
 def _unit_of(text: str, dimension: str) -> str:
-    """As the text has it; empty where it is no quantity of this dimension."""
+    """Unit as the text writes it; empty where it is no quantity of this dimension."""
     kind = DIMENSIONS[dimension]
     try:
         unit = _split(text, kind)[1]

@@ -104,6 +104,6 @@ def test_quantities_become_a_frame_and_a_dataset(monkeypatch: pytest.MonkeyPatch
 
 
 def test_without_the_package_its_name_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry._PLACES, ("function", "pandas_frame"), "no_such_package_here:DataFrame")
+    monkeypatch.setitem(registry._PATHS, ("function", "pandas_frame"), "no_such_package_here:DataFrame")
     with pytest.raises(ModuleNotFoundError, match="needs the package pandas"):
         Answer().to_pandas()

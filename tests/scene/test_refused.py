@@ -24,7 +24,7 @@ def test_every_fault_is_named(
     load: Callable[[Mapping[str, Any]], Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.delitem(registry._PLACES, ("scene", "ball"), raising=False)  # of another test
+    monkeypatch.delitem(registry._PATHS, ("scene", "ball"), raising=False)  # of another test
     case, document = REFUSED[kind][name], paper_document if kind == "liquid_ring" else driven_document
     for path in case.get("remove", ()):
         table, _, key = path.rpartition(".")

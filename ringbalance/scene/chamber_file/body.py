@@ -138,10 +138,12 @@ def _wrong_kinds(contents: Contents, solid: list[int]) -> Iterator[Contradiction
         problem = f"it has {len(contents.points)} nodes and {total} cells, more than can be checked"
         yield Contradiction(problem=problem, allowed=f"up to {MOST_NODES} of each; a larger mesh size")
     if not total:
-        there = "only lines and surface elements" if contents.blocks else "no elements"
-        yield Contradiction(problem=f"it has no cells, {there}: not a mesh of a volume", allowed=_KINDS)
-    known = (*CELL_KINDS, *FACET_KINDS.values())
-    unknown = dict.fromkeys(kind for kind, _ in contents.blocks if dimension(kind) > 1 and kind not in known)
+        elements = "only lines and surface elements" if contents.blocks else "no elements"
+        yield Contradiction(problem=f"it has no cells, {elements}: not a mesh of a volume", allowed=_KINDS)
+    readable = (*CELL_KINDS, *FACET_KINDS.values())
+    unknown = dict.fromkeys(
+        kind for kind, _ in contents.blocks if dimension(kind) > 1 and kind not in readable
+    )
     for kind in unknown:
         yield Contradiction(
             problem=f"it has elements of the kind {kind}", allowed=f"{_KINDS}, and their facets"

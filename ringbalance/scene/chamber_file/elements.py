@@ -24,20 +24,20 @@ CORNERS: Final[Mapping[str, int]] = MappingProxyType(
         **dict.fromkeys(("hexahedron", "hexahedron20", "hexahedron27"), 8),
     }
 )
-"""Of each kind of cell and facet that a chamber may have."""
+"""Number of corners by kind of cell or facet, for all that a chamber may have."""
 NODES: Final[Mapping[str, int]] = MappingProxyType(
     {kind: int("".join(filter(str.isdigit, kind)) or count) for kind, count in CORNERS.items()}
 )
 """A kind of second order has its number of nodes in its name."""
 FACET_KINDS: Final = MappingProxyType({3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"})
-"""By number of nodes."""
+"""Kind of facet by its number of nodes."""
 _FACES: Final[Mapping[int, tuple[tuple[int, ...], ...]]] = MappingProxyType(
     {
         4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
         8: ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
     }
 )
-"""By number of corners; normals point outward."""
+"""Corners of each face by the number of corners of the cell; normals point outward."""
 _EDGES: Final = MappingProxyType(
     {
         4: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
@@ -47,7 +47,7 @@ _EDGES: Final = MappingProxyType(
         ),
     }
 )
-_CORNER_PLACES: Final = MappingProxyType(
+_CORNER_POINTS: Final = MappingProxyType(
     {
         4: ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
         8: ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
@@ -73,7 +73,7 @@ def between(kind: str) -> tuple[tuple[int, ...], ...]:
 @cache
 def reference_nodes(kind: str) -> FloatArray:
     """Reference coordinates of a cell's nodes, shape (nodes, 3): the unit tetrahedron or cube."""
-    corners = np.array(_CORNER_PLACES[CORNERS[kind]], dtype=np.float64)
+    corners = np.array(_CORNER_POINTS[CORNERS[kind]], dtype=np.float64)
     return np.array([corners[list(each)].mean(axis=0) for each in between(kind)])
 
 
@@ -81,12 +81,12 @@ def reference_nodes(kind: str) -> FloatArray:
 def faces(kind: str) -> tuple[tuple[int, ...], ...]:
     """For each face of a cell its nodes in meshio's order: corners, middles of edges, middle of the face."""
     where = {frozenset(corners): node for node, corners in enumerate(between(kind))}
-    found = []
+    nodes_of_faces = []
     for face in _FACES[CORNERS[kind]]:
         edges = zip(face, (*face[1:], face[0]), strict=True)
         inside = (*(frozenset(edge) for edge in edges), frozenset(face))
-        found.append((*face, *(where[each] for each in inside if each in where)))
-    return tuple(found)
+        nodes_of_faces.append((*face, *(where[each] for each in inside if each in where)))
+    return tuple(nodes_of_faces)
 
 
 @cache
@@ -113,10 +113,10 @@ def shape_gradients(kind: str) -> FloatArray:
     return gradients
 
 
-def shape_values(kind: str, place: FloatArray) -> FloatArray:
+def shape_values(kind: str, point: FloatArray) -> FloatArray:
     """Shape functions of a cell at one place in reference coordinates, shape (nodes,)."""
     powers, coefficients = _polynomials(kind)
-    return np.asarray(np.prod(place**powers, axis=1) @ coefficients)
+    return np.asarray(np.prod(point**powers, axis=1) @ coefficients)
 
 
 @cache
@@ -159,8 +159,8 @@ def key_of(corners: IntArray, nodes: int) -> IntArray:
 
 def repeats(keys: IntArray) -> IntArray:
     """Count of each number among all, in the shape of `keys`."""
-    _, place, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    return np.asarray(counts[place].reshape(keys.shape))
+    _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.asarray(counts[inverse].reshape(keys.shape))
 
 
 def edges_of(corners: IntArray) -> IntArray:

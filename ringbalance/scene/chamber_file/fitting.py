@@ -1,6 +1,6 @@
-"""Where a body lies about the shaft, the dimensions that follow, and whether it fits the other keys.
+"""Position of a body about the shaft, the dimensions that follow, and its contradictions with other keys.
 
-Those are chambers, unit, port and the radii that it must cover.
+The keys are chambers, unit, port and the radii that the body must cover.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from ringbalance.scene.rules.shape import DRAWING_ROUNDING, SIZE_CHECKS
 from ringbalance.scene.units import DIMENSIONS
 
 _DIGITS: Final = 7
-"""Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
+"""Digits of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
 _LEAST_FACING: Final = 0.01
 """Radial part of the outer wall's normals, on average, below which the wall is none."""
 _SHARES: Final = tuple(step / 32 for step in range(33))
-"""Of an edge of second order, between which it is as good as straight: a share 1e-3 of its bulge."""
+"""Fractions of an edge of second order, between which it is straight but for 1e-3 of its bulge."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,16 +101,16 @@ def _nearest(points: FloatArray, surface: IntArray, corners: int) -> tuple[float
     else:
         middle = points[surface[:, corners : 2 * corners].ravel(), :2]
         bulge = middle - (first + last) / 2
-        along = [first + share * (last - first) + 4 * share * (1 - share) * bulge for share in _SHARES]
-        distance = np.minimum.reduce([_from_origin(*pair) for pair in pairwise(along)])
+        edge_points = [first + share * (last - first) + 4 * share * (1 - share) * bulge for share in _SHARES]
+        distance = np.minimum.reduce([_from_origin(*pair) for pair in pairwise(edge_points)])
     return float(distance.min()), int(ends[distance.argmin(), 0])
 
 
 def _from_origin(first: FloatArray, last: FloatArray) -> FloatArray:
     """Distances of straight lines from the origin."""
-    along = last - first
-    share = -(first * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300)
-    nearest = first + clipped(share, 0.0, 1.0)[:, None] * along
+    direction = last - first
+    share = -(first * direction).sum(axis=1) / np.maximum((direction**2).sum(axis=1), 1e-300)
+    nearest = first + clipped(share, 0.0, 1.0)[:, None] * direction
     return np.asarray(np.hypot(nearest[:, 0], nearest[:, 1]), dtype=np.float64)
 
 
@@ -157,10 +157,10 @@ _FRAME: Final = [0, 1, 2, -1]
 
 
 def unfitting(
-    reading: SceneReading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
+    reading: SceneReading, body: Body, placement: Placed, boundaries: dict[str, IntArray], unit: str
 ) -> Iterator[Contradiction]:
     """Contradictions between the mesh and other keys of the scene."""
-    points, extent = found.points, found.dimensions["central_angle"]
+    points, extent = placement.points, placement.dimensions["central_angle"]
     if reading.lacks("disc.chambers") and even_number_of_chambers(extent) is None:
         problem = f"chambers is needed: the mesh takes {written(extent, 'deg')}, no even part of 360 deg"
         yield Contradiction(problem=problem, allowed="chambers in [disc]")
@@ -176,14 +176,14 @@ def unfitting(
             allowed = f"within {written(half, 'deg')} on both sides of the middle (mesh_middle)"
             yield Contradiction(problem=problem, allowed=allowed)
     port, mesh_port = reading.values.get(PORT_RADIUS), port_radius(points, boundaries)
-    wrong_scale = tuple(_scale_findings(reading, found.dimensions, unit=unit, port=mesh_port))
+    wrong_scale = tuple(_scale_findings(reading, placement.dimensions, unit=unit, port=mesh_port))
     if wrong_scale:
         yield from wrong_scale
         return
     if port is not None and PORT in boundaries:
         radius = np.hypot(points[:, 0], points[:, 1])[boundaries[PORT]]
         low, high = float(radius.min()), float(radius.max())
-        rounding = 1e-6 * found.dimensions["outer_radius"]
+        rounding = 1e-6 * placement.dimensions["outer_radius"]
         if not low - rounding <= port <= high + rounding:
             span = f"from {written(low, 'mm')} to {written(high, 'mm')}"
             problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {span}'

@@ -60,7 +60,7 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
     if unit or reading.broken & set(keys) or not reading.known("accuracy.tolerance"):
         return unknown, (*superfluous, *unit)
     try:
-        geometry, found = _chamber(reading, folder)
+        geometry, placement = _chamber(reading, folder)
     except (MeshFileError, MemoryError) as error:
         problem = "memory does not suffice to check a mesh of this size"
         scarce = Contradiction(problem=problem, allowed="a coarser mesh")
@@ -72,8 +72,8 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
         return unknown, tuple(faults)
     if superfluous:
         return unknown, superfluous
-    values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
-    port = port_radius(found.points, geometry.boundaries)
+    values: dict[str, Any] = {f"disc.{key}": value for key, value in placement.dimensions.items()}
+    port = port_radius(placement.points, geometry.boundaries)
     if port is not None and reading.lacks(PORT_RADIUS):
         values[PORT_RADIUS] = port
     return reading.following({**values, "disc.geometry": geometry}), ()
@@ -98,13 +98,13 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
     facets = Facets.of(body)
     boundaries, misnamed = boundaries_of(body, facets)
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
-    found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
+    placement, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
         *facets.findings(body),
         *misshapen,
         *misnamed,
         *misplaced,
-        *unfitting(reading, body, found, boundaries, unit),
+        *unfitting(reading, body, placement, boundaries, unit),
     ]
     if everything:
         raise MeshFileError(everything)
@@ -113,7 +113,7 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
     new = np.zeros(len(body.points), dtype=np.int64)
     new[used] = np.arange(len(used))
     arrays = {each: new[facets] for each, facets in boundaries.items()}
-    points, cells = found.points[used], new[body.cells]
+    points, cells = placement.points[used], new[body.cells]
     for array in (points, cells, *arrays.values()):
         array.flags.writeable = False
     reading_options = (unit, axis, middle, tolerance)
@@ -125,7 +125,7 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
         cells=cells,
         boundaries=arrays,
     )
-    return geometry, found
+    return geometry, placement
 
 
 def _is_step(path: Path) -> bool:

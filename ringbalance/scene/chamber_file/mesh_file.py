@@ -286,8 +286,8 @@ def _read_abaqus(content: bytes) -> Contents:
     blocks = [(kind, places(rows[:, 1:])) for kind, _, rows in parts.elements]
     blocks += [(FACET_KINDS[rows.shape[1]], places(rows)) for _, rows in sides]
     named = (
-        Mark(name=name, block=len(parts.elements) + place, where=np.ones(len(rows), dtype=np.bool_))
-        for place, (name, rows) in enumerate(sides)
+        Mark(name=name, block=len(parts.elements) + number, where=np.ones(len(rows), dtype=np.bool_))
+        for number, (name, rows) in enumerate(sides)
     )
     return Contents(
         points=nodes[:, 1:],
@@ -401,8 +401,8 @@ def _marks(parts: _MeshContent) -> Iterator[Mark]:
 def _sides(parts: _MeshContent) -> Iterator[tuple[str, IntArray]]:
     """Name and facets of each line of a *SURFACE, as numbers of nodes."""
     for name, first, side in parts.surfaces:
-        one = first.isdigit() and len(first) < 16
-        numbers = np.array([int(first)]) if one else _numbers_in(first, parts)
+        is_element = first.isdigit() and len(first) < 16
+        numbers = np.array([int(first)]) if is_element else _numbers_in(first, parts)
         for kind, _, rows in parts.elements:
             inside = np.isin(rows[:, 0], numbers)
             if inside.any():
@@ -413,14 +413,14 @@ def _face(kind: str, side: str) -> list[int]:
     """Nodes of a face of a cell, in meshio's order; of a shell, its own."""
     if kind not in CELL_KINDS:
         return list(range(_NODES[kind]))
-    there = faces(kind)
-    numbered = _FACES[len(there)]
+    cell_faces = faces(kind)
+    numbered = _FACES[len(cell_faces)]
     if side not in [f"S{count}" for count in range(1, 1 + len(numbered))]:
         raise MeshFileError.of(
             f"*SURFACE names face {side[:9]} of {kind} cells, which have no such face", "S1 to S6"
         )
     corners = set(numbered[int(side[1]) - 1])
-    return next(list(each) for each in there if set(each[: len(corners)]) == corners)
+    return next(list(each) for each in cell_faces if set(each[: len(corners)]) == corners)
 
 
 READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(

@@ -22,7 +22,7 @@ Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 @dataclass(frozen=True, kw_only=True)
 class MeshKeys:
-    """Where the mesh of a chamber is and how it lies about the shaft."""
+    """Keys of [disc] that name the mesh of a chamber and its position about the shaft."""
 
     mesh: Annotated[
         OneLine | None,
@@ -73,7 +73,7 @@ MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
         WALLS: "any other wall; facets without a name count as this",
     }
 )
-"""Of the names of boundaries."""
+"""Meaning of each name of a boundary."""
 KNOWN_NAMES: Final = tuple(MEANINGS)
 STRETCHED: Final = ("outer_radius", "inner_radius", "axial_width", "central_angle")
 """Keys of [disc] that can be changed on a mesh."""
@@ -89,7 +89,7 @@ class ChamberGeometry:
     """
 
     file: str = field(compare=False)
-    """As the scene names it."""
+    """Name of the mesh file in the scene."""
     digest: str
     """SHA-256 of the file's bytes, unit and axis."""
     kind: CellKind = field(compare=False)
@@ -101,7 +101,7 @@ class ChamberGeometry:
     """Facets by name, shape (facets, nodes of a facet), in meshio's order; normals unspecified.  `outer_wall`
     is always there; no facet has two names."""
     stretch: Stretch | None = field(default=None, compare=False, repr=False)
-    """How it came from the mesh of a file; None for that mesh itself."""
+    """Stretch from the mesh of the file; None for that mesh itself."""
 
     def __str__(self) -> str:
         """The file and what it holds, for people."""

@@ -1,4 +1,4 @@
-"""Whether a body of cells is sound: how they hang together, the shape of each, and names of boundaries.
+"""Soundness of a body of cells: their connections, the shape of each, and the names of boundaries.
 
 What a file has as names is compared with what a chamber needs, facet by facet.
 """
@@ -173,8 +173,8 @@ def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> 
 def _several_volumes(body: Body, facets: Facets) -> Iterator[Contradiction]:
     order = np.argsort(facets.keys, kind="stable")
     meet = np.flatnonzero(facets.keys[order[1:]] == facets.keys[order[:-1]])
-    one, two = facets.cells[order[meet]], facets.cells[order[meet + 1]]
-    graph = coo_array((np.ones(len(one)), (one, two)), shape=(len(body.cells), len(body.cells)))
+    cell, neighbour = facets.cells[order[meet]], facets.cells[order[meet + 1]]
+    graph = coo_array((np.ones(len(cell)), (cell, neighbour)), shape=(len(body.cells), len(body.cells)))
     count, part = connected_components(graph, directed=False)
     if count > 1:
         _, first = np.unique(part, return_index=True)
@@ -208,19 +208,19 @@ def _jacobians(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
     gradients = shape_gradients(body.kind)
     places, nodes, _ = gradients.shape
     slopes = gradients.transpose(1, 0, 2).reshape(nodes, places * 3)
-    found = np.empty((3, len(body.cells)))
+    extremes = np.empty((3, len(body.cells)))
     for start in range(0, len(body.cells), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
         at = body.points[body.cells[part]].transpose(0, 2, 1)
-        along = (at @ slopes).reshape(len(at), 3, places, 3)
-        one, two, three = (along[..., axis].transpose(1, 0, 2) for axis in range(3))
+        derivatives = (at @ slopes).reshape(len(at), 3, places, 3)
+        d_first, d_second, d_third = (derivatives[..., axis].transpose(1, 0, 2) for axis in range(3))
         volume = (
-            one[0] * (two[1] * three[2] - two[2] * three[1])
-            + one[1] * (two[2] * three[0] - two[0] * three[2])
-            + one[2] * (two[0] * three[1] - two[1] * three[0])
+            d_first[0] * (d_second[1] * d_third[2] - d_second[2] * d_third[1])
+            + d_first[1] * (d_second[2] * d_third[0] - d_second[0] * d_third[2])
+            + d_first[2] * (d_second[0] * d_third[1] - d_second[1] * d_third[0])
         )
-        found[:, part] = volume.min(axis=1), volume.max(axis=1), np.ptp(at, axis=2).max(axis=1)
-    return found[0], found[1], found[2]
+        extremes[:, part] = volume.min(axis=1), volume.max(axis=1), np.ptp(at, axis=2).max(axis=1)
+    return extremes[0], extremes[1], extremes[2]
 
 
 def _misshapen(
@@ -270,7 +270,7 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
     wrong += _unknown(body, facets, sides, held)
     several = held.sum(axis=0) > 1
     if several.any():
-        both = [KNOWN_NAMES[place] for place in np.flatnonzero(held[:, several][:, 0])]
+        both = [KNOWN_NAMES[index] for index in np.flatnonzero(held[:, several][:, 0])]
         what = f"facets have two names, {' and '.join(map(toml_text, both))}"
         wrong += _about(body, what, facets.nodes[sides[several], : facets.corners], "one name for each facet")
     held[KNOWN_NAMES.index(WALLS)] |= ~held.any(axis=0)
@@ -324,8 +324,8 @@ def _missing(body: Body) -> Iterator[Contradiction]:
             problem=f'"{OUTER_WALL}" names {what}, not facets', allowed="a name of surface elements"
         )
         return
-    there = dict.fromkeys([*names, *volumes, *body.lesser, *body.other_names])
-    listed = ", ".join(map(toml_text, there)) or "none"
+    all_names = dict.fromkeys([*names, *volumes, *body.lesser, *body.other_names])
+    listed = ", ".join(map(toml_text, all_names)) or "none"
     problem = f'no facets have the name "{OUTER_WALL}"; names in the file: {listed[:300]}'
     yield Contradiction(problem=problem, allowed=f'a named boundary "{OUTER_WALL}" (Gmsh: Physical Surface)')
 

@@ -31,9 +31,9 @@ class Presence:
     """Always needed; with a default value; following from other keys; or leaving out a term."""
     meaning: str
     default: object = None
-    """As a user would write it."""
+    """Default value as a user would write it."""
     otherwise: str = ""
-    """What holds when it is left out, in words."""
+    """Rule that holds when the key is left out, in words."""
     rule: Callable[..., Any] | None = None
     """Value that follows from those of `needs`, or None; without a rule it is theirs."""
     needs: tuple[str, ...] = ()
@@ -41,9 +41,9 @@ class Presence:
     also: tuple[str, ...] = ()
     """Paths of what it follows from as well where that is there, else None."""
 
-    def value(self, *given: Any) -> Any:
+    def value(self, *values: Any) -> Any:
         """Value that follows from those of `needs`; None when there is none in this case."""
-        return given[0] if self.rule is None else self.rule(*given)
+        return values[0] if self.rule is None else self.rule(*values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,12 +58,12 @@ class Entries:
 
     @property
     def allowed(self) -> str:
-        """What is accepted, for messages."""
+        """Accepted values, for messages."""
         return self.example or f"a table with {', '.join(self.keys)}"
 
     @property
     def summary(self) -> str:
-        """What is written there, for the reference of the scene file."""
+        """Form of the value, for the reference of the scene file."""
         return "a list of tables" if self.example else "a table"
 
 
@@ -74,11 +74,11 @@ class Key:
     takes: ValueReader | Entries
     presence: Presence
     uncertain: bool = False
-    """Whether [uncertainty] may have its half-width."""
+    """True if [uncertainty] may have its half-width."""
     common: bool = False
-    """Whether all devices of a scene have it alike, so that its uncertainty is lack of knowledge."""
+    """True if all devices of a scene have it alike: its uncertainty is lack of knowledge."""
     shown_unit: str = ""
-    """In which it is described; empty where its declaration does not say."""
+    """Unit of its description; empty where its declaration has none."""
 
     @property
     def usual_unit(self) -> str:
@@ -94,12 +94,12 @@ class Shown:
     """Description of a field for a reader."""
 
     name: str
-    """Such as "outer radius R2"."""
+    """Name with symbol, such as "outer radius R2"."""
     unit: str = ""
     _: KW_ONLY
     note: str = ""
     absent: str = ""
-    """What is written when the scene has no such value; empty: no line."""
+    """Text in place of a value that the scene lacks; empty: no line."""
     only_for: str = ""
     """Control algorithm for which it is described; empty for all."""
     dimension: str | None = None
@@ -184,8 +184,8 @@ def keys_of(record: type) -> Mapping[str, Key]:
 def descriptions_of(record: type) -> Mapping[str, Shown]:
     """Descriptions that the fields of a record have, in order."""
     hints = get_type_hints(record, include_extras=True)
-    found = {name: _part(hint, Shown) for name, hint in hints.items()}
-    return MappingProxyType({name: entry for name, entry in found.items() if entry is not None})
+    shown = {name: _part(hint, Shown) for name, hint in hints.items()}
+    return MappingProxyType({name: entry for name, entry in shown.items() if entry is not None})
 
 
 def _part(hint: Any, kind: type[Part]) -> Part | None:

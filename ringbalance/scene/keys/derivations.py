@@ -73,8 +73,8 @@ def shortest_path(*, port_radius: float, hump_radius: float | None, separation: 
     """
     chord = 2 * port_radius * np.sin(separation / 2)
     if hump_radius is None:
-        whole: float = plain(chord)
-        return whole
+        straight_line: float = plain(chord)
+        return straight_line
     wrapped = separation - 2 * np.arccos(np.minimum(hump_radius / port_radius, 1.0))
     straight = np.sqrt(np.maximum((port_radius - hump_radius) * (port_radius + hump_radius), 0.0))
     around = 2 * straight + hump_radius * wrapped

@@ -1,4 +1,4 @@
-"""What a key of a scene file can take: readers that turn a TOML value into SI or say what is allowed.
+"""Readers of a key's value: they turn a TOML value into SI, or say what is allowed.
 
 A reader stands in the annotation of a record's field, see `declaration`.
 """
@@ -28,13 +28,13 @@ class ValueReader:
     read: Callable[[object], Any]
     """TOML value to SI; raises FieldError."""
     allowed: str
-    """What is accepted, for messages."""
+    """Accepted values, for messages."""
     summary: str
-    """What is written there, for the reference of the scene file."""
+    """Form of the value, for the reference of the scene file."""
     dimension: str | None = None
     """A key of `DIMENSIONS`; None without unit."""
     one_for_all: bool = False
-    """Whether a list of one value is written as that value."""
+    """True if a list of one value is written as that value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class Bounds:
         )
 
     def __str__(self) -> str:
-        """Such as "above 0 and at most 1"."""
+        """The interval in words, such as "above 0 and at most 1"."""
         named = {
             "above": self.above,
             "at least": self.at_least,

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
 from ringbalance.scene.keys.declaration import Entries, Key
-from ringbalance.scene.keys.schema import Place, Schema
+from ringbalance.scene.keys.schema import KeyPath, Schema
 from ringbalance.scene.toml import toml_key, toml_text
 from ringbalance.scene.units import FieldError, format_quantity
 
@@ -24,9 +24,9 @@ _MOST_GUESSED = 100
 class _Rejected:
     """A value, key or table that could not be read."""
 
-    place: Place
+    steps: KeyPath
     content: object
-    """What stands there."""
+    """Present value."""
     kind: Literal["value", "missing", "unknown"] = "value"
     problem: str = ""
     allowed: str = ""
@@ -37,7 +37,7 @@ class TableRead:
     """One table of a document as it was read: what is the same object there is not read again."""
 
     content: Any
-    """As TOML has it; None for a table that is not there."""
+    """Content as TOML has it; None for a missing table."""
     values: Mapping[str, Any]
     """SI values by path, standard defaults included."""
     rejected: tuple[_Rejected, ...]
@@ -48,19 +48,19 @@ class SceneReading:
     """Content of a scene file as read so far; paths are "table.key", or "key" at the top level."""
 
     file: str
-    """As it was named, for messages."""
+    """Name of the file, for messages."""
     document: Mapping[str, Any]
-    """As TOML has it."""
+    """Content of the file as TOML has it."""
     values: Mapping[str, Any]
     """SI values by path, defaults included; absent are keys that do not apply or could not be read."""
     broken: frozenset[str]
     """Paths, and names of whole tables, that stand in the file but could not be read."""
     schema: Schema
-    """What such a file can hold."""
+    """Keys and tables that such a file can hold."""
     derived: frozenset[str] = frozenset()
     """Paths of values that another file gives, which this one names."""
     tables: Mapping[str, TableRead] = field(default_factory=dict)
-    """Of the document, by name."""
+    """Tables of the document, by name."""
 
     def adding(self, values: Mapping[str, Any]) -> SceneReading:
         """Copy with more values, SI, by path."""
@@ -118,13 +118,13 @@ class SceneReading:
         from what the file gives.
         """
         unnamed = self.lacks("name")
-        known = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
+        reading = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
         for path, presence in self.schema.following:
-            if path not in known.values and known.lacks(path) and known.known(*presence.needs):
+            if path not in reading.values and reading.lacks(path) and reading.known(*presence.needs):
                 needs = (*presence.needs, *presence.also)
-                result = presence.value(*(known.values.get(need) for need in needs))
-                known = known if result is None else known.adding({path: result})
-        return known
+                result = presence.value(*(reading.values.get(need) for need in needs))
+                reading = reading if result is None else reading.adding({path: result})
+        return reading
 
     def missing_faults(self) -> Iterator[Fault]:
         """One error for each missing key, defaults included; one for a whole table that is missing."""
@@ -169,8 +169,8 @@ def read_document(
         rejected.extend(each.rejected)
     rejected += _unknown_keys(document, (*schema.top, *schema.tables), ())
     unknown = [each for each in rejected if each.kind == "unknown"][:_MOST_GUESSED]
-    meant = {each.place: _meant(each, schema) for each in unknown}
-    broken = {".".join(map(str, each.place[:2])) for each in rejected}
+    meant = {each.steps: _meant(each, schema) for each in unknown}
+    broken = {".".join(map(str, each.steps[:2])) for each in rejected}
     for steps, path in meant.items():
         table_name, _, key = path.rpartition(".")
         content = document.get(table_name, {}) if table_name else document
@@ -185,77 +185,77 @@ def read_document(
     reported = [
         each
         for each in rejected
-        if each.kind != "missing" or ".".join(map(str, each.place)) not in meant.values()
+        if each.kind != "missing" or ".".join(map(str, each.steps)) not in meant.values()
     ]
-    return reading, tuple(_fault(each, file, schema, meant=meant.get(each.place)) for each in reported)
+    return reading, tuple(_fault(each, file, schema, meant=meant.get(each.steps)) for each in reported)
 
 
 def _read_table(
-    content: object, keys: Mapping[str, Key], place: Place, before: TableRead | None = None
+    content: object, keys: Mapping[str, Key], steps: KeyPath, before: TableRead | None = None
 ) -> tuple[dict[str, Any], list[_Rejected]]:
     if not isinstance(content, Mapping):
         allowed = f"a table with {', '.join(keys)}"
-        return {}, [_Rejected(place=place, content=content, problem="it is not a table", allowed=allowed)]
-    values, rejected = _read_keys(content, keys, place, before)
-    return values, rejected + _unknown_keys(content, keys, place)
+        return {}, [_Rejected(steps=steps, content=content, problem="it is not a table", allowed=allowed)]
+    values, rejected = _read_keys(content, keys, steps, before)
+    return values, rejected + _unknown_keys(content, keys, steps)
 
 
 def _read_keys(
-    content: Mapping[str, Any], keys: Mapping[str, Key], place: Place, before: TableRead | None = None
+    content: Mapping[str, Any], keys: Mapping[str, Key], steps: KeyPath, before: TableRead | None = None
 ) -> tuple[dict[str, Any], list[_Rejected]]:
     """Values of keys, defaults included; a key that an entry of another key lacks is rejected at once."""
     values: dict[str, Any] = {}
     rejected: list[_Rejected] = []
     for name, key in keys.items():
         if name not in content and key.presence.default is None:
-            if len(place) > 1 and key.presence.kind == "needed":
-                rejected.append(_Rejected(place=(*place, name), content=content, kind="missing"))
+            if len(steps) > 1 and key.presence.kind == "needed":
+                rejected.append(_Rejected(steps=(*steps, name), content=content, kind="missing"))
             continue
-        given = content.get(name, key.presence.default)
-        path = f"{place[0]}.{name}" if place else name
+        content_of_key = content.get(name, key.presence.default)
+        path = f"{steps[0]}.{name}" if steps else name
         # Read there already, from the same object.
         read = before is not None and path in before.values
-        if before and read and (before.content or {}).get(name, key.presence.default) is given:
+        if before and read and (before.content or {}).get(name, key.presence.default) is content_of_key:
             values[name] = before.values[path]
             continue
-        value, wrong = _read_value(given, key, (*place, name))
+        value, wrong = _read_value(content_of_key, key, (*steps, name))
         rejected += wrong
         if not wrong:
             values[name] = value
     return values, rejected
 
 
-def _unknown_keys(content: Mapping[str, Any], known: Iterable[str], place: Place) -> list[_Rejected]:
-    names = set(known)
+def _unknown_keys(content: Mapping[str, Any], known_names: Iterable[str], steps: KeyPath) -> list[_Rejected]:
+    names = set(known_names)
     return [
-        _Rejected(place=(*place, name), content=value, kind="unknown")
+        _Rejected(steps=(*steps, name), content=value, kind="unknown")
         for name, value in content.items()
         if name not in names
     ]
 
 
-def _read_value(content: object, key: Key, place: Place) -> tuple[Any, list[_Rejected]]:
+def _read_value(content: object, key: Key, steps: KeyPath) -> tuple[Any, list[_Rejected]]:
     takes = key.takes
     if not isinstance(takes, Entries):
         try:
             return takes.read(content), []
         except FieldError as error:
-            wrong = _Rejected(place=place, content=content, problem=error.problem, allowed=error.allowed)
+            wrong = _Rejected(steps=steps, content=content, problem=error.problem, allowed=error.allowed)
             return None, [wrong]
     if not takes.example:
-        values, rejected = _read_table(content, takes.keys, place)
+        values, rejected = _read_table(content, takes.keys, steps)
         return (None if rejected else takes.record(**values)), rejected
     if not isinstance(content, list):
         problem = "it is not a list"
-        return None, [_Rejected(place=place, content=content, problem=problem, allowed=takes.example)]
-    read = [_read_table(entry, takes.keys, (*place, count)) for count, entry in enumerate(content)]
+        return None, [_Rejected(steps=steps, content=content, problem=problem, allowed=takes.example)]
+    read = [_read_table(entry, takes.keys, (*steps, count)) for count, entry in enumerate(content)]
     rejected = [each for _, wrong in read for each in wrong]
     return (None if rejected else tuple(takes.record(**values) for values, _ in read)), rejected
 
 
 def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None) -> Fault:
     """Args: `meant`: path that an unknown key was probably meant for; None where that was not looked for."""
-    steps, problem, allowed = rejected.place, rejected.problem, rejected.allowed
+    steps, problem, allowed = rejected.steps, rejected.problem, rejected.allowed
     unknown_table = len(steps) == 1 and isinstance(rejected.content, Mapping)
     is_table = str(steps[0]) in schema.tables or unknown_table
     table, keys = (str(steps[0]), steps[1:]) if is_table else ("", steps)
@@ -294,16 +294,16 @@ def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None)
 
 def _meant(rejected: _Rejected, schema: Schema) -> str:
     """Path that an unknown key or table was probably meant for; empty when there is none."""
-    place = rejected.place
-    word = str(place[-1])
-    if len(place) == 1 and isinstance(rejected.content, Mapping):
+    steps = rejected.steps
+    word = str(steps[-1])
+    if len(steps) == 1 and isinstance(rejected.content, Mapping):
         return closest(word, schema.tables)
-    if place[0] != "uncertainty" and len(place) <= 2:
+    if steps[0] != "uncertainty" and len(steps) <= 2:
         if word in schema.top:
             return word
         home = next((name for name, table in schema.tables.items() if word in table.keys), "")
         if home:
             return f"{home}.{word}"
     # In words the hump of a tube is the siphon's crest; no name of a key has that word.
-    near = closest(word.replace("crest", "hump"), schema.names_at(place[:-1]))
-    return ".".join([*map(str, place[:-1]), near]) if near else ""
+    near = closest(word.replace("crest", "hump"), schema.names_at(steps[:-1]))
+    return ".".join([*map(str, steps[:-1]), near]) if near else ""

@@ -17,7 +17,7 @@ from ringbalance.scene.keys.fields import Bounds, choice, half_width, one_of, sh
 from ringbalance.scene.origins import Measured, Origin
 from ringbalance.scene.registry import balancers
 
-Place = tuple[int | str, ...]
+KeyPath = tuple[int | str, ...]
 ORIGIN = "origin"
 """Key of every table that says where its values come from."""
 _UNCERTAINTY = "expanded uncertainties (95 %) of the inputs"
@@ -30,7 +30,7 @@ class TableSchema:
     text: str
     keys: Mapping[str, Key]
     record: type | None = None
-    """What is made of it; None when the scene has its values elsewhere."""
+    """Record made of the table; None when the scene has its values elsewhere."""
 
     @classmethod
     def of(cls, record: type, text: str) -> TableSchema:
@@ -46,7 +46,7 @@ class Schema:
     """Keys before the first table."""
     tables: Mapping[str, TableSchema]
     scene: Callable[..., Any]
-    """What is made of it all."""
+    """Record made of all tables."""
 
     @cached_property
     def following(self) -> tuple[tuple[str, Presence], ...]:
@@ -68,18 +68,18 @@ class Schema:
             }
         )
 
-    def key_at(self, place: Place) -> Key:
-        """The key at a place: table, key and so on; entries of lists are passed over."""
-        *tables, name = (step for step in place if isinstance(step, str))
+    def key_at(self, steps: KeyPath) -> Key:
+        """The key at a path of table, key and so on; entries of lists are passed over."""
+        *tables, name = (step for step in steps if isinstance(step, str))
         return self.keys_in(tables)[name] if tables else self.top[name]
 
-    def names_at(self, place: Place) -> list[str]:
-        """Names that can stand in the table at a place; at the top those of keys and tables."""
-        steps = [step for step in place if isinstance(step, str)]
-        return list(self.keys_in(steps)) if steps else [*self.top, *self.tables]
+    def names_at(self, steps: KeyPath) -> list[str]:
+        """Names that can stand in the table at a path; at the top those of keys and tables."""
+        tables = [step for step in steps if isinstance(step, str)]
+        return list(self.keys_in(tables)) if tables else [*self.top, *self.tables]
 
     def keys_in(self, steps: Sequence[str]) -> Mapping[str, Key]:
-        """Keys of the table at a place; none where there is no table."""
+        """Keys of the table at a path; none where there is no table."""
         keys = self.tables[steps[0]].keys if steps[0] in self.tables else {}
         for step in steps[1:]:
             takes = keys[step].takes if step in keys else None

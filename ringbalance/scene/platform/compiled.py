@@ -112,13 +112,13 @@ class _Called(_Dispatcher):  # type: ignore[misc]
     its own: those of the outermost function hold them.  That saves a good part of the time.
     """
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
         # Called only where no code is kept.
         self._compiler.compile = partial(_compile_announced, self._compiler.compile)
 
     def compile(self, sig: Any) -> Any:
-        """As numba's, but for code that another process is making now, which is waited for."""
+        """Compile a signature, or wait for another process that is compiling it now."""
         with getattr(self._cache, "in_turn", nullcontext)():
             return super().compile(sig)
 
@@ -128,24 +128,24 @@ class _Called(_Dispatcher):  # type: ignore[misc]
         return _Inner(py_func=self.py_func, locals=self.locals, targetoptions=options)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """As numba's, of the inner one, and for the type of a constant argument, not for its value."""
-        return self._inner.get_call_template(tuple(_unliteral(one) for one in args), kws)
+        """Template of the inner dispatcher, for the type of a constant argument and not for its value."""
+        return self._inner.get_call_template(tuple(_unliteral(each) for each in args), kws)
 
     def get_overload(self, sig: Any) -> Any:
-        """As numba's, of the inner one."""
+        """Overload of the inner dispatcher."""
         return self._inner.get_overload(sig)
 
 
-def _compile_announced(compile_it: Callable[..., Any], *given: Any) -> Any:
+def _compile_announced(compile_it: Callable[..., Any], *arguments: Any) -> Any:
     with announced("compiling, once on this machine ..."):
-        return compile_it(*given)
+        return compile_it(*arguments)
 
 
 class _Inner(_Dispatcher):  # type: ignore[misc]
     """Numba's dispatcher of a function that compiled code calls."""
 
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
         self._compiler._customize_flags = _without_address
 
     def compile(self, sig: Any) -> Any:
@@ -153,10 +153,10 @@ class _Inner(_Dispatcher):  # type: ignore[misc]
         args, result = _normalized(sig)
         if args not in self.overloads:
             with global_compiler_lock, self._compiling_counter:
-                found = self._compiler.compile(args, result)._replace(entry_point=_NoAddress())
-                libraries = _left_to_callers(found.library)
-                self.targetctx.insert_user_function(found.entry_point, found.fndesc, libraries)
-                self.overloads[args] = found
+                code = self._compiler.compile(args, result)._replace(entry_point=_NoAddress())
+                libraries = _left_to_callers(code.library)
+                self.targetctx.insert_user_function(code.entry_point, code.fndesc, libraries)
+                self.overloads[args] = code
         return self.overloads[args].entry_point
 
 
@@ -216,15 +216,15 @@ _COMPILED: Final = ("controller", "reduced_model")
 
 def _compiled_sources() -> tuple[Path, ...]:
     """Every source that holds functions that are compiled, and the machinery's own."""
-    here, root = Path(__file__), Path(__file__).parents[2]
+    this_file, root = Path(__file__), Path(__file__).parents[2]
     sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
     marked = [path for path in sources if any(mark in path.read_bytes() for mark in _MARKS)]
     return tuple(
         sorted(
             [
-                here,
-                here.with_name("both_ways.py"),
-                here.with_name("kept_code.py"),
+                this_file,
+                this_file.with_name("both_ways.py"),
+                this_file.with_name("kept_code.py"),
                 root / "physics/gas.py",
                 *marked,
             ]
@@ -300,8 +300,8 @@ def _give_back(deferred: dict[int, _Deferred]) -> None:
 def _signals_live() -> Iterator[None]:
     """Within `_signals_deferred`: let handlers act at once again, for Python code that takes long."""
     main = threading.current_thread() is threading.main_thread()
-    found = {number: signal.getsignal(number) for number in _SIGNALS} if main else {}
-    deferred = {number: held for number, held in found.items() if isinstance(held, _Deferred)}
+    handlers = {number: signal.getsignal(number) for number in _SIGNALS} if main else {}
+    deferred = {number: held for number, held in handlers.items() if isinstance(held, _Deferred)}
     try:
         for number, handler in deferred.items():
             signal.signal(number, handler.before)

@@ -1,4 +1,4 @@
-"""How much a command shows, and where it keeps a log: set once for a command line, read where it prints."""
+"""Extent of a command's output and its log file: set once for a command line, read where it prints."""
 
 from __future__ import annotations
 

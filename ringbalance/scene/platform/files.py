@@ -86,9 +86,9 @@ def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path
     return path
 
 
-def packaged_rows(package: str, *place: str) -> list[dict[str, str]]:
+def packaged_rows(package: str, *path: str) -> list[dict[str, str]]:
     """Rows of a CSV file that comes with the program, by its path below a package; "#" begins a comment."""
-    lines = files(package).joinpath(*place).read_text(encoding="utf-8").splitlines()
+    lines = files(package).joinpath(*path).read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
@@ -231,18 +231,18 @@ def _refused(path: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno is None:
             raise
-        place = f" ({error.filename})" if error.filename else ""
+        name = f" ({error.filename})" if error.filename else ""
         raise OSError(
-            f"{path} cannot be written: {error.strerror}{place}; make it writable or choose another place"
+            f"{path} cannot be written: {error.strerror}{name}; make it writable or choose another place"
         ) from error
 
 
 def _move_all(stage: Path, target: Path, last: Sequence[str]) -> None:
     finished = {path.relative_to(stage).as_posix(): path for path in stage.rglob("*") if path.is_file()}
     for name in sorted(finished, key=lambda name: (last.index(name) if name in last else -1, name)):
-        place = target / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        _move(finished[name], place)
+        destination = target / name
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        _move(finished[name], destination)
 
 
 def _move(source: Path, target: Path) -> None:
@@ -258,9 +258,9 @@ def _move(source: Path, target: Path) -> None:
 
 def cache_folder() -> Path:
     """The user's folder for what ringbalance can make again, after the XDG base directory specification."""
-    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    cache_home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     # A relative one is to be ignored, says the specification.
-    return (given if given.is_absolute() else Path.home() / ".cache") / "ringbalance"
+    return (cache_home if cache_home.is_absolute() else Path.home() / ".cache") / "ringbalance"
 
 
 def _draft_path(folder: Path) -> Path:

@@ -33,7 +33,7 @@ except ImportError:
 
 CODE: Final = ".nbc"
 OTHER: Final = ".kept"
-"""What another room keeps beside the code, and makes again without it."""
+"""Ending of files that another room keeps beside the code, and makes again without them."""
 _TURN: Final = ".turn"
 """Empty, held by the process that compiles a function."""
 _LONGEST_TURN: Final = 60.0
@@ -50,8 +50,8 @@ _rebuild: Any = compiler.CompileResult._rebuild
 
 def code_root() -> Path:
     """Folder that holds what is kept; NUMBA_CACHE_DIR moves it, and it may not exist yet."""
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    return Path(given) / "ringbalance" if given else cache_folder()
+    folder = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(folder) / "ringbalance" if folder else cache_folder()
 
 
 def checked_content(path: Path) -> bytes:
@@ -131,7 +131,7 @@ class KeptCode:
 
     @property
     def cache_path(self) -> str:
-        """As numba shows it."""
+        """Folder of kept code, as numba shows it."""
         return str(code_root())
 
     @contextlib.contextmanager
@@ -150,17 +150,17 @@ class KeptCode:
             return None
         target_context.refresh()
         key = (sig, target_context.codegen().magic_tuple())
-        kept = self._load(key, target_context)
-        if kept is None and self._turn is None:
+        code = self._load(key, target_context)
+        if code is None and self._turn is None:
             self._turn = _turn(code_root() / f"{self._name}{_TURN}")
-            kept = self._load(key, target_context)
-        return kept
+            code = self._load(key, target_context)
+        return code
 
     def _load(self, key: object, target_context: object) -> object:
         path = self._path(key)
         try:
-            known, data = pickle.loads(checked_content(path))
-            if known == (self._known, key):
+            origin, data = pickle.loads(checked_content(path))
+            if origin == (self._known, key):
                 return _rebuild(target_context, *data)
         except FileNotFoundError:
             return None

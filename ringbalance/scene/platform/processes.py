@@ -47,7 +47,7 @@ class _Cancellable(Future[_R]):
     """
 
     def set_exception(self, exception: BaseException | None) -> None:
-        """See `Future`."""
+        """Set the error of a worker, unless the future was cancelled."""
         try:
             super().set_exception(exception)
         except InvalidStateError:

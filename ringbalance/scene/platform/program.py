@@ -22,17 +22,17 @@ _SUFFIXES: Final = frozenset({".py", ".toml", ".csv", ".json", ".xz"})
 @cache
 def program_digest() -> str:
     """Digest of the files that decide an answer, the packages below them and the kind of processor."""
-    known = [
+    versions = [
         platform.python_version(),
         platform.machine(),
         *(f"{name} {version_of(name)}" for name in _PACKAGES),
     ]
-    found = hashlib.sha256("\n".join(known).encode())
+    digest = hashlib.sha256("\n".join(versions).encode())
     for room in _ROOMS:
         folder = Path(str(files(f"ringbalance.{room}")))
         for path in sorted(path for path in folder.rglob("*") if path.suffix in _SUFFIXES):
-            found.update(f"\n{room} {path.relative_to(folder)}\n".encode() + path.read_bytes())
-    return found.hexdigest()
+            digest.update(f"\n{room} {path.relative_to(folder)}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
 def version_of(name: str) -> str:

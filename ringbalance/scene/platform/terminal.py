@@ -1,4 +1,4 @@
-"""What a command shows: a console for its results, a console for messages, progress and the time taken.
+"""Output of a command: a console for its results, a console for messages, progress and the time taken.
 
 Progress goes to standard error: a bar on a terminal, elsewhere a line now and then; a run shorter than ten
 seconds that writes to no terminal says nothing.
@@ -32,7 +32,7 @@ _NEXT_LOGGED: Final = 1.0
 _LOADED: Final = time.perf_counter()
 _STAT: Final = Path("/proc/self/stat")
 _STARTED_AT: Final = 19
-"""Of the fields behind the program's name in brackets: ticks from the machine's start to the process's."""
+"""Field behind the program's name in brackets: ticks from the machine's start to the process's."""
 
 
 class _Terminal(Console):

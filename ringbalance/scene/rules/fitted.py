@@ -17,7 +17,7 @@ from ringbalance.scene.units import DIMENSIONS
 
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[[01]\])?")
 _ROUND_OFF: Final = 1e-6
-"""Of a correlation: files have at least seven digits."""
+"""Error of a correlation: files have at least seven digits."""
 
 
 def fitted_faults(reading: SceneReading) -> Iterator[Fault]:

@@ -42,7 +42,7 @@ _SETTLED: Final = 10.0
 _KEPT: Final = 128
 """Devices whose laws and predictions are kept."""
 _LEAST_LEFT: Final = 0.1
-"""Of a valve-open time, when the start of the flow is supposed late."""
+"""Fraction of a valve-open time that is left, at least, when the start of the flow is supposed late."""
 
 
 class _Kept(dict[Any, Any]):
@@ -57,10 +57,10 @@ class Models:
     """Models that predictions of a scene and its neighbours take, by the scene's own tolerance."""
 
     velocity: float
-    """Of a primed tube at equal fills, m/s."""
+    """Velocity in a primed tube at equal fills, m/s."""
     gas_pressure: float
     """Gauge pressure of the fitted scene's gas, Pa; that of another one is off by the error of the gauge."""
-    devices: dict[Scene, Device] = field(default_factory=_Kept, init=False, repr=False, compare=False)
+    devices: dict[Scene, ModelledDevice] = field(default_factory=_Kept, init=False, repr=False, compare=False)
     """The last `_KEPT` that were asked for."""
     rings: Rings = field(default_factory=_Kept, init=False, repr=False, compare=False)
     """Values of chambers under gravity, which few of the fitted quantities change."""
@@ -76,7 +76,7 @@ class Models:
 
     def expect(self, scenes: Sequence[Scene]) -> None:
         """Make the laws of these scenes together, once any of them is asked for."""
-        devices = {id(device): device for device in (Device.of(scene, self) for scene in scenes)}
+        devices = {id(device): device for device in (ModelledDevice.of(scene, self) for scene in scenes)}
         lacking = [device for device in devices.values() if "law" not in vars(device)]
         for places in alike([device.scene for device in lacking]):
             together = [lacking[index] for index in places]
@@ -85,7 +85,7 @@ class Models:
 
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
-    """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
+    """Velocity in a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
     fill = scene.disc.initial_fill
     return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
 
@@ -99,12 +99,12 @@ def runs_back(scene: Scene, _: Observations) -> str:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Device:
+class ModelledDevice:
     """Disc, tube and gas line of a scene."""
 
     scene: Scene
     models: Models
-    together: list[Device] = field(default_factory=list)
+    together: list[ModelledDevice] = field(default_factory=list)
     """Devices whose laws are made with this one's."""
 
     @cached_property
@@ -148,7 +148,7 @@ class Device:
         return {}
 
     def once(
-        self, observations: Observations, find: Callable[[Device, Observations], FloatArray]
+        self, observations: Observations, find: Callable[[ModelledDevice, Observations], FloatArray]
     ) -> FloatArray:
         """Part of a prediction that the device alone decides, which other rotors share."""
         # The entry keeps its data set alive, so that no other one can have the same identity.
@@ -196,7 +196,7 @@ class Device:
         return fills
 
     @classmethod
-    def of(cls, scene: Scene, models: Models) -> Device:
+    def of(cls, scene: Scene, models: Models) -> ModelledDevice:
         """The device of a scene, with the geometry's lambda.
 
         Scenes that differ in rotor, sensor, controller or the factor on lambda alone share theirs.
@@ -206,7 +206,7 @@ class Device:
         )
         disc = replace(scene.disc, lambda_factor=None)
         built, devices = replace(scene, rotor=rotor, disc=disc), models.devices
-        device = devices.pop(built, None) or Device(scene=built, models=models)
+        device = devices.pop(built, None) or ModelledDevice(scene=built, models=models)
         devices[built] = device
         if len(devices) > _KEPT:
             del devices[next(iter(devices))]

@@ -21,7 +21,7 @@ from ringbalance.identification.intervals import (
     scene_as_fitted,
 )
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block, Problem
+from ringbalance.identification.likelihood import DataBlock, Problem
 from ringbalance.identification.optimisation import Optimum, optimum_as_stated
 from ringbalance.identification.parameters import FitError, Parameter, inputs_of, path_of
 from ringbalance.identification.reading import KINDS, kinds_of
@@ -295,7 +295,7 @@ def problem_of(
         scene=scene,
         models=inputs.models,
         parameters=inputs.parameters(names),
-        blocks=tuple(Block(observations=each) for each in data),
+        blocks=tuple(DataBlock(observations=each) for each in data),
     )
 
 

@@ -36,13 +36,13 @@ STEP: Final = 1e-3
 _RANK: Final = 1e-10
 """Smallest singular value that counts, relative to the largest."""
 _SHORTEST: Final = 1e-2
-"""Of `STEP`, below which there is no difference to that side."""
+"""Fraction of `STEP` below which there is no difference to that side."""
 _JUMP: Final = 0.1
 """Part of the differences on both sides by which they may differ: beyond it there is a jump between them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Block:
+class DataBlock:
     """One file of measurements, its errors made independent."""
 
     observations: Observations
@@ -96,7 +96,7 @@ class Problem:
     models: Any
     """Models that predictions of this scene take, fixed during the fit."""
     parameters: tuple[Parameter, ...]
-    blocks: tuple[Block, ...]
+    blocks: tuple[DataBlock, ...]
 
     def scene_at(self, t: FloatArray) -> Any:
         """The scene with the parameters' values."""
@@ -106,7 +106,7 @@ class Problem:
         return scene
 
     @cached_property
-    def rows(self) -> tuple[tuple[Block, slice], ...]:
+    def rows(self) -> tuple[tuple[DataBlock, slice], ...]:
         """Every block with the place of its numbers among those of all."""
         ends = np.cumsum([0, *(b.measured.size for b in self.blocks)]).tolist()
         return tuple(zip(self.blocks, (slice(*each) for each in pairwise(ends)), strict=True))
@@ -241,7 +241,7 @@ class Residuals:
     held: FloatArray
     """L^-1 J, shape (n, held inputs)."""
     weights: FloatArray
-    """Of a robust loss, on squares, shape (n,); ones without."""
+    """Weights of a robust loss, on squares, shape (n,); ones without."""
     pulled: FloatArray
     """n at which the problem's scene and J stand, shape (held inputs,); zero where it is as stated."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block
+from ringbalance.identification.likelihood import DataBlock
 from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, kinds_of
 from ringbalance.results.rows import text_of
@@ -70,7 +70,7 @@ def next_measurement(result: FitResult, parameter: str | None = None) -> NextMea
     return NextMeasurement(parameter=chosen.name, gains=gains)
 
 
-def _candidates(result: FitResult) -> Iterator[Candidate]:
+def _candidates(result: FitResult) -> Iterator[MeasurementCandidate]:
     """Rows of every kind with derivatives in the columns of `Optimum.of_all`."""
     best = result.optimum
     problem, residuals, t = best.residuals.problem, best.residuals, best.t
@@ -80,7 +80,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         for kind in kinds_of(scene.balancer)
     ]
     offered_problem = replace(
-        problem, blocks=tuple(Block(observations=each) for each in offered if len(each))
+        problem, blocks=tuple(DataBlock(observations=each) for each in offered if len(each))
     )
     changed = [(problem.scene, inputs_of(problem.scene).changed(n, sd)) for n, sd in result.held.items()]
     by_parameters, by_held = offered_problem.quick_slopes(t), offered_problem.held_effects(t, changed)
@@ -104,7 +104,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         assumed = "" if before is not None else f" (noise of {100 * _ASSUMED_NOISE:g} % assumed)"
         for i in range(count):
             text = f"{_words_of(block.observations, i)}{assumed}"
-            yield Candidate(text=text, derivatives=rows[i::count])
+            yield MeasurementCandidate(text=text, derivatives=rows[i::count])
 
 
 def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
@@ -151,7 +151,7 @@ def _words_of(offered: Observations, row: int) -> str:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
+class MeasurementCandidate:
     """A measurement that could be made."""
 
     text: str
@@ -175,7 +175,7 @@ class _Gain:
 
 
 def _expected_gains(
-    information: FloatArray, *, parameter: int, candidates: Iterable[Candidate]
+    information: FloatArray, *, parameter: int, candidates: Iterable[MeasurementCandidate]
 ) -> tuple[_Gain, ...]:
     """Gains of all candidates, largest first.
 

@@ -24,7 +24,7 @@ _AGREES: Final = 1e-3
 """Relative change of the noise at which it is found."""
 _EVALUATIONS: Final = 40
 _NO_EFFECT: Final = 1e-3
-"""Of a standard deviation of the data, in all, below which a held input is left out."""
+"""Effect in standard deviations of the data, in all, below which a held input is left out."""
 _NEARBY: Final = 1e-2
 """Change of the sum of squares, relative or of few standard deviations, that tells one start's minimum from
 another's."""

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import Input, balancer_of
-from ringbalance.identification.device import Device, Models
+from ringbalance.identification.device import ModelledDevice, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
 from ringbalance.reduced_model.chamber.values import drawing_shares
@@ -71,7 +71,7 @@ class Parameter:
     gain: float = 1.0
     """g of ln g (x + c)."""
     scale: float | None = None
-    """Of a linear parameter, SI; None: logarithmic."""
+    """Scale of a linear parameter, SI; None: logarithmic."""
     change: Callable[[Any, float], Any]
     """The scene with another value."""
 
@@ -189,7 +189,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
     if speeds[1] <= 0 or speeds[0] <= speeds[1]:
         return 1.0, 1.0
     apart = _LOSS_STEP / (-2 * math.log(speeds[1] / speeds[0]))
-    fill, law = scene.disc.initial_fill, Device.of(scene, Models.of(scene)).law
+    fill, law = scene.disc.initial_fill, ModelledDevice.of(scene, Models.of(scene)).law
     ends = law.ends(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure)
     head = float(driving_pressure(law.path, ends)) / scene.liquid.density
     return apart - loss, head * 2 / speeds[0] ** 2 / apart
@@ -295,7 +295,7 @@ class _SceneInputs:
         return self.changed(name, -change), self.changed(name, change)
 
 
-class _LiquidRing(_SceneInputs):
+class _LiquidRingInputs(_SceneInputs):
     """Quantities go by their keys, such as "bore"."""
 
     scene: Scene
@@ -338,7 +338,7 @@ class _LiquidRing(_SceneInputs):
         return self.scene, error.moved(with_places(self.scene, self.errors.values()), change)
 
 
-_INPUTS: Final[Mapping[str, type[_SceneInputs]]] = {Scene.balancer: _LiquidRing}
+_INPUTS: Final[Mapping[str, type[_SceneInputs]]] = {Scene.balancer: _LiquidRingInputs}
 """By the name of the balancer; the others have nothing but their `Balancer`."""
 
 

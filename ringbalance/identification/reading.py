@@ -20,7 +20,7 @@ from ringbalance.identification.kinds.eccentric_mass import ECCENTRIC_MASS
 from ringbalance.identification.kinds.kind import Kind, Observations
 from ringbalance.identification.kinds.liquid_ring import LIQUID_RING
 from ringbalance.identification.tables import (
-    Table,
+    CsvTable,
     data_fault,
     decoded,
     file_name,
@@ -45,7 +45,7 @@ _TEXTS: Final = (
 )
 """Keys of the first lines that hold text."""
 _ROUNDED: Final = 0.01
-"""Of a full chamber's fill, as it may be written down."""
+"""Relative rounding of a full chamber's fill, as it may be written down."""
 
 
 def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -> tuple[Observations, ...]:
@@ -120,7 +120,7 @@ def observations_of(
     ), ()
 
 
-def _kind_faults(table: Table, scene: AnyScene | None) -> Iterator[Fault]:
+def _kind_faults(table: CsvTable, scene: AnyScene | None) -> Iterator[Fault]:
     word, allowed = table.header.get("kind"), kinds_of("" if scene is None else scene.balancer)
     if word is None:
         problem = 'the key "kind" is missing in the first lines, marked #'
@@ -134,7 +134,7 @@ def _kind_faults(table: Table, scene: AnyScene | None) -> Iterator[Fault]:
         yield data_fault(table.file, "kind", problem, value=toml_text(word), allowed=", ".join(allowed))
 
 
-def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
+def _header_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
     allowed_keys = (*_TEXTS, _UNCERTAINTY, *([_AMPLITUDE] if kind.has_amplitudes else []))
     for key, value in table.header.items():
         if key not in allowed_keys:
@@ -155,7 +155,7 @@ def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
         yield data_fault(table.file, _AMPLITUDE, problem, value=value, allowed=allowed)
 
 
-def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
+def _head_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
     allowed_names = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
     yield from table.name_faults(allowed_names)
     names = set()
@@ -188,7 +188,7 @@ def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
         yield data_fault(table.file, line, f"{len(present)} of the columns {choice}, and one is needed")
 
 
-def _columns(table: Table, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
+def _columns(table: CsvTable, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
     """Every column of numbers, SI, and the errors of its cells."""
     columns: dict[str, FloatArray] = {}
     faults: list[Fault] = []
@@ -211,7 +211,7 @@ def _columns(table: Table, kind: Kind) -> tuple[dict[str, FloatArray], list[Faul
 
 
 def _faults_of_scene(
-    table: Table, kind: Kind, scene: AnyScene | None, columns: Mapping[str, FloatArray]
+    table: CsvTable, kind: Kind, scene: AnyScene | None, columns: Mapping[str, FloatArray]
 ) -> Iterator[Fault]:
     """Chambers that the disc does not have, and fills of a driven one beyond the liquid of its pair."""
     if scene is None or not (kind.has_chamber or kind.column("gas_time")):
@@ -231,7 +231,7 @@ def _faults_of_scene(
                     yield table.fault(line, head, cell, problem, f"from 0 to {total:.4g}")
 
 
-def _repeated(table: Table) -> Iterator[Fault]:
+def _repeated(table: CsvTable) -> Iterator[Fault]:
     """Rows that stand twice: as evidence they would count twice."""
     first: dict[tuple[str, ...], int] = {}
     for line, row in zip(table.lines, table.rows, strict=True):
@@ -249,7 +249,7 @@ def _zero_to_peak(columns: Mapping[str, FloatArray], kind: Kind, factor: float) 
 
 
 def _stated_uncertainty(
-    table: Table, kind: Kind, columns: Mapping[str, FloatArray]
+    table: CsvTable, kind: Kind, columns: Mapping[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], list[Fault]]:
     """Expanded uncertainty of each measured column for which the file states one.
 

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import stdtr
 
-from ringbalance.identification.likelihood import Block, Problem
+from ringbalance.identification.likelihood import DataBlock, Problem
 from ringbalance.identification.misreadings import Joint
 from ringbalance.identification.optimisation import Optimum, optimum_as_stated
 from ringbalance.identification.parameters import FitError
@@ -46,10 +46,10 @@ _FEWEST: Final = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Rows:
+class _ReadingRows:
     """Numbers of one file before whitening: predicted at the start, slopes, effects of held inputs."""
 
-    block: Block
+    block: DataBlock
     predicted: FloatArray
     slopes: FloatArray
     held: FloatArray
@@ -59,7 +59,7 @@ class _Rows:
         """True where its numbers are real and imaginary parts, in proportion to the influence coefficient."""
         return self.block.measured.size == 2 * len(self.block.observations)
 
-    def times(self, factor: complex) -> _Rows:
+    def times(self, factor: complex) -> _ReadingRows:
         """Rows with the influence coefficient multiplied by a factor."""
         if not self.vibration or factor == 1:
             return self
@@ -69,7 +69,7 @@ class _Rows:
             both = np.reshape(values, (2, len(self.block.observations), -1))
             return np.reshape(np.einsum("ij,j...->i...", turn, both), values.shape)
 
-        return _Rows(
+        return _ReadingRows(
             block=self.block,
             predicted=turned(self.predicted),
             slopes=turned(self.slopes),
@@ -78,27 +78,27 @@ class _Rows:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Comparison:
+class ReadingComparison:
     """Likelihood of a fit's files as they stand, and as other readings of them would have it."""
 
     problem: Problem
-    rows: tuple[_Rows, ...]
+    rows: tuple[_ReadingRows, ...]
     deviance: float
     """-2 ln L of the files as they stand."""
     pulled: FloatArray
     """Held inputs at which predictions are made, in standard deviations."""
-    changed: dict[tuple[int, tuple[str, ...]], _Rows | None]
+    changed: dict[tuple[int, tuple[str, ...]], _ReadingRows | None]
     """Rows of each file, by what a reading has been set to; None where nothing can be predicted of it."""
     refits: dict[tuple[Joint, tuple[int, ...]], float]
     """Gains by fits that were made before."""
 
     @classmethod
-    def of(cls, best: Optimum) -> Comparison:
+    def of(cls, best: Optimum) -> ReadingComparison:
         """Predictions and slopes about the scene's values, and the fit that readings are compared with."""
         problem, start = best.residuals.problem, best.residuals.problem.start
         values = (problem.at(start)[:, None], problem.quick_slopes(start), best.residuals.held)
         parts = zip(problem.blocks, *(_unwhitened(problem, each) for each in values), strict=True)
-        rows = tuple(_Rows(block=b, predicted=f[:, 0], slopes=s, held=h) for b, f, s, h in parts)
+        rows = tuple(_ReadingRows(block=b, predicted=f[:, 0], slopes=s, held=h) for b, f, s, h in parts)
         pulled = best.residuals.pulled
         return cls(
             problem=problem, rows=rows, deviance=deviance_of(best), pulled=pulled, changed={}, refits={}
@@ -133,7 +133,7 @@ class Comparison:
         for i in chosen:
             for each in joint:
                 changed = each.change(blocks[i].observations, scene)
-                blocks[i] = Block(observations=changed) if changed is not None else blocks[i]
+                blocks[i] = DataBlock(observations=changed) if changed is not None else blocks[i]
         problem = replace(self.problem, scene=scene, blocks=tuple(blocks))
         with suppress(FitError, ValueError):
             best, _ = optimum_as_stated(problem, loss="linear", starts=1)
@@ -149,7 +149,7 @@ class Comparison:
         others = (rows.slopes[:, columns] for rows in self.rows if not rows.vibration)
         return [] if len(columns) < len(wanted) or any(map(np.any, others)) else columns
 
-    def _starts(self, problem: Problem, rows: Sequence[_Rows]) -> Iterator[FloatArray]:
+    def _starts(self, problem: Problem, rows: Sequence[_ReadingRows]) -> Iterator[FloatArray]:
         """t of the scene, and with the influence coefficient that explains the vibrations best."""
         yield problem.start
         if not self._response:
@@ -173,7 +173,7 @@ class Comparison:
             moved[self._response] += math.log(abs(factor)), -cmath.phase(factor)
         return moved
 
-    def _deviance(self, problem: Problem, rows: Sequence[_Rows], t: FloatArray) -> float:
+    def _deviance(self, problem: Problem, rows: Sequence[_ReadingRows], t: FloatArray) -> float:
         """-2 ln L, linear in all but the response of the rotor."""
         deviance = math.inf
         for _ in range(_STEPS):
@@ -195,7 +195,7 @@ class Comparison:
             t = self._moved(t, turn)
         return deviance
 
-    def _changed(self, joint: Joint, i: int) -> _Rows | None:
+    def _changed(self, joint: Joint, i: int) -> _ReadingRows | None:
         """Rows of a file that is read otherwise, as far as it can be; None where nothing can be predicted."""
         rows, problem = self.rows[i], self.problem
         observations = rows.block.observations
@@ -205,7 +205,7 @@ class Comparison:
             if changed is not None:
                 observations = changed
                 settings = (*settings, each.code) if each.settings else settings
-        block = Block(observations=observations)
+        block = DataBlock(observations=observations)
         if settings and (i, settings) not in self.changed:
             alone = replace(problem, blocks=(block,))
             try:
@@ -221,7 +221,9 @@ class Comparison:
                 )
                 moved = np.divide(after, before, out=np.zeros_like(after), where=before != 0)[:, None] * held
                 held = np.concatenate([moved.real, moved.imag]) if rows.vibration else moved
-                self.changed[i, settings] = _Rows(block=block, predicted=predicted, slopes=slopes, held=held)
+                self.changed[i, settings] = _ReadingRows(
+                    block=block, predicted=predicted, slopes=slopes, held=held
+                )
         other = self.changed[i, settings] if settings else rows
         return None if other is None else replace(other, block=block)
 

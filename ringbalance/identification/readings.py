@@ -32,7 +32,7 @@ from ringbalance.identification.misreadings import (
     words_of,
 )
 from ringbalance.identification.optimisation import Optimum
-from ringbalance.identification.reading_likelihood import Comparison
+from ringbalance.identification.reading_likelihood import ReadingComparison
 from ringbalance.results.rows import Value, text_of
 
 _FAR: Final = 5.0
@@ -127,7 +127,7 @@ def other_readings(
         of its files, it is named from the first gain on: a free loss takes up a pressure ten times too large.
         `stated`: the scene before held inputs are pulled; None: they are not.
     """
-    compare, far = Comparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
+    compare, far = ReadingComparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
     problem = compare.problem
     gains = {
         (joint, chosen): gain
@@ -175,7 +175,7 @@ def other_readings(
 
 
 def _without_idle_factors(
-    compare: Comparison, gains: Mapping[_Choice, float], scene: Any
+    compare: ReadingComparison, gains: Mapping[_Choice, float], scene: Any
 ) -> dict[_Choice, float]:
     """Gains of readings whose factor of the amplitude the parameters do not take up as well.
 

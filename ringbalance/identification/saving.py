@@ -36,7 +36,7 @@ _DIGITS: Final = 9
 _PARTS: Final = ("even", "odd")
 _ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
 _ENTRIES: Final = 2
-"""Of a list, one for each mass."""
+"""Entries of a list, one for each mass."""
 _RISE_DIGITS: Final = 4
 _TOGETHER: Final = 0.5
 """Correlation from which two errors are said to go together."""
@@ -104,7 +104,7 @@ def _fitted_scene(
     held = [] if result is None else [name for name in result.held if name not in MODEL_ERRORS]
     pulled = {name: path_of(name).split(".")[-1].split("[")[0] for name in held}
     while True:
-        changes = _Changes(scene)
+        changes = _FileChanges(scene)
         if result is not None and result.joint.names:
             _put_joint(changes, result, pulled)
         keyed = [(changes.scene_key(each.path), each) for each in fitted]
@@ -132,7 +132,7 @@ class _SceneKey:
     table: str
     key: str
     entry: int | None
-    """Of a list; None for a single value."""
+    """Number in a list; None for a single value."""
     width: str
     """Path of its uncertainty."""
     dimension: str | None
@@ -180,7 +180,7 @@ class _SceneKey:
 
 
 @dataclass
-class _Changes:
+class _FileChanges:
     """Values of a scene file that a fit gives, by path, and their origins."""
 
     scene: AnyScene
@@ -241,7 +241,7 @@ class _Changes:
         return {**self.values, **origins}
 
 
-def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) -> None:
+def _put_joint(changes: _FileChanges, result: FitResult, pulled: Collection[str]) -> None:
     """Write values of held inputs, corrections of models and the joint distribution.
 
     Of every error of k it holds both parts: one that the data do not depend on is as uncertain as it was, and
@@ -296,7 +296,7 @@ def _put_joint(changes: _Changes, result: FitResult, pulled: Collection[str]) ->
 
 
 def _put_widths(
-    changes: _Changes, keyed: Iterable[tuple[_SceneKey, FittedParameter]]
+    changes: _FileChanges, keyed: Iterable[tuple[_SceneKey, FittedParameter]]
 ) -> Iterator[MeasuredFinding]:
     """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
     by_path: dict[str, list[tuple[_SceneKey, FittedParameter]]] = {}

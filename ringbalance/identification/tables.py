@@ -37,13 +37,13 @@ _WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx or .ods, and of .xls."""
 _HEAD: Final = re.compile(r"([A-Za-z][A-Za-z0-9_ ]*?)(?: ?\[([^][]+)\])?")
 _SIZES: Final = (1e-15, 1e15)
-"""Of a number as it stands in a cell; zero is allowed too."""
+"""Least and largest magnitude of a number in a cell; zero is allowed too."""
 _NO_UNIT: Final = "1"
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class CsvTable:
     """A file's header and its cells, as text; `lines` and `rows` are of one length."""
 
     file: str
@@ -146,7 +146,7 @@ def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
     return "", (data_fault(file, position, f'{problem}; save the file as "CSV UTF-8"'),)
 
 
-def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table | None, tuple[Fault, ...]]:
+def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTable | None, tuple[Fault, ...]]:
     """The table of a text, or all that is wrong with its form. Args: `most`: rows that it may have."""
     numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
     head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
@@ -185,7 +185,7 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[Table |
     rows, bad_rows = _rows(data[1:], len(names), separator, file)
     # Spreadsheets make capitals of names; capitals of a unit have a meaning.
     parts = [name.partition("[") for name in names]
-    table = Table(
+    table = CsvTable(
         file=file,
         header=header,
         head_line=head_at,

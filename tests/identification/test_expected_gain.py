@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from ringbalance.identification.next_measurement import Candidate, _expected_gains
+from ringbalance.identification.next_measurement import MeasurementCandidate, _expected_gains
 from ringbalance.scene.arrays import FloatArray
 
 DURATIONS = np.array([0.05, 0.1, 0.2, 0.3])
@@ -50,7 +50,7 @@ def test_the_expected_interval_is_that_of_refits() -> None:
     gain = _expected_gains(
         derivatives(many).T @ derivatives(many),
         parameter=0,
-        candidates=[Candidate(text="2 s", derivatives=derivatives(np.full(10, 2.0)))],
+        candidates=[MeasurementCandidate(text="2 s", derivatives=derivatives(np.full(10, 2.0)))],
     )[0]
     refit = spread_of_refits((*many, *np.full(10, 2.0)))[0]
     # 1500 draws know a quartile's spread to 3 % (one standard deviation).
@@ -64,8 +64,8 @@ def test_what_nothing_determines_is_infinite_until_something_does() -> None:
         one.T @ one,
         parameter=0,
         candidates=[
-            Candidate(text="the same again", derivatives=one),
-            Candidate(text="another", derivatives=np.array([[1.0, -1.0]])),
+            MeasurementCandidate(text="the same again", derivatives=one),
+            MeasurementCandidate(text="another", derivatives=np.array([[1.0, -1.0]])),
         ],
     )
     assert [gain.candidate for gain in gains] == ["another", "the same again"]
@@ -82,7 +82,9 @@ def test_what_nothing_determines_is_infinite_until_something_does() -> None:
 def test_a_measurement_never_harms(rows: list[tuple[float, float, float]], parameter: int) -> None:
     information = np.diag([1.0, 4.0, 9.0])
     (gain,) = _expected_gains(
-        information, parameter=parameter, candidates=[Candidate(text="c", derivatives=np.array(rows))]
+        information,
+        parameter=parameter,
+        candidates=[MeasurementCandidate(text="c", derivatives=np.array(rows))],
     )
     assert gain.after <= gain.before * (1 + 1e-12)
     exact = np.sqrt(np.linalg.inv(information + np.array(rows).T @ np.array(rows))[parameter, parameter])

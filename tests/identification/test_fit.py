@@ -15,7 +15,7 @@ from synthetic_rigs import READINGS, covered, fitted, measured, observations, ri
 from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit, problem_of
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block, Problem
+from ringbalance.identification.likelihood import DataBlock, Problem
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -238,7 +238,7 @@ def test_a_jump_is_no_slope(place: float) -> None:
     made = rig(0)
     smooth = problem_of(made.scene, made.data, ["bore", "lambda_factor"])
 
-    class Jumping(Block):
+    class Jumping(DataBlock):
         def predicted(self, scene: Any, models: Any) -> FloatArray:
             beyond = scene.tube.bore > place * made.scene.tube.bore
             jump = 0.01 * np.max(np.abs(self.measured)) * beyond

@@ -14,7 +14,7 @@ from synthetic_rigs import READINGS, observations
 
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.identification.device import Device, Models
+from ringbalance.identification.device import ModelledDevice, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -35,7 +35,7 @@ def predicted(scene: Scene, data: Observations) -> FloatArray:
 
 def test_the_quick_law_is_the_calibrated_one(paper_scene: Scene) -> None:
     slow = calibrated_model(paper_scene)
-    quick = Device.of(paper_scene, Models.of(paper_scene)).law
+    quick = ModelledDevice.of(paper_scene, Models.of(paper_scene)).law
     fills = np.linspace(0.02, 0.48, 60)
     for gas in (0.0, 0.6e6, 1.2e6):
         one, other = (
@@ -140,7 +140,7 @@ def test_laws_made_together_may_differ_in_any_number_alone(paper_scene: Scene, d
         else with_value(scene=paper_scene, quantity="drag_coefficient", value=drag)
     )
 
-    def left(device: Device) -> float:
+    def left(device: ModelledDevice) -> float:
         before_and_after = device.injected(fill=0.25, chamber=0, pressure=scene.gas.pressure, gas_time=0.1)
         return float(before_and_after[1, 0])
 
@@ -153,7 +153,7 @@ def test_laws_made_together_may_differ_in_any_number_alone(paper_scene: Scene, d
         together = Models.of(scene)
         together.expect(scenes)
         for each in scenes:
-            one, other = (left(Device.of(each, models)) for models in (together, Models.of(scene)))
+            one, other = (left(ModelledDevice.of(each, models)) for models in (together, Models.of(scene)))
             assert one == pytest.approx(other, rel=1e-11), name
 
 

@@ -14,7 +14,7 @@ from synthetic_rigs import Rig, fitted, rig
 
 from ringbalance.cli import main
 from ringbalance.controller.liquid_ring.devices import Spread, devices
-from ringbalance.identification.device import Device, Models
+from ringbalance.identification.device import ModelledDevice, Models
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.parameters import inputs_of
@@ -124,7 +124,7 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
     def log_rate(moved: Scene) -> float:
         fill = np.array([moved.disc.max_fill_ratio])
         moment = float(measured_closed_forms(scene=moved, fill_ratio=fill)[1][0])
-        u = Device.of(moved, Models.of(moved)).law.evaluate(
+        u = ModelledDevice.of(moved, Models.of(moved)).law.evaluate(
             fill_ratio=moved.disc.initial_fill, gas_pressure=moved.gas.pressure, primed=True
         )
         flow = moved.tube.area * float(u.velocity) / chamber_volume(disc=moved.disc)

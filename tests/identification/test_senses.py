@@ -22,7 +22,7 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.misreadings import Joint
 from ringbalance.identification.optimisation import optimum, optimum_as_stated
 from ringbalance.identification.reading import KINDS
-from ringbalance.identification.reading_likelihood import Comparison
+from ringbalance.identification.reading_likelihood import ReadingComparison
 from ringbalance.identification.readings import Reading, other_readings
 from ringbalance.scene import load_scene
 from ringbalance.scene.models import Scene
@@ -153,14 +153,14 @@ def test_senses_that_gain_about_as_much_are_told_apart_by_fits(
 ) -> None:
     """Far from the scene the linear gain of the senses that mirror the right ones may be the larger."""
     made = rig(rig_scene, math.radians(40), "ABCDAB", weights=WEIGHTS)
-    linear = Comparison.gain
+    linear = ReadingComparison.gain
 
-    def curved(compare: Comparison, joint: Joint, chosen: Sequence[int]) -> float | None:
+    def curved(compare: ReadingComparison, joint: Joint, chosen: Sequence[int]) -> float | None:
         gain = linear(compare, joint, chosen)
         mirror = [each.code for each in joint] == [*TURNED[:2]] and len(chosen) == 2
         return gain * 1.02 + 100 if gain is not None and mirror else gain
 
-    monkeypatch.setattr(Comparison, "gain", curved)
+    monkeypatch.setattr(ReadingComparison, "gain", curved)
     turned = [counted(each, (False, False, True)) for each in made]
     assert told(readings(rig_scene, turned)) == ({TURNED[2]}, set())
 

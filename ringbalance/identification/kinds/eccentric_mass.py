@@ -94,7 +94,7 @@ def _too_long(scene: EccentricScene, observations: Observations) -> str:
     )
 
 
-class _Motion(NamedTuple):
+class _MassMotion(NamedTuple):
     series: str
     mass: int
     """Index."""
@@ -102,13 +102,13 @@ class _Motion(NamedTuple):
     speed: float
 
 
-def _motions(observations: Observations) -> Iterator[tuple[_Motion, IntArray]]:
+def _motions(observations: Observations) -> Iterator[tuple[_MassMotion, IntArray]]:
     """Every motion, and its rows in the order of their times."""
     columns, series = observations.columns, observations.series.tolist()
     set_to = zip(series, _moved_masses(observations), columns["voltage"], columns["speed"], strict=True)
-    rows_of: dict[_Motion, list[int]] = {}
+    rows_of: dict[_MassMotion, list[int]] = {}
     for row, values in enumerate(set_to):
-        rows_of.setdefault(_Motion(*values), []).append(row)
+        rows_of.setdefault(_MassMotion(*values), []).append(row)
     for motion, rows in rows_of.items():
         yield motion, np.array(rows)[np.argsort(columns["time"][rows], kind="stable")]
 

@@ -32,7 +32,7 @@ _TURNS: Final = 4 * math.pi
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class DataColumn:
     """One column of numbers."""
 
     name: str
@@ -158,7 +158,7 @@ class Kind:
     """One kind of measurement: of a scene's machine, which `fit` takes, or of a test bench without one."""
 
     title: str
-    columns: tuple[Column, ...]
+    columns: tuple[DataColumn, ...]
     one_of: tuple[str, ...] = ()
     """Columns of which a file has exactly one."""
     has_chamber: bool = False
@@ -190,7 +190,7 @@ class Kind:
         return any(column.amplitude for column in self.columns)
 
     @property
-    def measured(self) -> tuple[Column, ...]:
+    def measured(self) -> tuple[DataColumn, ...]:
         """Columns that are predicted."""
         return tuple(column for column in self.columns if column.measured)
 
@@ -199,11 +199,11 @@ class Kind:
         """Columns of text."""
         return ("series", "note", *(["chamber"] if self.has_chamber else []))
 
-    def column(self, name: str) -> Column | None:
+    def column(self, name: str) -> DataColumn | None:
         """Declaration of a column, of that of an uncertainty too; None where the kind has none."""
         return {column.name: column for column in (*self.columns, *self.uncertainties())}.get(name)
 
-    def uncertainties(self) -> Iterator[Column]:
+    def uncertainties(self) -> Iterator[DataColumn]:
         """The columns that may state how well each row is known."""
         for column in self.measured:
             yield replace(
@@ -279,10 +279,10 @@ def always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
     return lambda _: names
 
 
-def column(head: str, meaning: str, **declared: Any) -> Column:
+def column(head: str, meaning: str, **declared: Any) -> DataColumn:
     """A column by its head in the template, such as "time [s]"."""
     name, unit = split_head(head) or (head, "")
-    return Column(
+    return DataColumn(
         name=name, dimension=dimension_of(unit) if unit else None, unit=unit, meaning=meaning, **declared
     )
 

@@ -19,7 +19,7 @@ from scipy.optimize import newton
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
-from ringbalance.identification.device import Device, Models, runs_back
+from ringbalance.identification.device import ModelledDevice, Models, runs_back
 from ringbalance.identification.kinds.kind import (
     Grid,
     Kind,
@@ -88,7 +88,7 @@ def _injections(scene: Scene, observations: Observations, models: Models) -> Flo
 
     M is the moment of the pair of chambers that the gas acts on, e its direction.
     """
-    device = Device.of(scene, models)
+    device = ModelledDevice.of(scene, models)
     fills, moment = device.once(observations, _fills), device.law.moment
     before, after = moment.pair_vector(
         fill_ratio=fills, opposite_fill_ratio=2 * scene.disc.initial_fill - fills
@@ -104,7 +104,7 @@ def _chamber_numbers(scene: Scene, observations: Observations) -> IntArray:
     return np.array([letters.index(letter) for letter in observations.chamber], dtype=np.int64)
 
 
-def _fills(device: Device, observations: Observations) -> FloatArray:
+def _fills(device: ModelledDevice, observations: Observations) -> FloatArray:
     """Fill of the positive chamber of each row's pair before and after, shape (2, n)."""
     disc, columns = device.scene.disc, observations.columns
     half, total = disc.chambers // 2, 2 * disc.initial_fill
@@ -132,12 +132,12 @@ def _fills(device: Device, observations: Observations) -> FloatArray:
 
 def _transferred(scene: Scene, observations: Observations, models: Models) -> FloatArray:
     """V (x_before - x_after), m^3, times rho for a mass, kg, once the liquid rests again."""
-    device = Device.of(scene, models)
+    device = ModelledDevice.of(scene, models)
     volume = device.law.chamber_volume * device.once(observations, _moved)
     return np.asarray(scene.liquid.density * volume if "mass" in observations.columns else volume)
 
 
-def _moved(device: Device, observations: Observations) -> FloatArray:
+def _moved(device: ModelledDevice, observations: Observations) -> FloatArray:
     columns = observations.columns
     before, after = device.injected(
         fill=np.minimum(columns["fill_ratio"], 2 * device.scene.disc.initial_fill),
@@ -148,7 +148,7 @@ def _moved(device: Device, observations: Observations) -> FloatArray:
     return np.asarray(before - after)
 
 
-def _flow_rate(device: Device, observations: Observations) -> FloatArray:
+def _flow_rate(device: ModelledDevice, observations: Observations) -> FloatArray:
     """Flow through the tube alone, at rest: (k + 1) rho u^2/2 = p, Q = S u, k without rotation, m^3/s.
 
     By the secant in ln u. Source: definition of k, between two reservoirs at rest.
@@ -290,7 +290,7 @@ LIQUID_RING: Final[Mapping[str, Kind]] = {
             positive("pressure_difference [kPa]", "between the ends of the tube"),
             positive("flow_rate [ml/s]", "volume flow", measured=True),
         ),
-        predict=lambda scene, data, models: Device.of(scene, models).once(data, _flow_rate),
+        predict=lambda scene, data, models: ModelledDevice.of(scene, models).once(data, _flow_rate),
         informs=always("bore", "extra_loss"),
         offers=lambda scene: {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
     ),

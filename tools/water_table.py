@@ -11,7 +11,7 @@ from chemicals.iapws import iapws95_Psat, iapws95_rho
 from chemicals.viscosity import mu_IAPWS
 from numpy.polynomial import chebyshev
 
-COLDEST, HOTTEST, PRESSURE, DEGREE = 273.15, 373.05, 101325.0, 20
+COLDEST_WATER_K, HOTTEST_WATER_K, PRESSURE, DEGREE = 273.15, 373.05, 101325.0, 20
 TARGET = Path(__file__).resolve().parent.parent / "ringbalance" / "scene" / "data" / "water.csv"
 HEAD = """\
 # Water at 101325 Pa, 273.15 to 373.05 K: coefficients of Chebyshev series in x = 2 (T - 273.15) / 99.9 - 1.
@@ -24,7 +24,7 @@ HEAD = """\
 def table() -> str:
     """Series of density, kg/m^3; logarithm of kinematic viscosity, m^2/s; that of vapour pressure, Pa."""
     x = np.cos(np.pi * (np.arange(2 * DEGREE) + 0.5) / (2 * DEGREE))
-    temperature = COLDEST + (HOTTEST - COLDEST) * (x + 1) / 2
+    temperature = COLDEST_WATER_K + (HOTTEST_WATER_K - COLDEST_WATER_K) * (x + 1) / 2
     density = np.array([iapws95_rho(t, PRESSURE) for t in temperature])
     viscosity = np.array([mu_IAPWS(t, rho) for t, rho in zip(temperature, density, strict=True)]) / density
     vapour_pressure = np.array([iapws95_Psat(t) for t in temperature])

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.identification.tables import (
-    Table,
+    CsvTable,
     decoded,
     file_name,
     in_order,
@@ -91,7 +91,7 @@ def as_toml(text: str, reader: ValueReader) -> Any:
     return text
 
 
-def _column(table: Table, head: str, unit: str, reader: ValueReader) -> tuple[list[Any], list[Fault]]:
+def _column(table: CsvTable, head: str, unit: str, reader: ValueReader) -> tuple[list[Any], list[Fault]]:
     """Values of a column as a scene takes them, and the errors of its cells."""
     values: list[Any] = []
     faults: list[Fault] = []

@@ -40,7 +40,7 @@ LEVEL: Final = 0.05
 """Chance that a model that is right is said to fail."""
 FEWEST: Final = 5
 """Rows of a block that is tested."""
-_MOST_NAMED: Final = 3
+_MOST_NAMED_FINDINGS: Final = 3
 """Findings that the sentence names."""
 _LEAST_SHARE: Final = 0.5
 _HIDDEN: Final = 4.0
@@ -126,9 +126,11 @@ class _Criticism:
         """One sentence."""
         failed = [each.text for each in self.findings if each.fails]
         if failed:
-            more = len(failed) - _MOST_NAMED
+            more = len(failed) - _MOST_NAMED_FINDINGS
             rest = [text_of("more_findings", count=more)] if more > 0 else []
-            return text_of("residuals_against_fit", findings="; ".join([*failed[:_MOST_NAMED], *rest]))
+            return text_of(
+                "residuals_against_fit", findings="; ".join([*failed[:_MOST_NAMED_FINDINGS], *rest])
+            )
         if not self.findings:
             return text_of("residuals_too_few")
         return text_of("residuals_sound", tests=len(self.findings), level=LEVEL)

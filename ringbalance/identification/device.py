@@ -37,9 +37,9 @@ from ringbalance.scene.uncertain import NORMAL_95
 RELATIVE_ERROR: Final = 1e-5
 """Allowed to one step of an injection: the derivatives by differences are then within 1e-5 of those at a
 thousandth of it, below what counts as dependent."""
-_SETTLED: Final = 10.0
-"""s after a valve has closed: the gas has vented and the liquid rests, or has run back."""
-_KEPT: Final = 128
+_SETTLING_TIME_S: Final = 10.0
+"""Time after a valve has closed: the gas has vented and the liquid rests, or has run back."""
+_KEPT_DEVICES: Final = 128
 """Devices whose laws and predictions are kept."""
 _LEAST_LEFT: Final = 0.1
 """Fraction of a valve-open time that is left, at least, when the start of the flow is supposed late."""
@@ -61,7 +61,7 @@ class Models:
     gas_pressure: float
     """Gauge pressure of the fitted scene's gas, Pa; that of another one is off by the error of the gauge."""
     devices: dict[Scene, ModelledDevice] = field(default_factory=_Kept, init=False, repr=False, compare=False)
-    """The last `_KEPT` that were asked for."""
+    """The last `_KEPT_DEVICES` that were asked for."""
     rings: Rings = field(default_factory=_Kept, init=False, repr=False, compare=False)
     """Values of chambers under gravity, which few of the fitted quantities change."""
 
@@ -189,7 +189,7 @@ class ModelledDevice:
             np.broadcast_to(supply, count).copy(),
             # Of a shorter time the model would have nothing left to start.
             np.maximum(times - delay, _LEAST_LEFT * times),
-            _SETTLED,
+            _SETTLING_TIME_S,
             fills,
             np.zeros(WORKSPACE),
         )
@@ -208,6 +208,6 @@ class ModelledDevice:
         built, devices = replace(scene, rotor=rotor, disc=disc), models.devices
         device = devices.pop(built, None) or ModelledDevice(scene=built, models=models)
         devices[built] = device
-        if len(devices) > _KEPT:
+        if len(devices) > _KEPT_DEVICES:
             del devices[next(iter(devices))]
         return device

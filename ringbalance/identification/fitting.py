@@ -39,7 +39,7 @@ root of two that rms amplitudes are wrong by where zero to peak is stated."""
 
 _FAR: Final = 3.0
 """Standard deviations by which data may disagree with what is known beforehand."""
-_TOLD: Final = 0.1
+_MOVABLE_FRACTION: Final = 0.1
 """Fraction of the prior standard deviation by which data must be able to move a value to disagree."""
 _LITTLE: Final = 1e-4
 """Change of a quantity, relative, or in SI units where it is zero."""
@@ -108,7 +108,7 @@ class FittedParameter:
             prior = (self.before_interval[1] - self.before) / NORMAL_95
             left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
             moved = math.sqrt(max(prior**2 - left**2, 0.0))
-            disagrees |= moved > _TOLD * prior and abs(self.value - self.before) > _FAR * moved
+            disagrees |= moved > _MOVABLE_FRACTION * prior and abs(self.value - self.before) > _FAR * moved
         if self.before_source == "[uncertainty]" and disagrees:
             doubts.append(text_of("outside_stated" if self.contradicts else "data_outside_stated"))
         far = self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR

@@ -15,8 +15,8 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.scene.arrays import FloatArray
 
-_LONGEST_TIME: Final = 10.0
-"""s, of an injection: seconds are looked for where milliseconds stand, and not hours."""
+_LONGEST_INJECTION_S: Final = 10.0
+"""Longest injection: seconds are looked for where milliseconds stand, and not hours."""
 Change = Callable[[Observations, Any], Observations | None]
 """Takes the scene, too, which kinds of one balancer alone ask for a value of that balancer."""
 Conversion = Callable[[FloatArray, Any], FloatArray]
@@ -147,7 +147,7 @@ _OTHERS: Final = (
     Misreading(
         code="times_in_seconds",
         words="valve-open times a thousand times as long, such as seconds stated as milliseconds",
-        change=partial(_gas, "gas_time", -math.inf, _LONGEST_TIME, lambda values, _: 1e3 * values),
+        change=partial(_gas, "gas_time", -math.inf, _LONGEST_INJECTION_S, lambda values, _: 1e3 * values),
         settings=True,
         column="gas_time",
     ),

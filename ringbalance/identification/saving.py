@@ -35,13 +35,12 @@ from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_factor, un
 _DIGITS: Final = 9
 _PARTS: Final = ("even", "odd")
 _ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
-_ENTRIES: Final = 2
+_LIST_ENTRIES: Final = 2
 """Entries of a list, one for each mass."""
 _RISE_DIGITS: Final = 4
 _TOGETHER: Final = 0.5
 """Correlation from which two errors are said to go together."""
-_LONGEST: Final = 200
-"""Characters of a finding, as of any text of a scene file."""
+_FINDING_CHARACTERS: Final = 200
 _ANY_SIGN: Final = ("lag_angle", "phase")
 """Keys whose uncertainty may be larger than the value."""
 _KEPT: Final = "the uncertainty before stays, since it is that of both masses too: {} was fitted alone"
@@ -77,7 +76,10 @@ def save_result(
             words = text_of("errors_correlated", first=first.name, second=second.name, correlation=value)
             texts.append(("correlation", words))
     findings = [
-        MeasuredFinding(about=about, text=text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ...")
+        MeasuredFinding(
+            about=about,
+            text=text if len(text) <= _FINDING_CHARACTERS else f"{text[: _FINDING_CHARACTERS - 4]} ...",
+        )
         for about, text in texts
     ]
     fitted = [each for each in result.parameters if each.name not in START]
@@ -225,7 +227,7 @@ class _FileChanges:
         """Write a value, SI."""
         written: Any = scene_key.written(value)
         if scene_key.entry is not None:
-            zeros = [scene_key.written(0.0)] * _ENTRIES
+            zeros = [scene_key.written(0.0)] * _LIST_ENTRIES
             both = list(self.values.get(scene_key.path) or self.before(scene_key.path) or zeros)
             both[scene_key.entry] = written
             written = both
@@ -309,7 +311,7 @@ def _put_widths(
             continue
         if (
             scene_key.entry is not None
-            and len(each) < _ENTRIES
+            and len(each) < _LIST_ENTRIES
             and changes.before(scene_key.width) is not None
         ):
             # The uncertainty stands for both entries, and nothing was learnt of the other one.

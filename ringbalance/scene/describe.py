@@ -47,7 +47,7 @@ class _SceneLine:
     """Empty without unit."""
 
 
-_EXACT = 15
+_EXACT_DIGITS = 15
 """Digits of a number whose last place does not matter."""
 _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -152,7 +152,7 @@ def in_usual_unit(path: str, value: float) -> float:
     line = _line_at(path)
     if not line.dimension:
         return value
-    return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT).split(" ")[0])
+    return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT_DIGITS).split(" ")[0])
 
 
 def setting_text(path: str, value: object) -> str:

@@ -21,12 +21,11 @@ from ringbalance.scene.arrays import FloatArray
 
 BLOCK: Final = 64
 """Devices of one Latin hypercube."""
-_KEPT: Final = 4096
-"""Columns, which devices one by one ask for again."""
-_LAST: Final = 1e-12
+_KEPT_COLUMNS: Final = 4096
+_LEAST_QUANTILE: Final = 1e-12
 """Fraction at either end of a distribution that no device lies in."""
-_NOISE: Final = 3
-"""In the key of a run's noise, which the keys of drawn inputs do not have."""
+_NOISE_KEY: Final = 3
+"""Number in the key of a run's noise, which the keys of drawn inputs do not have."""
 
 
 def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
@@ -37,7 +36,7 @@ def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
     for each in np.unique(block):
         in_block = block == each
         values[in_block] = _column(name, int(each), seed)[row[in_block]]
-    return np.clip(values, _LAST, 1.0 - _LAST)
+    return np.clip(values, _LEAST_QUANTILE, 1.0 - _LEAST_QUANTILE)
 
 
 def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
@@ -47,7 +46,7 @@ def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
 
 def run_noise(seed: int, number: int) -> np.random.Generator:
     """Random numbers of the sensors in the run of a drawn device."""
-    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE))
+    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE_KEY))
     return np.random.Generator(np.random.PCG64(key))
 
 
@@ -65,7 +64,7 @@ def noise_table(seed: int, numbers: tuple[int, ...], samples: int, *, devices: b
     return table
 
 
-@lru_cache(_KEPT)
+@lru_cache(_KEPT_COLUMNS)
 def _column(name: str, block: int, seed: int) -> FloatArray:
     key = np.random.SeedSequence(entropy=seed, spawn_key=(block, crc32(name.encode())))
     random = np.random.Generator(np.random.PCG64(key))

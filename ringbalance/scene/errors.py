@@ -39,9 +39,9 @@ Distribution: TypeAlias = Literal["normal", "lognormal", "uniform"]
 Varies: TypeAlias = Literal["devices", "chambers", "not known"]
 """Population over which a quantity varies; "not known": all devices have it alike."""
 NOT_KNOWN: Final = "not known"
-ASSUMED_INFLUENCE: Final = 0.05
+_ASSUMED_INFLUENCE_U95: Final = 0.05
 """Relative expanded uncertainty (95 %) of an influence coefficient for which the scene states none."""
-ASSUMED_LAG: Final = math.radians(3.0)
+_ASSUMED_LAG_U95_RAD: Final = math.radians(3.0)
 """Expanded uncertainty (95 %) of a lag angle for which the scene states none."""
 ASSUMED_AMPLITUDE: Final = 0.05
 """Relative expanded uncertainty (95 %) of the initial amplitude from one machine to the next."""
@@ -289,8 +289,8 @@ def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
     rotor, stated = scene.rotor, {each.key for each in scene.fitted.quantities}
     stated |= {each.quantity for each in scene.uncertainty}
     assumed = {
-        "influence_coefficient": ASSUMED_INFLUENCE * rotor.influence_coefficient,
-        "lag_angle": ASSUMED_LAG,
+        "influence_coefficient": _ASSUMED_INFLUENCE_U95 * rotor.influence_coefficient,
+        "lag_angle": _ASSUMED_LAG_U95_RAD,
     }
     errors = [of_input(name, width) for name, width in assumed.items() if name not in stated]
     starts: tuple[tuple[str, Distribution, float], ...] = (

@@ -11,9 +11,9 @@ from ringbalance.scene.toml import toml_text
 MISSING = "missing"
 COMMAND_LINE = "command line"
 """File of the errors of options."""
-MOST_SHOWN = 50
+MOST_SHOWN_FAULTS = 50
 """Errors that the message of a `SceneError` lists; more are counted."""
-_LONGEST_VALUE = 60
+_WORD_CHARACTERS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class SceneError(Exception):
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults: tuple[Fault, ...] = tuple(faults)
-        lines = [str(fault) for fault in self.faults[:MOST_SHOWN]]
+        lines = [str(fault) for fault in self.faults[:MOST_SHOWN_FAULTS]]
         more = len(self.faults) - len(lines)
         if more:
             lines.append(f"{self.faults[0].file}: and {more} more; correct these first")
@@ -86,7 +86,7 @@ class SceneError(Exception):
 def closest(word: str, words: Iterable[str]) -> str:
     """The known word that was probably meant; an empty string when nothing is close."""
     folded = {name.casefold(): name for name in words}
-    close = difflib.get_close_matches(word.casefold()[:_LONGEST_VALUE], list(folded), n=1, cutoff=0.6)
+    close = difflib.get_close_matches(word.casefold()[:_WORD_CHARACTERS], list(folded), n=1, cutoff=0.6)
     return folded[close[0]] if close else ""
 
 

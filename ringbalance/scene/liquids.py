@@ -22,9 +22,9 @@ from ringbalance.scene.models import Liquid
 from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.units import FieldError
 
-_ZERO_CELSIUS = 273.15
-_ROOM = 293.15
-_SAME_TEMPERATURE = 0.01
+_ZERO_CELSIUS_K = 273.15
+_ROOM_TEMPERATURE_K = 293.15
+_SAME_TEMPERATURE_K = 0.01
 _WATER = "water"
 _COLUMNS = ("T_C", "rho_kg_m3", "nu_m2_s", "vapour_pressure_Pa")
 _ALIASES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
@@ -41,10 +41,10 @@ _ALIASES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     }
 )
 """Name in the data file: name here, further names; the data file's own name is understood too."""
-COLDEST = 273.15
-"""K; water freezes below."""
-HOTTEST = 373.05
-"""K (99.9 degC); water boils at atmospheric pressure just above."""
+COLDEST_WATER_K = 273.15
+"""Lowest temperature of liquid water; it freezes below."""
+HOTTEST_WATER_K = 373.05
+"""Highest temperature of liquid water (99.9 degC); it boils at atmospheric pressure just above."""
 _DENSITY, _VISCOSITY, _VAPOUR = "liquid.density", "liquid.kinematic_viscosity", "liquid.vapour_pressure"
 _OUTRIGHT = "density and kinematic_viscosity given outright"
 
@@ -67,13 +67,15 @@ class KnownLiquid:
     @property
     def held(self) -> str:
         """The temperatures for which there are data, in words."""
-        first, last = (f"{t - _ZERO_CELSIUS:.4g} degC" for t in (self.temperatures[0], self.temperatures[-1]))
+        first, last = (
+            f"{t - _ZERO_CELSIUS_K:.4g} degC" for t in (self.temperatures[0], self.temperatures[-1])
+        )
         return first if len(self.temperatures) == 1 else f"{first} to {last}"
 
     def holds(self, temperature: float) -> bool:
         """True when there are data for a temperature (K), plus or minus 0.01 K."""
         low, high = self.temperatures[0], self.temperatures[-1]
-        return low - _SAME_TEMPERATURE <= temperature <= high + _SAME_TEMPERATURE
+        return low - _SAME_TEMPERATURE_K <= temperature <= high + _SAME_TEMPERATURE_K
 
 
 def known_liquids() -> tuple[KnownLiquid, ...]:
@@ -111,7 +113,7 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
     if liquid is None:
         raise _unknown_liquid(name=name)
     if not liquid.holds(temperature):
-        shown = f"{temperature - _ZERO_CELSIUS:.6g} degC"
+        shown = f"{temperature - _ZERO_CELSIUS_K:.6g} degC"
         raise FieldError(f"there are no data for {liquid.name} at {shown}", f"{liquid.name} at {liquid.held}")
     low, high = liquid.temperatures[0], liquid.temperatures[-1]
     inside = min(max(temperature, low), high)
@@ -145,7 +147,10 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
 def liquids_at_room_temperature() -> tuple[Liquid, ...]:
     """Every known liquid at 20 degC, or at the nearest temperature for which there are data."""
     return tuple(
-        liquid_at(name=each.name, temperature=min(max(_ROOM, each.temperatures[0]), each.temperatures[-1]))
+        liquid_at(
+            name=each.name,
+            temperature=min(max(_ROOM_TEMPERATURE_K, each.temperatures[0]), each.temperatures[-1]),
+        )
         for each in known_liquids()
     )
 
@@ -168,12 +173,12 @@ def _library() -> Mapping[str, tuple[KnownLiquid, FloatArray]]:
             (line for line in table if line["fluid"] == key), key=lambda line: float(line["T_C"])
         )
         rows = np.array([[float(line[column]) for column in _COLUMNS] for line in ordered])
-        rows[:, 0] += _ZERO_CELSIUS
+        rows[:, 0] += _ZERO_CELSIUS_K
         name, aliases = _ALIASES[key]
         liquid = KnownLiquid(
             name=name,
             aliases=aliases if key == name else (*aliases, key),
-            temperatures=(COLDEST, HOTTEST) if name == _WATER else tuple(rows[:, 0].tolist()),
+            temperatures=(COLDEST_WATER_K, HOTTEST_WATER_K) if name == _WATER else tuple(rows[:, 0].tolist()),
             density_uncertainty=max(float(line["u95_rho_percent"]) for line in ordered) / 100,
             viscosity_uncertainty=max(float(line["u95_nu_percent"]) for line in ordered) / 100,
             source=f"{ordered[0]['source']}; {ordered[0]['status']}",
@@ -188,11 +193,11 @@ def _water_properties(*, temperature: float) -> tuple[float, float, float]:
 
     Args: `temperature`: K.
     Returns: Density, kg/m^3; kinematic viscosity, m^2/s; vapour pressure, Pa absolute.
-    Range: `COLDEST` to `HOTTEST`, 101 325 Pa; at 10 MPa the density is 0.5 % higher, which is left out.
+    Range: `COLDEST_WATER_K` to `HOTTEST_WATER_K`, 101 325 Pa; 0.5 % more density at 10 MPa is left out.
     Source: density and vapour pressure, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387 (IAPWS-95);
         viscosity, Huber et al., ibid. 38 (2009) 101 (IAPWS 2008); as series in `data/water.csv`.
     """
-    x = 2.0 * (temperature - COLDEST) / (HOTTEST - COLDEST) - 1.0
+    x = 2.0 * (temperature - COLDEST_WATER_K) / (HOTTEST_WATER_K - COLDEST_WATER_K) - 1.0
     density, log_viscosity, log_vapour_pressure = np.asarray(chebval(x, _water_series())).tolist()
     return density, math.exp(log_viscosity), math.exp(log_vapour_pressure)
 

@@ -22,7 +22,7 @@ from ringbalance.scene.registry import balancers
 from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml import read_toml, toml_text
 
-_LARGEST_FILE = 2**20
+_LARGEST_FILE_BYTES = 2**20
 _DECIDE_NOTHING = ("requirement.", "design.", "measured.", "rotor.mass", "liquid.source")
 """Values that no result depends on."""
 CHANGED: Final = ", changed"
@@ -49,7 +49,7 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
     """
     name = str(path)
     file = name if name.isprintable() else toml_text(name)
-    content, problem = read_bounded(name, what="scene file", most=_LARGEST_FILE)
+    content, problem = read_bounded(name, what="scene file", most=_LARGEST_FILE_BYTES)
     if problem:
         raise SceneError.of_file(file, problem, "a TOML file")
     scene = scene_from(content=content, file=file, folder=Path(name).parent)

@@ -138,8 +138,8 @@ class Sensor:
     ]
 
 
-_UNASKED_LIMIT: Final = 0.05e-6
-"""m, to which a controller goes where nothing is required of it."""
+_DEFAULT_LIMIT_M: Final = 0.05e-6
+"""Amplitude below which a controller rests where nothing is required of it."""
 
 
 def required_amplitude(
@@ -169,7 +169,7 @@ def _limit(
     required = required_amplitude(
         speed=speed, influence_coefficient=influence, mass=mass, residual=residual, grade=grade
     )
-    return _UNASKED_LIMIT if required is None else required
+    return _DEFAULT_LIMIT_M if required is None else required
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Final
 
-_LONGEST_VALUE, _LONGEST_LIST, _DEEPEST = 60, 10, 4
+_VALUE_CHARACTERS, _LIST_ENTRIES, _NESTED_LEVELS = 60, 10, 4
 MOST_PARTS: Final = 50
 """Parts of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for 30,000 parts."""
 _JSON: Final = json.JSONEncoder(ensure_ascii=False)
@@ -96,20 +96,20 @@ def _value_text(value: Any, *, indent: str = "") -> str:
 def toml_text(value: object) -> str:
     """A value as it would stand in a TOML file, printable and shortened to fit a line."""
     text = _toml_text(value, depth=0)
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
+    return text if len(text) <= _VALUE_CHARACTERS else text[: _VALUE_CHARACTERS - 4] + " ..."
 
 
 def _toml_text(value: object, *, depth: int) -> str:
     if isinstance(value, str):
-        return _quoted(value[: 2 * _LONGEST_VALUE])
-    if isinstance(value, Mapping | Sequence) and depth == _DEEPEST:
+        return _quoted(value[: 2 * _VALUE_CHARACTERS])
+    if isinstance(value, Mapping | Sequence) and depth == _NESTED_LEVELS:
         return "..."
     if isinstance(value, Mapping):
-        few = list(value.items())[:_LONGEST_LIST]
+        few = list(value.items())[:_LIST_ENTRIES]
         pairs = (f"{toml_key(str(key))} = {_toml_text(item, depth=depth + 1)}" for key, item in few)
         return "{ " + ", ".join(pairs) + " }"
     if isinstance(value, Sequence):
-        return "[" + ", ".join(_toml_text(item, depth=depth + 1) for item in value[:_LONGEST_LIST]) + "]"
+        return "[" + ", ".join(_toml_text(item, depth=depth + 1) for item in value[:_LIST_ENTRIES]) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int) and abs(value) >= 10**30:
@@ -120,7 +120,7 @@ def _toml_text(value: object, *, depth: int) -> str:
 def toml_key(key: str) -> str:
     """A key as it would stand in a TOML file: bare where it can be, else quoted; printable, on one line."""
     bare = key.isascii() and key.replace("_", "a").replace("-", "a").isalnum()
-    return key if bare and len(key) <= _LONGEST_VALUE else _quoted(key[:_LONGEST_VALUE])
+    return key if bare and len(key) <= _VALUE_CHARACTERS else _quoted(key[:_VALUE_CHARACTERS])
 
 
 def _quoted(text: str) -> str:

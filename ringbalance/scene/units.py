@@ -92,12 +92,12 @@ def _unit(text: str) -> tuple[str, _Unit]:
 DIMENSIONS: Mapping[str, _Dimension] = _dimensions()
 
 
-_LONGEST_TEXT = 60
+_TEXT_CHARACTERS = 60
 _READS_BACK = 1e-6
 """Relative change of a value that is written and read again."""
 _TINY = 0.01
 """In its usual unit: 0.06 s is easier read than 0.001 min."""
-_SAVED = 4
+_SAVED_CHARACTERS = 4
 """Characters that another unit than the usual one must save."""
 _NUMBER = re.compile(
     r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![0-9.,])\s*(.*?)\s*", re.DOTALL
@@ -200,7 +200,7 @@ def written_like(value: float, like: object, dimension: str) -> str:
     number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
     texts = (f"{number:.{digits}g} {unit}" for digits in (15, 16, 17))
     text = next((each for each in texts if parse_quantity(each, dimension) == value), in_si)
-    return in_si if len(plain) + _SAVED <= len(text.split(" ")[0]) else text
+    return in_si if len(plain) + _SAVED_CHARACTERS <= len(text.split(" ")[0]) else text
 
 
 @lru_cache(1024)
@@ -258,7 +258,7 @@ def shortest_quantity(value: float, usual: str) -> str:
     si = next(kind.si_unit for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
     tiny = abs(value) < _TINY * unit_factor(usual) and len(other) < len(plain)
-    return other if value == 0.0 or tiny or len(other) + _SAVED <= len(plain) else plain
+    return other if value == 0.0 or tiny or len(other) + _SAVED_CHARACTERS <= len(plain) else plain
 
 
 def unit_of(text: str) -> str:
@@ -272,8 +272,8 @@ def _split(text: object, kind: _Dimension) -> tuple[str, str]:
         raise FieldError("it is not text with a number and a unit", _allowed(kind))
     if not isinstance(text, str):
         raise FieldError("a bare number has no unit", _allowed(kind))
-    if len(text) > _LONGEST_TEXT:
-        raise FieldError(f"it is longer than {_LONGEST_TEXT} characters", _allowed(kind))
+    if len(text) > _TEXT_CHARACTERS:
+        raise FieldError(f"it is longer than {_TEXT_CHARACTERS} characters", _allowed(kind))
     spelled = _respelled(text)
     match = _NUMBER.fullmatch(spelled)
     if match is None or _THOUSANDS.match(spelled):

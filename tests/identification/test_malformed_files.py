@@ -14,7 +14,7 @@ from ringbalance.cli import main
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS, read_observations
 from ringbalance.scene import SceneError, bundled_scene
-from ringbalance.scene.faults import MOST_SHOWN
+from ringbalance.scene.faults import MOST_SHOWN_FAULTS
 from ringbalance.scene.models import Scene
 
 PAPER: Final = str(bundled_scene("liquid_ring_paper"))
@@ -161,7 +161,7 @@ def test_a_malformed_file_is_refused_with_its_place(
         if refused % ONE_IN == 0:
             assert main(["fit", PAPER, str(path)]) == 2
             written = capsys.readouterr()
-            assert (written.out, written.err.splitlines()[:MOST_SHOWN]) == ("", found[:MOST_SHOWN])
+            assert (written.out, written.err.splitlines()[:MOST_SHOWN_FAULTS]) == ("", found[:MOST_SHOWN_FAULTS])
         if refused == malformed:
             break
     # Changes that do not matter are let through, so that not everything is refused.

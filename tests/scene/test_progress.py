@@ -17,8 +17,8 @@ from ringbalance.scene.platform.terminal import activity
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first line after 50 ms, then one every 20 ms."""
-    monkeypatch.setattr(terminal, "FIRST_LINE", 0.05)
-    monkeypatch.setattr(terminal, "NEXT_LINE", 0.02)
+    monkeypatch.setattr(terminal, "FIRST_LINE_S", 0.05)
+    monkeypatch.setattr(terminal, "NEXT_LINE_S", 0.02)
 
 
 def test_a_short_run_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:

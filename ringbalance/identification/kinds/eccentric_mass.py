@@ -31,8 +31,7 @@ _MOST_SUBSTEPS: Final = 20_000
 """Steps of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
 _VOLTAGES: Final = (0.25, 0.5, 1.0)
 """Fractions of the largest voltage; where the scene gives none, those of the data alone."""
-_TIMES: Final = (0.1, 0.4, 1.0)
-"""s, of positioning."""
+_POSITIONING_TIMES_S: Final = (0.1, 0.4, 1.0)
 _SPEEDS: Final = 9
 """From half of the lowest speed of the scene to the highest one."""
 
@@ -124,7 +123,7 @@ def _some_motions(scene: EccentricScene) -> Grid:
         "moved_mass": [1.0, 2.0],
         "voltage": [] if largest is None else [x * largest for x in _VOLTAGES],
         "speed": [min(point.speed for point in scene.rotor.speed_profile)],
-        "time": _TIMES,
+        "time": _POSITIONING_TIMES_S,
     }
 
 

@@ -27,8 +27,8 @@ _LARGEST: Final[Mapping[str, float]] = {
     "voltage": 1e4,
 }
 """By dimension, SI: what no rig has, with room to spare; beyond it the unit is wrong."""
-_TURNS: Final = 4 * math.pi
-"""Largest phase or angle of a measurement, rad; beyond it degrees stand in a column of radians."""
+_LARGEST_ANGLE_RAD: Final = 4 * math.pi
+"""Largest phase or angle of a measurement; beyond it degrees stand in a column of radians."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,7 +289,7 @@ def column(head: str, meaning: str, **declared: Any) -> DataColumn:
 
 measured: Final = partial(column, measured=True)
 positive: Final = partial(column, above_zero=True)
-angle: Final = partial(column, lowest=-_TURNS, highest=_TURNS)
+angle: Final = partial(column, lowest=-_LARGEST_ANGLE_RAD, highest=_LARGEST_ANGLE_RAD)
 amplitude: Final = partial(measured, amplitude=True, lowest=0.0, highest=0.2)
 phase: Final = partial(
     angle, meaning="of that vibration, positive with the rotation, from the mark of the rotor", measured=True

@@ -46,8 +46,7 @@ _FRACTIONS: Final = (0.3, 0.5, 0.7)
 """Fractions of the largest fill."""
 _PRESSURES: Final = (0.8, 1.0, 1.25)
 """Ratios to the scene's gas pressure."""
-_TIMES: Final = (0.05, 0.2, 0.8)
-"""s, of valve-open."""
+_VALVE_OPEN_TIMES_S: Final = (0.05, 0.2, 0.8)
 _WEIGHTS: Final = (0.5, 1.0, 2.0)
 """Ratios to the unbalance that makes the vibration at the start."""
 
@@ -213,7 +212,7 @@ def _some_weights(scene: SceneFile) -> Grid:
 
 def _some_injections(scene: Scene) -> Grid:
     pressures = [x * scene.gas.pressure for x in _PRESSURES]
-    return {"fill_ratio": _some_fills(scene), "pressure": pressures, "gas_time": _TIMES}
+    return {"fill_ratio": _some_fills(scene), "pressure": pressures, "gas_time": _VALVE_OPEN_TIMES_S}
 
 
 def _some_fills(scene: Scene) -> list[float]:

@@ -16,7 +16,7 @@ from ringbalance.scene.kinds import Contradiction
 _KINDS: Final = f"cells of one kind: {', '.join(CELL_KINDS)}"
 _MOST_SHOWN: Final = 4
 """Places that one message lists; more are counted."""
-_FARTHEST: Final = 1e9
+_LARGEST_COORDINATE: Final = 1e9
 
 
 class MeshFileError(Exception):
@@ -158,8 +158,8 @@ def _wrong_nodes(contents: Contents) -> Iterator[Contradiction]:
     wrong = ~np.isfinite(points).all(axis=1)
     if wrong.any():
         yield Contradiction(problem=f"coordinates are no finite numbers ({wrong.sum()} nodes)", allowed="")
-    elif points.size and np.abs(points).max() > _FARTHEST:
-        yield Contradiction(problem=f"a coordinate is above {_FARTHEST:g}", allowed="")
+    elif points.size and np.abs(points).max() > _LARGEST_COORDINATE:
+        yield Contradiction(problem=f"a coordinate is above {_LARGEST_COORDINATE:g}", allowed="")
     for kind, nodes in contents.blocks:
         lost = ((nodes < 0) | (nodes >= len(points))).any(axis=1)
         if lost.any():

@@ -23,11 +23,11 @@ from ringbalance.scene.kinds import Contradiction, failed_checks, written
 from ringbalance.scene.rules.shape import DRAWING_ROUNDING, SIZE_CHECKS
 from ringbalance.scene.units import DIMENSIONS
 
-_DIGITS: Final = 7
+_DIMENSION_DIGITS: Final = 7
 """Digits of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
 _LEAST_FACING: Final = 0.01
 """Radial part of the outer wall's normals, on average, below which the wall is none."""
-_SHARES: Final = tuple(step / 32 for step in range(33))
+_EDGE_FRACTIONS: Final = tuple(step / 32 for step in range(33))
 """Fractions of an edge of second order, between which it is straight but for 1e-3 of its bulge."""
 
 
@@ -88,7 +88,7 @@ def placed(
         "plate_thickness": 0.0,
     }
     # As many digits as a file's rounding leaves.
-    rounded = {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
+    rounded = {key: float(f"{value:.{_DIMENSION_DIGITS}g}") for key, value in dimensions.items()}
     return Placed(points=points, dimensions=rounded), tuple(wrong)
 
 
@@ -101,7 +101,9 @@ def _nearest(points: FloatArray, surface: IntArray, corners: int) -> tuple[float
     else:
         middle = points[surface[:, corners : 2 * corners].ravel(), :2]
         bulge = middle - (first + last) / 2
-        edge_points = [first + share * (last - first) + 4 * share * (1 - share) * bulge for share in _SHARES]
+        edge_points = [
+            first + share * (last - first) + 4 * share * (1 - share) * bulge for share in _EDGE_FRACTIONS
+        ]
         distance = np.minimum.reduce([_from_origin(*pair) for pair in pairwise(edge_points)])
     return float(distance.min()), int(ends[distance.argmin(), 0])
 
@@ -149,7 +151,7 @@ def port_radius(points: FloatArray, boundaries: Mapping[str, IntArray]) -> float
 
 
 PORT_RADIUS: Final = "tube.port_radius"
-_LARGEST, _SMALLEST = 5.0, 1e-3
+_LARGEST_RADIUS_M, _SMALLEST_RADIUS_M = 5.0, 1e-3
 """Outer radii, m, beyond which no balancing disc is built."""
 _LENGTHS: Final = ("outer_radius", "inner_radius", "axial_width")
 _FRAME: Final = [0, 1, 2, -1]
@@ -212,7 +214,7 @@ def _scale_findings(
         """Why a chamber drawn in another unit cannot be; None where it can."""
         factor = float(units[other].factor / units[unit].factor)
         sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
-        if not _SMALLEST <= sized["outer_radius"] <= _LARGEST:
+        if not _SMALLEST_RADIUS_M <= sized["outer_radius"] <= _LARGEST_RADIUS_M:
             return "no disc is of that size"
         values = {f"disc.{key}": value for key, value in sized.items()}
         if reading.lacks("tube.port_radius"):
@@ -223,7 +225,7 @@ def _scale_findings(
     reason = misfit(unit)
     fitting = [name for name in get_args(MeshUnit) if misfit(name) is None]
     inner, outer = dimensions["inner_radius"], dimensions["outer_radius"]
-    if reason is None or (not fitting and _SMALLEST <= outer <= _LARGEST):
+    if reason is None or (not fitting and _SMALLEST_RADIUS_M <= outer <= _LARGEST_RADIUS_M):
         return
     problem = f'in "{unit}" the chamber reaches from {written(inner, "mm")} to {written(outer, "mm")}: '
     allowed = " or ".join(f'mesh_unit = "{name}"' for name in fitting)
@@ -231,7 +233,7 @@ def _scale_findings(
         allowed = " or ".join(f'a STEP file in "{name}"' for name in fitting)
     yield Contradiction(
         problem=f"{problem}wrong scale; {reason}",
-        allowed=allowed or f"an outer radius of {_SMALLEST:g} m to {_LARGEST:g} m",
+        allowed=allowed or f"an outer radius of {_SMALLEST_RADIUS_M:g} m to {_LARGEST_RADIUS_M:g} m",
     )
 
 

@@ -28,11 +28,10 @@ from ringbalance.scene.units import DIMENSIONS
 
 _STEP_ENDINGS: Final = (".step", ".stp")
 _STEP_UNIT: Final = "m"
-_LONGEST: Final = 300
-"""Seconds."""
+_MESHING_TIME_S: Final = 300
 _COARSEST, _FINEST = 1 / 6, 1 / 40
 """Size of cells over the extent of the solid."""
-_LARGEST_FILE: Final = 2**28
+_LARGEST_FILE_BYTES: Final = 2**28
 
 
 def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, tuple[Fault, ...]]:
@@ -85,7 +84,7 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
     path, ending, step = folder / name, Path(name).suffix, _is_step(Path(name))
     if ending.lower() not in (*READERS, *_STEP_ENDINGS):
         raise MeshFileError.of(f"a name that ends with {ending[:20] or 'no .ending'} is not read", FORMATS)
-    content, problem = read_bounded(path, what="mesh", most=_LARGEST_FILE, regular=True)
+    content, problem = read_bounded(path, what="mesh", most=_LARGEST_FILE_BYTES, regular=True)
     if problem:
         raise MeshFileError.of(f"{path}: {problem}", "a path from the folder of the scene file")
     if not content.strip():
@@ -154,12 +153,14 @@ def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
             child = subprocess.run(
                 [*command, str(source), str(target), repr(share)],
                 capture_output=True,
-                timeout=_LONGEST,
+                timeout=_MESHING_TIME_S,
                 check=False,
                 cwd=folder,
             )
         except subprocess.TimeoutExpired as error:
-            raise MeshFileError.of(f"Gmsh has not meshed the solid within {_LONGEST} s", "a mesh") from error
+            raise MeshFileError.of(
+                f"Gmsh has not meshed the solid within {_MESHING_TIME_S} s", "a mesh"
+            ) from error
         if child.returncode or not target.exists():
             lines = child.stderr.decode("utf-8", errors="replace").strip().splitlines()
             reason = "".join(each for each in (lines or ["it ended"])[-1] if each.isprintable())[:200]

@@ -53,10 +53,10 @@ _GMSH_DATA: Final = re.compile(rb"(?ms)^\$(NodeData|ElementData|ElementNodeData)
 """Results on the mesh, which meshio wants for every node."""
 _VTU: Final = "a .vtu file of an UnstructuredGrid, compressed by zlib, lzma or not at all"
 _FLUENT: Final = (b"(0", b"(1", b"(2")
-_MOST_UNPACKED: Final = 8 * 12 * MOST_NODES
+_MOST_UNPACKED_BYTES: Final = 8 * 12 * MOST_NODES
 """Bytes of one array: the connectivity of cells of ten nodes and their facets, which share most nodes."""
-_SPARE_MEMORY: Final = 300_000_000
-_MEMORY_PER_BYTE: Final = 100
+_SPARE_BYTES: Final = 300_000_000
+_BYTES_PER_FILE_BYTE: Final = 100
 """Bytes that reading may take in all, and for each of the file: text of a few digits becomes numbers, copied
 some times, and lists of them."""
 _COMPRESSED: Final = re.compile(rb"<VTKFile[^>]*\bcompressor=")
@@ -75,7 +75,7 @@ def _by_meshio(
 
     Args: `allowed`: what is. `unread`: sentences about sound files, by what stands in them or in the error.
     """
-    bound = _SPARE_MEMORY + _MEMORY_PER_BYTE * len(content)
+    bound = _SPARE_BYTES + _BYTES_PER_FILE_BYTE * len(content)
     quiet = redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO())
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), quiet[0], quiet[1]:
         warnings.simplefilter("error", DeprecationWarning)
@@ -188,7 +188,10 @@ def _refuse_bomb(content: bytes) -> None:
             count, block, last = number.unpack((base64.b64decode(head) if coded else head)[: number.size])
         except (ValueError, struct.error):
             continue
-        if max(count - 1, 0) * block + last > _MOST_UNPACKED or max(count, block) > _MOST_UNPACKED:
+        if (
+            max(count - 1, 0) * block + last > _MOST_UNPACKED_BYTES
+            or max(count, block) > _MOST_UNPACKED_BYTES
+        ):
             problem = f"one of its arrays would have {count * block} bytes"
             raise MeshFileError.of(problem, f"up to {MOST_NODES} nodes or cells")
 

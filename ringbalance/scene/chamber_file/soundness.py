@@ -37,7 +37,7 @@ _SAME: Final = 1e-7
 """Distance, as a share of the body, below which two nodes are meant to be one."""
 _ON: Final = 1e-6
 """Distance from a facet, as a share of its size, below which a node lies on it."""
-_MOST_NEAR: Final = 5_000_000
+_MOST_NEAR_PAIRS: Final = 5_000_000
 """Pairs of facets and nodes near them that are looked at, the facets with the fewest first."""
 
 
@@ -151,7 +151,7 @@ def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> 
     tree = cKDTree(points[nodes])
     counts = tree.query_ball_point(middles, radii, return_length=True)
     order = np.argsort(counts, kind="stable")
-    near = order[np.cumsum(counts[order]) <= _MOST_NEAR]
+    near = order[np.cumsum(counts[order]) <= _MOST_NEAR_PAIRS]
     lists = tree.query_ball_point(middles[near], radii[near])
     which = np.repeat(near, [len(each) for each in lists])
     candidates = nodes[np.fromiter((node for each in lists for node in each), dtype=np.int64)]
@@ -182,7 +182,7 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Contradiction]:
         yield Contradiction(problem=problem, allowed="one chamber, whose cells meet at facets")
 
 
-_AT_ONCE: Final = 4096
+_CELLS_AT_ONCE: Final = 4096
 """Cells whose Jacobians are held at one time."""
 _FLAT: Final = 1e-9
 """Jacobian over the cube of the longest diagonal below which a cell has no volume that rounding leaves."""
@@ -209,8 +209,8 @@ def _jacobians(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
     places, nodes, _ = gradients.shape
     slopes = gradients.transpose(1, 0, 2).reshape(nodes, places * 3)
     extremes = np.empty((3, len(body.cells)))
-    for start in range(0, len(body.cells), _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
+    for start in range(0, len(body.cells), _CELLS_AT_ONCE):
+        part = slice(start, start + _CELLS_AT_ONCE)
         at = body.points[body.cells[part]].transpose(0, 2, 1)
         derivatives = (at @ slopes).reshape(len(at), 3, places, 3)
         d_first, d_second, d_third = (derivatives[..., axis].transpose(1, 0, 2) for axis in range(3))

@@ -16,7 +16,7 @@ import gmsh
 from ringbalance.scene.chamber_file.record import KNOWN_NAMES
 from ringbalance.scene.platform.memory import bounded_memory
 
-_MEMORY: Final = 4 * 2**30
+_MEMORY_BYTES: Final = 4 * 2**30
 _SAME: Final = 1e-6
 _Entity = tuple[int, int]
 
@@ -75,5 +75,5 @@ def _placed(faces: list[_Entity]) -> Iterator[tuple[_Entity, str]]:
 
 
 if __name__ == "__main__":
-    with bounded_memory(_MEMORY):
+    with bounded_memory(_MEMORY_BYTES):
         _mesh_step(sys.argv[1], sys.argv[2], float(sys.argv[3]))

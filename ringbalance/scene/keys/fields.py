@@ -15,7 +15,7 @@ from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.units import DIMENSIONS, FieldError, counted_pressure, parse_quantity
 
 _LARGEST_NUMBER = 1e9
-_LONGEST_NAME = 200
+_LINE_CHARACTERS = 200
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 LEAST_CHAMBERS = 4
 """Two pairs: one corrects along its own line only."""
@@ -265,12 +265,12 @@ def one_of(words: Callable[[], tuple[str, ...]]) -> ValueReader:
 
 def text() -> ValueReader:
     """Reader of text on one line."""
-    allowed = f"text on one line, up to {_LONGEST_NAME} characters"
+    allowed = f"text on one line, up to {_LINE_CHARACTERS} characters"
 
     def read(value: object) -> str:
         if not isinstance(value, str):
             raise FieldError("it is not text", allowed)
-        if not value.strip() or not value.isprintable() or len(value) > _LONGEST_NAME:
+        if not value.strip() or not value.isprintable() or len(value) > _LINE_CHARACTERS:
             raise FieldError("it is empty, too long or not printable", allowed)
         return value
 

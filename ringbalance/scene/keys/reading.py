@@ -16,7 +16,7 @@ from ringbalance.scene.keys.schema import KeyPath, Schema
 from ringbalance.scene.toml import toml_key, toml_text
 from ringbalance.scene.units import FieldError, format_quantity
 
-_MOST_GUESSED = 100
+_MOST_GUESSED_KEYS = 100
 """Unknown keys of a file for which the key that was meant is looked for: a third of a millisecond each."""
 
 
@@ -168,7 +168,7 @@ def read_document(
         values.update(each.values)
         rejected.extend(each.rejected)
     rejected += _unknown_keys(document, (*schema.top, *schema.tables), ())
-    unknown = [each for each in rejected if each.kind == "unknown"][:_MOST_GUESSED]
+    unknown = [each for each in rejected if each.kind == "unknown"][:_MOST_GUESSED_KEYS]
     meant = {each.steps: _meant(each, schema) for each in unknown}
     broken = {".".join(map(str, each.steps[:2])) for each in rejected}
     for steps, path in meant.items():

@@ -34,12 +34,11 @@ _LOCK: Final = "lock"
 _FILES: Final = "files"
 _SYSTEM: Final = ("/dev/", "/proc/")
 """Folders whose links lead to what the process has open."""
-_MOST_KEPT: Final = 2**28
-"""Bytes of a kept file that is read."""
-_BEGINNING: Final = 60.0
-"""s in which a folder that is being made gets its lock."""
-_LONGEST_WORK: Final = 86400.0
-"""s after which a draft counts as abandoned where files cannot be locked."""
+_MOST_KEPT_BYTES: Final = 2**28
+_LOCKING_TIME_S: Final = 60.0
+"""Time in which a folder that is being made gets its lock."""
+_LONGEST_WORK_S: Final = 86400.0
+"""Age at which a draft counts as abandoned where files cannot be locked."""
 
 
 def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path:
@@ -138,7 +137,7 @@ def read_kept(path: Path) -> bytes:
     flags = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     with open(path, "rb", opener=lambda name, mode: os.open(name, mode | flags)) as stream:
         status = os.fstat(stream.fileno())
-        if not stat.S_ISREG(status.st_mode) or status.st_size > _MOST_KEPT:
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _MOST_KEPT_BYTES:
             raise OSError(f"{path} is no file that is kept")
         return stream.read()
 
@@ -296,14 +295,14 @@ def _remove_abandoned(folder: Path) -> None:
                 age = time.time() - path.stat().st_mtime
                 lock = path / _LOCK if path.is_dir() else path
                 if not lock.exists():
-                    if age > _BEGINNING:
+                    if age > _LOCKING_TIME_S:
                         discard(path)
                 elif fcntl is None:
-                    if age > _LONGEST_WORK:
+                    if age > _LONGEST_WORK_S:
                         discard(path)
                 else:
                     with open(lock, "r+b") as stream:
-                        if age > 1.0 and _lock(stream, without_locks=age > _LONGEST_WORK):
+                        if age > 1.0 and _lock(stream, without_locks=age > _LONGEST_WORK_S):
                             discard(path)
 
 

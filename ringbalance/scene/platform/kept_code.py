@@ -36,13 +36,13 @@ OTHER: Final = ".kept"
 """Ending of files that another room keeps beside the code, and makes again without them."""
 _TURN: Final = ".turn"
 """Empty, held by the process that compiles a function."""
-_LONGEST_TURN: Final = 60.0
-"""s, for which another process is waited for: several times what the longest function takes."""
-_LONGEST_KEPT: Final = 60 * 86400.0
-"""s, after which a file is removed when another one is kept."""
-_MOST_KEPT: Final = 5e8
-"""Bytes of all files: beyond, the oldest go. Each version of the program keeps some 30 MB."""
-_SIZE: Final = hashlib.sha256().digest_size
+_LONGEST_TURN_S: Final = 60.0
+"""Longest wait for another process: several times what the longest function takes."""
+_LONGEST_KEPT_S: Final = 60 * 86400.0
+"""Age at which a file is removed when another one is kept."""
+_MOST_KEPT_BYTES: Final = 5e8
+"""Size of all files: beyond, the oldest go. Each version of the program keeps some 30 MB."""
+_CHECKSUM_BYTES: Final = hashlib.sha256().digest_size
 
 _dumps: Any = serialize.dumps
 _rebuild: Any = compiler.CompileResult._rebuild
@@ -59,9 +59,9 @@ def checked_content(path: Path) -> bytes:
     if _may_be_changed_by_others(path):
         raise PermissionError(f"{path} may have been written by another user")
     data = read_kept(path)
-    if hashlib.sha256(data[_SIZE:]).digest() != data[:_SIZE]:
+    if hashlib.sha256(data[_CHECKSUM_BYTES:]).digest() != data[:_CHECKSUM_BYTES]:
         raise ValueError(f"{path} is damaged")
-    return data[_SIZE:]
+    return data[_CHECKSUM_BYTES:]
 
 
 def write_checked(path: Path, content: bytes) -> None:
@@ -196,7 +196,7 @@ def _turn(path: Path) -> int | None:
     except OSError:
         return None
     start = time.monotonic()
-    while time.monotonic() < start + _LONGEST_TURN:
+    while time.monotonic() < start + _LONGEST_TURN_S:
         try:
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -217,10 +217,10 @@ def _remove_old() -> None:
         with contextlib.suppress(OSError):
             status = path.stat()
             files.append((status.st_mtime, status.st_size, path))
-    room = _MOST_KEPT
+    room = _MOST_KEPT_BYTES
     for kept_at, size, path in sorted(files, reverse=True):
         room -= size
-        if room < 0 or time.time() - kept_at > _LONGEST_KEPT:
+        if room < 0 or time.time() - kept_at > _LONGEST_KEPT_S:
             with contextlib.suppress(OSError):
                 path.unlink()
 

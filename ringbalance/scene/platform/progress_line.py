@@ -7,10 +7,10 @@ from collections.abc import Callable
 from time import monotonic
 from typing import Any, Final
 
-_IN_PLACE: Final = 0.05
-"""s from one text to the next where each takes the place of the last."""
-_LINES: Final = 30.0
-"""s from one line to the next in a file or a pipe; the first comes as late."""
+_UPDATE_INTERVAL_S: Final = 0.05
+"""Time from one text to the next where each takes the place of the last."""
+_LINE_INTERVAL_S: Final = 30.0
+"""Time from one line to the next in a file or a pipe; the first comes as late."""
 
 
 class ProgressLine:
@@ -32,8 +32,8 @@ class ProgressLine:
             handle = ipython.display.display({"text/plain": ""}, raw=True, display_id=True)
             self._update = handle.update
         in_place = self._update is not None or sys.stderr.isatty()
-        self._wait = _IN_PLACE if in_place else _LINES
-        self._next = monotonic() + (0.0 if in_place else _LINES)
+        self._wait = _UPDATE_INTERVAL_S if in_place else _LINE_INTERVAL_S
+        self._next = monotonic() + (0.0 if in_place else _LINE_INTERVAL_S)
         self._end = "" if in_place else "\n"
 
     def __call__(self, *how_far: object) -> None:

@@ -23,15 +23,13 @@ from rich.text import Text
 
 from ringbalance.scene.platform.display import LOG, display, shown_by
 
-FIRST_LINE: Final = 10.0
-"""Seconds without a terminal before the first line."""
-NEXT_LINE: Final = 30.0
-"""Seconds from one line to the next."""
-_NEXT_LOGGED: Final = 1.0
-"""Seconds from one entry of the log to the next."""
+FIRST_LINE_S: Final = 10.0
+"""Time without a terminal before the first line."""
+NEXT_LINE_S: Final = 30.0
+_LOG_INTERVAL_S: Final = 1.0
 _LOADED: Final = time.perf_counter()
 _STAT: Final = Path("/proc/self/stat")
-_STARTED_AT: Final = 19
+_START_FIELD: Final = 19
 """Field behind the program's name in brackets: ticks from the machine's start to the process's."""
 
 
@@ -96,7 +94,7 @@ class Activity:
             work altogether, in the same unit; None where it is not known.
         """
         self.text = text
-        if monotonic() > self._logged + _NEXT_LOGGED:
+        if monotonic() > self._logged + _LOG_INTERVAL_S:
             LOG.info("%s", text)
             self._logged = monotonic()
         self._bar.update(self._task, description=escape(text), completed=done, total=total)
@@ -125,21 +123,21 @@ def activity(command: str, text: str) -> Iterator[Activity]:
 
 
 def _write_lines(command: str, shown: Activity, ended: Event) -> None:
-    start, wait = monotonic(), FIRST_LINE
+    start, wait = monotonic(), FIRST_LINE_S
     while not ended.wait(wait):
         try:
             sys.stderr.write(f"{command}: {shown.text} ({monotonic() - start:.0f} s)\n")
             sys.stderr.flush()
         except (AttributeError, OSError, ValueError):  # closed, or none at all: nobody reads it
             return
-        wait = NEXT_LINE
+        wait = NEXT_LINE_S
 
 
 def since_start() -> float:
     """Wall time since this process began, s; where the system does not tell, since this module was loaded."""
     try:
         fields = _STAT.read_text(encoding="utf-8").rpartition(")")[2].split()
-        begun = int(fields[_STARTED_AT]) / os.sysconf("SC_CLK_TCK")
+        begun = int(fields[_START_FIELD]) / os.sysconf("SC_CLK_TCK")
         return time.clock_gettime(time.CLOCK_BOOTTIME) - begun
     except (OSError, ValueError, IndexError, AttributeError):
         return time.perf_counter() - _LOADED

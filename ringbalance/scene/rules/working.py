@@ -30,8 +30,7 @@ from ringbalance.scene.kinds import Check, Contradiction, check, limit_above_noi
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
-_LARGEST_RIM_SPEED: Final = 1000.0
-"""m/s."""
+_LARGEST_RIM_SPEED_M_S: Final = 1000.0
 AIR_CONSTANT: Final = 287.05
 """R of dry air, J/(kg K)."""
 _LARGEST_EXPONENT: Final = 0.25
@@ -59,12 +58,12 @@ def bulk_modulus(liquid: Liquid) -> float:
 
 def _rim_holds(speed: float, outer: float) -> Contradiction | None:
     """omega R2 <= 1 km/s."""
-    if speed * outer <= _LARGEST_RIM_SPEED:
+    if speed * outer <= _LARGEST_RIM_SPEED_M_S:
         return None
     return Contradiction(
         problem=f"the rim would move at {speed * outer:.4g} m/s, which no disc withstands",
-        allowed=f"above 0 rpm and at most {_rpm(_LARGEST_RIM_SPEED / outer)}, {_LARGEST_RIM_SPEED:g} m/s at "
-        f"outer_radius ({written(outer, 'mm')})",
+        allowed=f"above 0 rpm and at most {_rpm(_LARGEST_RIM_SPEED_M_S / outer)}, "
+        f"{_LARGEST_RIM_SPEED_M_S:g} m/s at outer_radius ({written(outer, 'mm')})",
     )
 
 

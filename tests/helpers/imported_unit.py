@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-_KINDS: Final = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 _C_TYPES: Final[dict[str, dict[str, Any]]] = {
     "fmi2": {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int},
     "fmi3": {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Boolean": ctypes.c_bool},

@@ -51,7 +51,7 @@ test-numbers: TESTS := $(NUMBER_TESTS)
 test-numbers: test ## lint, types and the tests of what may differ between versions of Python, NumPy and SciPy
 
 test-faults: env ## kills, damaged caches, odd environments: a few minutes, part of .ci/run
-	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults $$(grep -rl --include="*.py" "mark.faults" tests)
 
 test-units: env ## units of `export` under FMPy, fmutool and the cross-compiler, which it fetches
 	$(VENV)/bin/uv run --no-project --python $(PYTHON_IN_VENV) --with fmpy --with fmu-manipulation-toolbox --with ziglang -- \

@@ -83,7 +83,8 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
 def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
     """Columns of a table of every sample by name: rotor-fixed vectors, angles not wrapped."""
     history = run.history
-    stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
+    stages = run.stages
+    stage_index = np.searchsorted([stage.start for stage in stages], run.time, side="right") - 1
     columns: dict[str, FloatArray] = {
         "time_s": run.time,
         "speed_rad_s": run.speed,
@@ -107,7 +108,7 @@ def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
     return {
         **{name: values.tolist() for name, values in columns.items()},
         "drive_off": run.drive_off.astype(int).tolist(),
-        "stage": [run.stages[stage].name for stage in stages],
+        "stage": [stages[index].name for index in stage_index],
     }
 
 

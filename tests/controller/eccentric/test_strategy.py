@@ -12,7 +12,8 @@ from ringbalance.controller.eccentric_mass.memory import MEMORY, EccentricMeasur
 from ringbalance.controller.eccentric_mass.outcome import EccentricOutcome
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_rows import eccentric_history
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
@@ -34,6 +35,23 @@ def test_it_settles_through_all_stages(run: EccentricRun) -> None:
     assert run.residual_ratio < 2e-3
     assert not run.warnings
     assert run.drive_off[-1]
+
+
+def test_a_table_of_samples_divides_the_run_into_stages_once(
+    run: EccentricRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once a sample takes minutes over the 240,000 samples of the paper's run."""
+    stages, calls = run.stages, []
+
+    def counted(_: EccentricRun) -> tuple[StageSpan, ...]:
+        calls.append(1)
+        return stages
+
+    monkeypatch.setattr(EccentricRun, "stages", property(counted))
+    names = eccentric_history(run)["stage"]
+    assert len(calls) == 1
+    assert len(names) == run.time.size
+    assert list(dict.fromkeys(names)) == [stage.name for stage in stages]
 
 
 def unbalance_left(run: EccentricRun, plant: PlantParameters) -> float:

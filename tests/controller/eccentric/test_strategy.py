@@ -40,7 +40,7 @@ def test_it_settles_through_all_stages(run: EccentricRun) -> None:
 def test_a_table_of_samples_divides_the_run_into_stages_once(
     run: EccentricRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Once a sample takes minutes over the 240,000 samples of the paper's run."""
+    """Once a sample takes minutes over the 250,000 samples of the paper's run."""
     stages, calls = run.stages, []
 
     def counted(_: EccentricRun) -> tuple[StageSpan, ...]:

@@ -102,7 +102,7 @@ def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
     """Points of a grid that meet what is required, with the median of their gas, J."""
     asked = balancer_of(space.scene).asked_fraction()
     for point in points:
-        first = race(space.hasty, point, places=None, asked=threshold(asked), settings=True)
+        first = race(space.hasty, point, grid_points=None, required_fraction=threshold(asked), settings=True)
         if first is None or first.fraction < asked - NEAR:
             continue
         judgement = judged_design(space.hasty, point, settings=first.settings, search=True)

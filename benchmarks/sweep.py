@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import ringbalance as rb
-from ringbalance.design.work import CALL, bundle_size
+from ringbalance.design.work import CALL_TIME_S, bundle_size
 from ringbalance.scene import AnyScene
 
 KEPT: Final = Path(__file__).parent / "sweep.json"
@@ -47,7 +47,7 @@ def on_paper(workers: int, *, designs: int, each: float) -> float:
     size = bundle_size(each, count=designs, workers=workers)
     free, caller = [0.0] * workers, 0.0
     for start in range(0, designs, size):
-        caller = max(caller, heapq.heappop(free)) + CALL
+        caller = max(caller, heapq.heappop(free)) + CALL_TIME_S
         heapq.heappush(free, caller + min(size, designs - start) * each)
     return designs * each / (workers * max(free))
 
@@ -85,7 +85,7 @@ def measured(designs: int) -> dict[str, Any]:
         "designs": designs,
         "runs": RUNS,
         "checked": CHECKED,
-        "seconds": spent | {"runs": each, "call": CALL, "simulate": alone},
+        "seconds": spent | {"runs": each, "call": CALL_TIME_S, "simulate": alone},
         "devices": devices / DRIVEN,
         "loop_of_simulations": alone * devices / ran,
         "workers": [

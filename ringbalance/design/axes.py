@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.design.choices import NAME, as_toml, read_choices
-from ringbalance.results.numbers import format_given as given_text
+from ringbalance.results.numbers import format_given
 from ringbalance.results.numbers import plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
@@ -35,12 +35,12 @@ from ringbalance.scene.units import DIMENSIONS, FieldError
 Point = Mapping[str, Any]
 """Changed values by path, as `SceneFile.with_values` takes them: SI, or text."""
 
-MOST_POINTS: Final = 1_000_000
+MAX_POINTS: Final = 1_000_000
 _SAMPLES: Final = ("sobol", "latin")
-_OFTEN_WRONG: Final = frozenset({"length", "pressure"})
+_OFTEN_WRONG_DIMENSIONS: Final = frozenset({"length", "pressure"})
 """Dimensions whose numbers are often thought of in a unit a thousand or a million times as large or small."""
-_FAR: Final = 100.0
-"""Times a scene's value beyond which no sweep over it lies as a whole."""
+_FAR_FACTOR: Final = 100.0
+"""Ratio to a scene's value beyond which no sweep over it lies as a whole."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,13 +68,13 @@ class Range:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
+class SweepAxis:
     """Keys that move together."""
 
     ranges: Mapping[str, Range]
-    """By path; empty for a list."""
+    """Ranges by path; empty for a list."""
     choices: tuple[Point, ...] = ()
-    """Of a list, one after the other."""
+    """Values of a list, one after the other."""
     names: tuple[str, ...] = ()
     """Names of the rows of a CSV file that names them."""
 
@@ -89,13 +89,13 @@ class Axis:
         return f"{self.paths[0].partition('.')[0]}.{NAME}" if self.names else self.paths[0]
 
     def name_of(self, point: Point) -> str:
-        """The name of the row that a point has; empty without."""
+        """Name of the row that a point has; empty without."""
         return self._name_by_values.get(tuple(map(point.get, self.paths)), "")
 
     @cached_property
     def _name_by_values(self) -> Mapping[tuple[Any, ...], str]:
         rows = [tuple(map(each.get, self.paths)) for each in self.choices]
-        # Of rows with the same values the first one names them.
+        # Of rows with equal values the first one names them.
         return dict(reversed([*zip(rows, self.names, strict=False)]))
 
     def grid(self) -> tuple[Point, ...]:
@@ -111,17 +111,17 @@ class Axis:
     def at(self, shares: FloatArray) -> tuple[Point, ...]:
         """Values at fractions of the axis, in [0, 1]."""
         if not self.ranges:
-            places = np.minimum(shares * len(self.choices), len(self.choices) - 1).astype(int)
-            return tuple(self.choices[place] for place in places.tolist())
+            numbers = np.minimum(shares * len(self.choices), len(self.choices) - 1).astype(int)
+            return tuple(self.choices[number] for number in numbers.tolist())
         columns = {path: each.at(shares).tolist() for path, each in self.ranges.items()}
         return tuple(dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Axes, and how points are taken from them."""
+    """Axes, and the way to take points from them."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
     sample: str = ""
     """ "sobol:1024" or "latin:1024"; empty: every combination."""
 
@@ -156,8 +156,8 @@ class Plan:
             parts = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
             return tuple(_merged(row) for row in zip(*parts, strict=True))
         grids = [axis.grid() for axis in self.axes]
-        if (count := math.prod(map(len, grids))) > MOST_POINTS:
-            raise _fault("", f"{count} points", f"at most {MOST_POINTS}; a sample takes as many as it says")
+        if (count := math.prod(map(len, grids))) > MAX_POINTS:
+            raise _fault("", f"{count} points", f"at most {MAX_POINTS}; a sample takes as many as it says")
         return tuple(map(_merged, product(*grids)))
 
 
@@ -166,10 +166,10 @@ def _merged(parts: Sequence[Point]) -> Point:
 
 
 def _sample_size(sample: str) -> tuple[str, int]:
-    """Kind and number of points. Raises: SceneError: no sample."""
+    """Kind and number of points of a sample. Raises: SceneError: no sample."""
     kind, _, text = sample.partition(":")
-    if kind not in _SAMPLES or not text.isdecimal() or not 1 <= int(text) <= MOST_POINTS:
-        allowed = f"one of {', '.join(f'{each}:N' for each in _SAMPLES)} with at most {MOST_POINTS} points"
+    if kind not in _SAMPLES or not text.isdecimal() or not 1 <= int(text) <= MAX_POINTS:
+        allowed = f"one of {', '.join(f'{each}:N' for each in _SAMPLES)} with at most {MAX_POINTS} points"
         problem = "this is no sample"
         raise SceneError.of_option(option="--sample", value=sample, problem=problem, allowed=allowed)
     return kind, int(text)
@@ -181,7 +181,7 @@ def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> P
     Args: `vary`: by path, an array, SI, a list of values as a scene file has them, or the text of an axis
         behind its "="; by a tuple of paths, one such list for each; by the name of a table, a list of
         mappings from its keys, or a CSV file.
-    Raises: SceneError: everything that is wrong with it.
+    Raises: SceneError: all errors of the axes together.
     """
     return _plan([partial(_axis_of, scene, name, values) for name, values in vary.items()], sample)
 
@@ -191,29 +191,29 @@ def plan_of_texts(
 ) -> Plan:
     """A plan from axes as the command line has them, each KEY=VALUES; see `plan_of`.
 
-    Args: `folder`: from which files are looked for; default that of the process.
+    Args: `folder`: folder of files that an axis names; default that of the process.
     """
     return _plan([partial(_axis_of_text, scene, each, folder=folder or Path()) for each in texts], sample)
 
 
-def _plan(axes: Iterable[Callable[[], Axis]], sample: str) -> Plan:
-    """Raises: SceneError: everything that is wrong with the axes."""
-    made: list[Axis] = []
+def _plan(axes: Iterable[Callable[[], SweepAxis]], sample: str) -> Plan:
+    """Make a plan of axes. Raises: SceneError: all errors of the axes together."""
+    plan_axes: list[SweepAxis] = []
     faults: list[Fault] = []
     for axis in axes:
         try:
-            made.append(axis())
+            plan_axes.append(axis())
         except SceneError as error:
             faults += error.faults
     if faults:
         raise SceneError(faults)
-    return Plan(axes=tuple(made), sample=sample)
+    return Plan(axes=tuple(plan_axes), sample=sample)
 
 
 def plan_of_file(scene: SceneFile, file: Path) -> Plan:
     """A plan from a TOML file with `vary`, a list of axes as the command line has them, and `sample`.
 
-    Raises: SceneError: it cannot be read, or anything in it is wrong.
+    Raises: SceneError: it cannot be read, or has errors.
     """
     if not file.is_file():
         raise SceneError.of_file(str(file), "there is no such file", "a TOML file with vary and sample")
@@ -248,7 +248,7 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
     return plan
 
 
-def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
+def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> SweepAxis:
     """Read KEY=VALUES, or several with commas between."""
     keys: list[tuple[str, list[str]]] = []
     for part in text.split(","):
@@ -264,7 +264,7 @@ def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
     return _linked([_values(scene, path, values) for path, values in keys], keys[0][0])
 
 
-def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
+def _axis_of(scene: SceneFile, name: Any, values: Any) -> SweepAxis:
     if isinstance(name, tuple):
         if len(name) != len(values):
             raise _fault(", ".join(map(str, name)), f"{len(values)} lists of values", "one for each key")
@@ -272,7 +272,7 @@ def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
     if name in scene_kind(scene.balancer).schema.tables:
         if isinstance(values, str | Path):
             return _table_axis(scene, name, Path(values), shown=str(values))
-        # A table of pandas is taken by its rows, one mapping as the only one.
+        # The rows of a pandas table, or a single row.
         values = values.to_dict("records") if hasattr(values, "to_dict") else values
         values = [values] if isinstance(values, Mapping) else values
         if not all(isinstance(row, Mapping) for row in values):
@@ -287,64 +287,62 @@ def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
         choices = (
             {path: _checked(path, value, readers[path]) for path, value in row.items()} for row in rows
         )
-        return Axis(ranges={}, choices=tuple(choices), names=tuple(names) if len(names) == len(rows) else ())
+        every_name = tuple(names) if len(names) == len(rows) else ()
+        return SweepAxis(ranges={}, choices=tuple(choices), names=every_name)
     return _linked([_values(scene, name, values)], name)
 
 
-def _linked(parts: Sequence[tuple[str, Range | list[Any]]], path: str) -> Axis:
+def _linked(parts: Sequence[tuple[str, Range | list[Any]]], path: str) -> SweepAxis:
     """Keys that move together: all over ranges, or all over lists of one length."""
     ranges = {path: each for path, each in parts if isinstance(each, Range)}
     lists = {path: each for path, each in parts if isinstance(each, list)}
     if not lists:
-        return Axis(ranges=ranges)
+        return SweepAxis(ranges=ranges)
     if not all(lists.values()):
         raise _fault(path, "no value stands there", "at least one")
     if ranges or len({len(each) for each in lists.values()}) != 1:
         raise _fault(path, "keys of one axis differ in kind or number of values", "as many values of each")
     rows = zip(*lists.values(), strict=True)
-    return Axis(ranges={}, choices=tuple(dict(zip(lists, row, strict=True)) for row in rows))
+    return SweepAxis(ranges={}, choices=tuple(dict(zip(lists, row, strict=True)) for row in rows))
 
 
-def _values(scene: SceneFile, path: str, given: Any) -> tuple[str, Range | list[Any]]:
-    """A key's range or list, read by the key's own reader."""
+def _values(scene: SceneFile, path: str, values: Any) -> tuple[str, Range | list[Any]]:
+    """Range or list of a key, read by the key's own reader."""
     reader = _reader(scene, path)
-    if isinstance(given, str):
-        given = given.split(",")
-    given = given.tolist() if hasattr(given, "tolist") else given
-    given = list(given) if isinstance(given, Iterable) else [given]
-    _check_scale(scene, path, given, reader)
-    if len(given) == 1 and isinstance(given[0], str) and ":" in given[0]:
-        return path, _range(path, given[0], reader)
-    return path, [_checked(path, each, reader) for each in given]
-
-
-def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: ValueReader) -> None:
-    """Raises: SceneError: bare numbers that are all as far from the scene's own value as a wrong unit is."""
-    table, _, key = path.partition(".")
-    own, dimension = getattr(getattr(scene, table), key, None), reader.dimension
-    bare = all(isinstance(each, int | float) and each > 0 for each in values)
-    if dimension not in _OFTEN_WRONG or not values or not bare or not isinstance(own, float) or own <= 0:
-        return
-    ratios = [each / own for each in values]
-    if min(ratios) > _FAR or max(ratios) < 1 / _FAR:
-        unit = unit_of_path(scene, path)
-        shown = plain(given_text(own, unit))
-        problem = f"bare numbers are in {unit}, and all are far from the scene's {shown}"
-        raise _fault(
-            f"{path}={values[0]:g}", problem, f'numbers in {unit}, or text with its unit, as "{shown}"'
-        )
-
-
-def _range(path: str, text: str, reader: ValueReader) -> Range:
-    low, high, *more = text.split(":")
+    if isinstance(values, str):
+        values = values.split(",")
+    values = values.tolist() if hasattr(values, "tolist") else values
+    values = list(values) if isinstance(values, Iterable) else [values]
+    _check_scale(scene, path, values, reader)
+    if len(values) != 1 or not isinstance(values[0], str) or ":" not in values[0]:
+        return path, [_checked(path, each, reader) for each in values]
+    low, high, *more = values[0].split(":")
     log = bool(more) and more[-1] == "log"
     counts = more[:-1] if log else more
     if len(counts) > 1 or not all(each.isdecimal() and int(each) > 0 for each in counts):
-        raise _fault(f"{path}={text}", "this is no range", "LOW:HIGH:COUNT or LOW:HIGH:COUNT:log")
+        raise _fault(f"{path}={values[0]}", "this is no range", "LOW:HIGH:COUNT or LOW:HIGH:COUNT:log")
     ends = [_read(path, end, reader) for end in (low, high)]
     if not all(isinstance(end, float) for end in ends) or (log and min(ends) <= 0):
-        raise _fault(f"{path}={text}", "this key has no such range", "a list A,B,C")
-    return Range(low=ends[0], high=ends[1], count=int(counts[0]) if counts else None, log=log)
+        raise _fault(f"{path}={values[0]}", "this key has no such range", "a list A,B,C")
+    count = int(counts[0]) if counts else None
+    return path, Range(low=ends[0], high=ends[1], count=count, log=log)
+
+
+def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: ValueReader) -> None:
+    """Raises: SceneError: bare numbers that are all as far from the scene's value as a wrong unit is."""
+    table, _, key = path.partition(".")
+    scene_value, dimension = getattr(getattr(scene, table), key, None), reader.dimension
+    bare = bool(values) and all(isinstance(each, int | float) and each > 0 for each in values)
+    comparable = isinstance(scene_value, float) and scene_value > 0
+    if dimension not in _OFTEN_WRONG_DIMENSIONS or not bare or not comparable:
+        return
+    ratios = [each / scene_value for each in values]
+    if min(ratios) > _FAR_FACTOR or max(ratios) < 1 / _FAR_FACTOR:
+        unit = unit_of_path(scene, path)
+        text = plain(format_given(scene_value, unit))
+        problem = f"bare numbers are in {unit}, and all are far from the scene's {text}"
+        allowed = f'numbers in {unit}, or text with its unit, as "{text}"'
+        raise _fault(f"{path}={values[0]:g}", problem, allowed)
 
 
 def _read(path: str, text: str, reader: ValueReader) -> Any:
@@ -363,25 +361,25 @@ def _checked(path: str, value: Any, reader: ValueReader) -> Any:
 
 
 def _reader(scene: SceneFile, path: str) -> ValueReader:
-    """Raises: SceneError: the scene's kind has no such key, or one with a table in it."""
+    """Reader of a key. Raises: SceneError: the scene's kind has no such key, or a table in its place."""
     schema: Schema = scene_kind(scene.balancer).schema
     table, _, key = str(path).partition(".")
     declared = schema.tables[table].keys.get(key) if table in schema.tables else None
     if declared is None or key == ORIGIN or not isinstance(declared.takes, ValueReader):
-        known = [f"{name}.{each}" for name, content in schema.tables.items() for each in content.keys]
-        problem = f"a scene of this kind has no such key{did_you_mean(str(path), known)}"
+        paths = [f"{name}.{each}" for name, content in schema.tables.items() for each in content.keys]
+        problem = f"a scene of this kind has no such key{did_you_mean(str(path), paths)}"
         raise _fault(str(path), problem, "TABLE.KEY=VALUES, or TABLE=FILE.csv")
     return declared.takes
 
 
-def _table_axis(scene: SceneFile, table: str, file: Path, *, shown: str) -> Axis:
-    """Rows of a CSV file, each of which sets some keys of a table. Args: `shown`: its name."""
+def _table_axis(scene: SceneFile, table: str, file: Path, *, shown: str) -> SweepAxis:
+    """Axis of the rows of a CSV file, each of which sets some keys of a table. Args: `shown`: file name."""
     if not file.is_file():
         raise _fault(f"{table}={shown}", "there is no such file", f"a CSV file with keys of [{table}]")
     keys = scene_kind(scene.balancer).schema.tables[table].keys
-    found = read_choices(file, table=table, keys=keys)
-    rows = ({f"{table}.{key}": value for key, value in row.items()} for row in found.rows)
-    return Axis(ranges={}, choices=tuple(rows), names=found.names)
+    content = read_choices(file, table=table, keys=keys)
+    rows = ({f"{table}.{key}": value for key, value in row.items()} for row in content.rows)
+    return SweepAxis(ranges={}, choices=tuple(rows), names=content.names)
 
 
 def unit_of_path(scene: SceneFile, path: str) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.identification.tables import (
-    CsvTable,
     decoded,
     file_name,
     in_order,
@@ -25,7 +24,7 @@ from ringbalance.scene.units import FieldError
 
 NAME: Final = "name"
 """Column that names a row, where the table of the scene has no such key."""
-MOST_ROWS: Final = 1_000_000
+MAX_ROWS: Final = 1_000_000
 _REMARK: Final = re.compile(r"^#.*$", re.MULTILINE)
 
 
@@ -51,7 +50,7 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
     text, undecoded = ("", problems) if problems else decoded(raw, file=shown)
     if undecoded:
         raise SceneError(undecoded)
-    content, problems = parse_table(_REMARK.sub("", text), file=shown, most=MOST_ROWS)
+    content, problems = parse_table(_REMARK.sub("", text), file=shown, most=MAX_ROWS)
     if content is None or problems:
         raise SceneError(in_order(problems))
     faults: list[Fault] = []
@@ -62,14 +61,20 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
         if name == NAME and key is None:
             continue
         if key is None or name == ORIGIN or not isinstance(key.takes, ValueReader):
-            known = [each for each, other in keys.items() if isinstance(other.takes, ValueReader)]
-            problem = f"[{table}] of a scene has no such key{did_you_mean(name, known)}"
-            faults.append(content.head_fault(head, problem, ", ".join((*known, NAME))))
+            allowed = [each for each, other in keys.items() if isinstance(other.takes, ValueReader)]
+            problem = f"[{table}] of a scene has no such key{did_you_mean(name, allowed)}"
+            faults.append(content.head_fault(head, problem, ", ".join((*allowed, NAME))))
         elif name in columns:
             faults.append(content.head_fault(head, "this column stands twice"))
         else:
-            columns[name], wrong = _column(content, head, unit, key.takes)
-            faults += wrong
+            columns[name] = []
+            for line, cell in zip(content.lines, content.texts(head), strict=True):
+                text = f"{cell} {unit}".strip() if cell else ""
+                try:
+                    value = key.takes.read(as_toml(text, key.takes)) if text else None
+                    columns[name].append(value if isinstance(value, int | float) or not text else text)
+                except FieldError as error:
+                    faults.append(content.fault(line, head, cell, error.problem, error.allowed))
     if not columns and not faults:
         faults.append(
             content.head_fault(content.heads[0], f"no column is a key of [{table}]", ", ".join(keys))
@@ -89,17 +94,3 @@ def as_toml(text: str, reader: ValueReader) -> Any:
             except ValueError:
                 continue
     return text
-
-
-def _column(table: CsvTable, head: str, unit: str, reader: ValueReader) -> tuple[list[Any], list[Fault]]:
-    """Values of a column as a scene takes them, and the errors of its cells."""
-    values: list[Any] = []
-    faults: list[Fault] = []
-    for line, cell in zip(table.lines, table.texts(head), strict=True):
-        text = f"{cell} {unit}".strip() if cell else ""
-        try:
-            read = reader.read(as_toml(text, reader)) if text else None
-            values.append(read if isinstance(read, int | float) or not text else text)
-        except FieldError as error:
-            faults.append(table.fault(line, head, cell, error.problem, error.allowed))
-    return values, faults

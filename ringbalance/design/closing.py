@@ -16,7 +16,7 @@ from scipy.special import expit, logit, ndtr
 
 from ringbalance.controller.balancer import Settings
 from ringbalance.design.hunt import Hunt
-from ringbalance.design.races import Candidate, Points, Races, deal
+from ringbalance.design.races import Points, RacedDesign, Races, deal
 from ringbalance.design.racing import Race, judged_design, tuned_settings
 from ringbalance.scene.arrays import FloatArray
 
@@ -37,20 +37,20 @@ _SIGMA_FACTOR: Final = 1.5
 """Ratio of the surface's error near the required fraction to its own standard deviation, as measured."""
 _MIN_GAIN: Final = 0.002
 """Expected relative decrease of the size from which on a design is worth judging."""
-_NEAR: Final = 0.03
+_NEAR_FRACTION: Final = 0.03
 """Fraction below the required one from which on a listed design may meet it, for the surface may be wrong."""
 
 
-def judged_designs(hunt: Hunt) -> list[Candidate]:
+def judged_designs(hunt: Hunt) -> list[RacedDesign]:
     """Judge the promising designs of a search, each then with the race of its judged settings alone."""
     if not hunt.races.candidates:
         return []
-    if hunt.whole or not hunt.races.space.sized:
+    if hunt.complete or not hunt.races.space.sized:
         return _judge_listed(hunt)
     return _judge_smaller_and_smaller(hunt.races, hunt.size)
 
 
-def growth(races: Races, best: Candidate) -> float:
+def growth(races: Races, best: RacedDesign) -> float:
     """Derivative of the fraction of devices by the logarithm of the size at a design, by the surface."""
     shares = next(each.shares for each in races.candidates if each.point == best.point)
     ends = best.size * np.array([1 - AS_SMALL, 1 + AS_SMALL])
@@ -60,12 +60,12 @@ def growth(races: Races, best: Candidate) -> float:
     return float(np.diff(fractions)[0]) / math.log(sizes[1] / sizes[0]) if len(set(sizes)) == 2 else 0.0
 
 
-def _judge_smaller_and_smaller(races: Races, size: float) -> list[Candidate]:
+def _judge_smaller_and_smaller(races: Races, size: float) -> list[RacedDesign]:
     """Judge two designs a round, by expected decrease of the size, until the surface promises none.
 
     Every verdict improves the surface.
     """
-    judged: list[Candidate] = []
+    judged: list[RacedDesign] = []
     settings: Settings | None = None
     for round_number in range(_MAX_ROUNDS):
         smallest = min((each.size for each in judged if each.race.succeeded), default=math.inf)
@@ -82,17 +82,17 @@ def _judge_smaller_and_smaller(races: Races, size: float) -> list[Candidate]:
             order = sorted(range(len(races.candidates)), key=lambda i: races.candidates[i].race.order)
             chosen = races.points.some(order[:2])
         if round_number == 0 and not races.space.sets_controller:
-            races.told("settings of the designs that are judged")
+            races.report_progress("settings of the designs that are judged")
             (settings,) = deal(races.executor, [partial(tuned_settings, races.space.hasty, chosen.points[0])])
-        races.told(f"judging designs {len(judged) + 1} and on, about {1e6 * size:.4g} ml")
-        places = races.nearest_places(chosen.shares)
+        races.report_progress(f"judging designs {len(judged) + 1} and on, about {1e6 * size:.4g} ml")
+        grid_points = races.nearest_grid_points(chosen.shares)
         calls = [
-            partial(judged_design, races.space.hasty, point, place=place, settings=settings)
-            for point, place in zip(chosen.points, places, strict=True)
+            partial(judged_design, races.space.hasty, point, grid_point=grid_point, settings=settings)
+            for point, grid_point in zip(chosen.points, grid_points, strict=True)
         ]
         for i, judgement in enumerate(deal(races.executor, calls)):
             if judgement is not None:
-                judged.append(races.add(chosen, i, Race(place=places[i], judgement=judgement)))
+                judged.append(races.add(chosen, i, Race(grid_point=grid_points[i], judgement=judgement)))
         largest = max(races.space.size(point) for point in chosen.points)
         size = min((each.size for each in judged if each.race.succeeded), default=largest)
     return judged
@@ -125,7 +125,7 @@ def _most_promising_by_size(
     return points.some(best), sizes[best], logits[best], sigmas[best]
 
 
-def _judge_listed(hunt: Hunt) -> list[Candidate]:
+def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
     """Judge designs that raced, two at a time, in the order of their size and gas.
 
     From the first that promises to meet the requirement, go on to smaller ones until two miss it, or to
@@ -144,23 +144,23 @@ def _judge_listed(hunt: Hunt) -> list[Candidate]:
             elif logits[i] > logits[listed[-1]]:
                 listed[-1] = i
     else:
-        least = min(float(expit(logits.max())), races.threshold - _NEAR)
+        least = min(float(expit(logits.max())), races.threshold - _NEAR_FRACTION)
         listed = [i for i in order if expit(logits[i]) >= least]
     designs = [races.candidates[i] for i in listed]
     promises = logits[listed]
-    search = hunt.whole and not races.space.sets_controller
-    judged: dict[int, Candidate | None] = {}
+    search = hunt.complete and not races.space.sets_controller
+    judged: dict[int, RacedDesign | None] = {}
 
     def judge(*numbers: int) -> list[int]:
         """Judge designs by number. Returns: the numbers of all that meet the requirement."""
         new = [i for i in numbers if 0 <= i < len(designs) and i not in judged]
-        races.told(f"judging designs {len(judged) + 1} and on")
+        races.report_progress(f"judging designs {len(judged) + 1} and on")
         judge_one = partial(judged_design, races.space.hasty, search=search)
-        calls = [partial(judge_one, designs[i].point, place=designs[i].race.place) for i in new]
+        calls = [partial(judge_one, designs[i].point, grid_point=designs[i].race.grid_point) for i in new]
         for i, judgement in zip(new, deal(races.executor, calls), strict=True):
             judged[i] = None
             if judgement is not None:
-                race = Race(place=designs[i].race.place, judgement=judgement)
+                race = Race(grid_point=designs[i].race.grid_point, judgement=judgement)
                 judged[i] = replace(designs[i], race=race)
         return [i for i, each in judged.items() if each is not None and each.race.succeeded]
 

@@ -27,25 +27,25 @@ _EDGES: Final = {
     True: ("design_edge", "design_edge_default"),
     False: ("design_edge_missed", "design_edge_missed_default"),
 }
-"""By whether the design meets what is required: at an end that the scene gives, and at one by default."""
-_EDGE: Final = 0.02
-"""Of a range: nearer to its end, a value stands at it."""
+"""Codes, True if the design meets the requirements: at an end that the scene gives, and at a default."""
+_EDGE_FRACTION: Final = 0.02
+"""Fraction of an end of a range: nearer to it, a value stands at the end."""
 
 
 def design_rows(design: Design) -> Rows:
-    """The design, its verdict, others, and what changes of it would do."""
+    """Rows of a design: its verdict, others, and the effects of changes."""
     judgement = design.judgement
-    whole = () if judgement is None else (_keys_table(design, judgement), required_table(judgement))
+    tables = () if judgement is None else (_keys_table(design, judgement), required_table(judgement))
     return Rows(
         title=f"Design for {design.given.name} ({design.given.source})",
         quantities=tuple(_quantities(design)),
         findings=tuple(_findings(design)),
-        tables=(*whole, _effects_table(design), _front_table(design)),
+        tables=(*tables, _effects_table(design), _front_table(design)),
     )
 
 
 def design_document(design: Design) -> dict[str, Any]:
-    """In SI."""
+    """Document of a design, SI."""
     scene, judgement, static = design.given, design.judgement, design.static
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
@@ -196,9 +196,9 @@ def _edges(design: Design) -> Iterator[tuple[str, str, str | None]]:
     for axis in design.space.axes:
         for path, ends in axis.ranges.items():
             value = float(design.point[path])
-            if abs(value - ends.low) <= _EDGE * abs(ends.low):
+            if abs(value - ends.low) <= _EDGE_FRACTION * abs(ends.low):
                 yield path, setting_text(path, ends.low), design.space.wider(path, low=True)
-            elif abs(value - ends.high) <= _EDGE * abs(ends.high):
+            elif abs(value - ends.high) <= _EDGE_FRACTION * abs(ends.high):
                 yield path, setting_text(path, ends.high), design.space.wider(path, low=False)
 
 
@@ -244,12 +244,12 @@ def _effects_table(design: Design) -> Table:
 
 
 def _front_table(design: Design) -> Table:
-    asked = REQUIRED_FRACTION if design.judgement is None else design.judgement.required_fraction
+    required_fraction = REQUIRED_FRACTION if design.judgement is None else design.judgement.required_fraction
     paths = [path for path in design.space.paths if path not in design.space.valve_paths]
     rows = [
         (
             format_given(each.size, "m^3", digits=4),
-            format_given(finite(each.race.time(asked)), "s", digits=3),
+            format_given(finite(each.race.time(required_fraction)), "s", digits=3),
             format_given(finite(each.race.gas), "J", digits=3),
             *([design.space.valve(each.point)] if design.space.valves else []),
             *(setting_text(path, each.point.get(path)) for path in paths),
@@ -258,7 +258,7 @@ def _front_table(design: Design) -> Table:
     ]
     valve = (VALVE,) if design.space.valves else ()
     columns = (path.rpartition(".")[2].replace("_", " ") for path in paths)
-    heads = ("size", f"{percent(asked)} within", "gas, median", *valve, *columns)
+    heads = ("size", f"{percent(required_fraction)} within", "gas, median", *valve, *columns)
     return Table(
         caption="Others, none of which is better in everything; times and gas of few devices",
         heads=heads,

@@ -22,10 +22,10 @@ from ringbalance.controller.judging.ranking import Ranking, ranked
 from ringbalance.design.axes import Point
 from ringbalance.design.closing import growth, judged_designs
 from ringbalance.design.hunt import Static, hunt
-from ringbalance.design.races import Candidate, Races, deal
+from ringbalance.design.races import RacedDesign, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import Space
-from ringbalance.design.static import point_scene, reach_of, static_rows
+from ringbalance.design.static import reach_of, static_rows
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
@@ -35,14 +35,14 @@ from ringbalance.scene.platform.processes import beside
 
 VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
-_MOVED: Final = 0.05
+_MOVE_FRACTION: Final = 0.05
 """Relative change of a key to either side."""
 _EFFECT_DEVICES: Final = 256
 """Devices on which a moved key is answered."""
 _MAX_VERDICTS: Final = 3
-"""Designs at most, each the next larger, of which the verdict is asked on devices that have chosen none."""
-_FRONT: Final = 6
-_APART: Final = 0.05
+"""Designs at most, each the next larger, that are judged on devices that have chosen none."""
+_MAX_FRONT: Final = 6
+_NOTABLE_FRACTION: Final = 0.05
 """Relative difference in size, time or gas that makes another design worth a line."""
 
 
@@ -52,7 +52,7 @@ class Effect:
 
     path: str
     changes: Point
-    """SI; with what follows from it."""
+    """Changes of the scene, SI; with those that follow."""
     met: Proportion | None
     """Fraction of the devices that meet every demand; None: no such design."""
     compared: Paired | None = None
@@ -61,7 +61,7 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Design(PresentedResult):
-    """A design and what it rests on.
+    """Design with its verdict, its neighbours and the effects of its keys.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("spindle_design"))
@@ -90,7 +90,7 @@ class Design(PresentedResult):
     doubt: float | None
     """By how much other drawn devices would move the size, relative (95 %); None: the fraction of devices
     does not grow with the size, or that does not vary."""
-    front: tuple[Candidate, ...]
+    front: tuple[RacedDesign, ...]
     """Others that should meet what is required, none better than another in size, time and gas."""
     effects: tuple[Effect, ...]
     ranking: Ranking
@@ -125,39 +125,46 @@ def run_design(
 ) -> Design:
     """Design what a scene leaves open; see `ringbalance.design`.
 
-    Args: `executor`: who computes; default `workers` processes, default one for each processor. `start`:
+    Args: `executor`: any executor; default `workers` processes, default one for each processor. `start`:
         seed of the points that are tried.
     Raises: SceneError: a scene without [design], or one that leaves nothing to choose or to cancel.
     """
-    space, told = Space.of(liquid_ring_scene(scene)), progress or (lambda _: None)
+    space, report_progress = Space.of(liquid_ring_scene(scene)), progress or (lambda _: None)
     balancer = balancer_of(space.scene)
     needed = abs(balancer.rotor().unbalance)
     if needed == 0.0:
         problem = "the rotor has no unbalance that a disc could cancel"
         raise SceneError.of_file(scene.file, problem, "an amplitude above 0 of rotor.initial_vibration")
     workers = workers or os.cpu_count() or 1
-    best: Candidate | None = None
+    best: RacedDesign | None = None
     judgement: Judgement | None = None
     effects: tuple[Effect, ...] = ()
     doubt: float | None = None
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         crew = executor or pool
-        asked = balancer.asked_fraction()
-        search = hunt(space, asked=asked, needed=needed, executor=crew, told=told, seed=start)
+        required_fraction = balancer.asked_fraction()
+        search = hunt(
+            space,
+            required_fraction=required_fraction,
+            needed=needed,
+            executor=crew,
+            report_progress=report_progress,
+            seed=start,
+        )
         races, raced = search.races, len(search.races.candidates)
         judged = judged_designs(search)
 
-        def order(each: Candidate) -> float:
+        def order(each: RacedDesign) -> float:
             """Size or, of designs of one size, gas."""
             return each.size if space.sized else float(np.nanmedian(each.race.judgement.outcomes.energy))
 
         promising = sorted((each for each in judged if each.race.succeeded), key=order)[:_MAX_VERDICTS]
         # Where none meets what is required, the one that serves most devices.
         for best in promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]:
-            told("the verdict, and what changes of it would do")
+            report_progress("the verdict, and what changes of it would do")
             settings = best.race.judgement.settings
-            whole = partial(judged_design, scene, best.point, settings=settings, whole=True)
-            effects, judgement = _effects(space, best, settings, crew, whole)
+            judge = partial(judged_design, scene, best.point, settings=settings, verdict=True)
+            effects, judgement = _effects(space, best, settings, crew, judge)
             if judgement is not None and judgement.verdict == MET:
                 break
         if best is not None and space.sized:
@@ -172,7 +179,7 @@ def run_design(
             next_smaller = max(below, key=lambda each: each.size)
             smaller = next_smaller.size, next_smaller.race.judgement.fraction
         if judgement is not None:
-            ranking = ranked(balancer_of(point_scene(scene, best.point)), judgement)
+            ranking = ranked(balancer_of(scene.with_values(best.point)), judgement)
     return Design(
         presentation=presentation,
         given=scene,
@@ -185,7 +192,7 @@ def run_design(
         judgement=judgement,
         smaller=smaller,
         doubt=doubt,
-        front=() if best is None else _front(races, asked, best),
+        front=() if best is None else _front(races, required_fraction, best),
         effects=effects,
         ranking=ranking,
     )
@@ -193,10 +200,10 @@ def run_design(
 
 def _effects(
     space: Space,
-    best: Candidate,
+    best: RacedDesign,
     settings: Settings,
     executor: Executor | None,
-    whole: Callable[[], Judgement | None],
+    judge: Callable[[], Judgement | None],
 ) -> tuple[tuple[Effect, ...], Judgement | None]:
     """Effects of every key changed alone, and the verdict on the design itself, which takes longest."""
     point = best.point
@@ -204,7 +211,7 @@ def _effects(
     for axis in space.axes:
         # A number moves to both sides; an entry of a list is replaced by each other one.
         for path in axis.ranges:
-            by = (1 - _MOVED, 1 + _MOVED)
+            by = (1 - _MOVE_FRACTION, 1 + _MOVE_FRACTION)
             moves += [(path, {path: float(f"{factor * float(point[path]):.4g}")}) for factor in by]
         now = {path: point.get(path) for path in axis.paths}
         name = VALVE if any(axis.names) else axis.paths[0]
@@ -215,7 +222,7 @@ def _effects(
     points = [point, *(space.followed({**base, **changes}) for _, changes in moves)]
     draws = Draws.block(FIRST_VERDICT_DEVICE, _EFFECT_DEVICES, whole=False)
     calls = [partial(devices_row, space.hasty, each, settings=settings, draws=draws) for each in points]
-    judgement, now_met, *then_met = deal(executor, [whole, *calls])
+    judgement, now_met, *then_met = deal(executor, [judge, *calls])
     effects = [
         Effect(
             path=path,
@@ -228,7 +235,7 @@ def _effects(
     return tuple(effects), judgement
 
 
-def _front(races: Races, asked: float, best: Candidate) -> tuple[Candidate, ...]:
+def _front(races: Races, required_fraction: float, best: RacedDesign) -> tuple[RacedDesign, ...]:
     """Designs that should meet what is required, the smallest first; of those nearly alike the first.
 
     Args: `best`: the design itself: smaller ones met what is required on few devices alone.
@@ -241,10 +248,10 @@ def _front(races: Races, asked: float, best: Candidate) -> tuple[Candidate, ...]
         if each.size >= best.size and each.race.meets.size >= DEVICES and promise >= logit(races.threshold)
     ]
 
-    def costs(each: Candidate) -> tuple[float, float, float]:
-        return each.size, each.race.time(asked), each.race.gas
+    def costs(each: RacedDesign) -> tuple[float, float, float]:
+        return each.size, each.race.time(required_fraction), each.race.gas
 
-    front: list[Candidate] = []
+    front: list[RacedDesign] = []
     for each in passing:
         cost = costs(each)
         beaten = any(
@@ -252,10 +259,11 @@ def _front(races: Races, asked: float, best: Candidate) -> tuple[Candidate, ...]
             for other in passing
         )
         alike = any(
-            all(abs(a - b) <= _APART * b for a, b in zip(cost, costs(other), strict=True)) for other in front
+            all(abs(a - b) <= _NOTABLE_FRACTION * b for a, b in zip(cost, costs(other), strict=True))
+            for other in front
         )
         if not beaten and not alike:
             front.append(each)
     front = [each for each in front if each.point != best.point]
-    numbers = {round(i * (len(front) - 1) / (_FRONT - 1)) for i in range(_FRONT)} if front else set()
+    numbers = {round(i * (len(front) - 1) / (_MAX_FRONT - 1)) for i in range(_MAX_FRONT)} if front else set()
     return tuple(each for i, each in enumerate(front) if i in numbers)

@@ -23,7 +23,7 @@ from scipy.special import logit
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.design.axes import Point
-from ringbalance.design.races import Candidate, Points, Races, Told, threshold
+from ringbalance.design.races import Points, RacedDesign, Races, ReportProgress, threshold
 from ringbalance.design.space import Space
 from ringbalance.design.static import reach_of
 from ringbalance.design.surface import Surface
@@ -73,9 +73,9 @@ class Static:
     refusals: tuple[str, ...]
     """Reasons for which the checks of a scene refuse points, one for each of these."""
     blocked: int
-    """Without any flow."""
+    """Number of points without any flow."""
     able: int
-    """Able to cancel the unbalance."""
+    """Number of points that cancel the unbalance."""
     reach: float
     """Largest unbalance that a point cancels in any direction, kg m; NaN: none flows."""
     reach_point: Point
@@ -88,48 +88,54 @@ class Hunt:
 
     static: Static
     races: Races
-    whole: bool
+    complete: bool
     """True if every design that can work raced."""
     size: float
     """Expected size of the smallest design that meets the requirement, m^3."""
 
 
 def hunt(
-    space: Space, *, asked: float, needed: float, executor: Executor | None, told: Told, seed: int = 0
+    space: Space,
+    *,
+    required_fraction: float,
+    needed: float,
+    executor: Executor | None,
+    report_progress: ReportProgress,
+    seed: int = 0,
 ) -> Hunt:
     """Search a space for the smallest design.
 
-    Args: `asked`: required fraction of devices. `needed`: initial unbalance, kg m. `executor`: who computes;
-        default this process. `told`: called with the progress. `seed`: of the points.
+    Args: `required_fraction`: fraction of devices that must meet every demand. `needed`: initial unbalance,
+        kg m. `executor`: any executor; default this process. `seed`: seed of the points.
     """
     one_way = space.scene.requirement.phase_range < _EVERY_WAY_RAD
     races = Races(
         space=space,
         needed=needed,
         least=_REACH_ONE_WAY if one_way else _REACH,
-        threshold=threshold(asked),
+        threshold=threshold(required_fraction),
         executor=executor,
-        told=told,
+        report_progress=report_progress,
         trials=balancer_of(space.scene).trials(),
         random=np.random.default_rng(seed),
     )
-    static, whole = _race_first_sample(races)
+    static, complete = _race_first_sample(races)
     if not races.candidates:
-        return Hunt(static=static, races=races, whole=whole, size=math.nan)
+        return Hunt(static=static, races=races, complete=complete, size=math.nan)
 
-    def served(candidate: Candidate) -> float:
+    def served(candidate: RacedDesign) -> float:
         """Fraction of the devices less one: 4 of 4 are worth less than 60 of 64."""
         return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
 
     enough = [each.size for each in races.candidates if served(each) >= races.threshold]
     size = min(enough) if enough else max(races.candidates, key=served).size
     last = len(_STEP_SIGMAS) - 1
-    count = 0 if whole else min(_MIN_ROUNDS + len(space.axes), len(_STEP_SIGMAS))
-    for number, at in enumerate(np.linspace(0, last, count), start=1):
+    count = 0 if complete else min(_MIN_ROUNDS + len(space.axes), len(_STEP_SIGMAS))
+    for number, index in enumerate(np.linspace(0, last, count), start=1):
         about = f", about {1e6 * size:.4g} ml" if space.sized else ""
-        told(f"round {number} of {count}{about}")
-        size = _race_round(races, size, round(at))
-    return Hunt(static=static, races=races, whole=whole, size=size)
+        report_progress(f"round {number} of {count}{about}")
+        size = _race_round(races, size, round(index))
+    return Hunt(static=static, races=races, complete=complete, size=size)
 
 
 def _race_first_sample(races: Races) -> tuple[Static, bool]:
@@ -139,25 +145,25 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
     """
     space = races.space
     counts = [len(axis.choices) for axis in space.axes]
-    whole = all(counts) and math.prod(counts) <= _MAX_LISTED
+    complete = all(counts) and math.prod(counts) <= _MAX_LISTED
     shares: FloatArray
-    if whole:
+    if complete:
         shares = np.array(list(product(*((np.arange(count) + 0.5) / count for count in counts))))
     else:
         shares = registered("function", "sobol")(len(space.axes), POINTS)
-    races.told(f"{len(shares)} designs without a run")
+    races.report_progress(f"{len(shares)} designs without a run")
     points = space.points(shares)
     rows = races.answered(points)
     able = races.able(shares, rows)
     races.wide = able.shares
     order = sorted(range(len(able.points)), key=lambda i: space.size(able.points[i]))
-    if whole:
+    if complete:
         chosen = able.some(order)
     else:
         rest = order[_FIRST_SMALLEST:]
         spread = np.linspace(0, len(rest) - 1, min(_FIRST_SPREAD, len(rest))).astype(int)
-        chosen = able.some(order[:_FIRST_SMALLEST] + [rest[at] for at in spread])
-    races.told(f"{len(chosen.points)} of {len(order)} designs that can work, few devices each")
+        chosen = able.some(order[:_FIRST_SMALLEST] + [rest[i] for i in spread])
+    races.report_progress(f"{len(chosen.points)} of {len(order)} designs that can work, few devices each")
     races.race(chosen, [None] * len(chosen.points))
     reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") for row in rows]
     best = int(np.argmax(reach))
@@ -169,26 +175,26 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
         reach=reach[best] or math.nan,
         reach_point=points[best],
     )
-    return static, whole
+    return static, complete
 
 
-def _race_round(races: Races, size: float, at: int) -> float:
+def _race_round(races: Races, size: float, index: int) -> float:
     """Race points about the best designs, the most promising of every range of sizes.
 
-    Args: `size`: expected, m^3. `at`: index into the settings of the rounds.
+    Args: `size`: expected, m^3. `index`: into the settings of the rounds.
     Returns: the size from which on designs meet the requirement, by the surface, m^3.
     """
-    low, high = _SIZE_RANGES[at]
+    low, high = _SIZE_RANGES[index]
     promise = partial(_promise, races, races.surface())
     count = _RACES_PER_ROUND * _POINTS_PER_RACE
     sizes = size * np.exp(np.linspace(math.log(low), math.log(high), count))
     parents = races.parents(promise, size)
-    points = races.cloud(parents, _STEP_SIGMAS[at], sizes, anywhere=_ANYWHERE_SHARES[at])
+    points = races.cloud(parents, _STEP_SIGMAS[index], sizes, anywhere=_ANYWHERE_SHARES[index])
     if points.points:
         values = promise(points)
         slices = np.array_split(np.arange(values.size), min(_RACES_PER_ROUND, values.size))
         chosen = points.some([int(each[np.argmax(values[each])]) for each in slices])
-        races.race(chosen, races.places(chosen.shares))
+        races.race(chosen, races.grid_points(chosen.shares))
     logits, sigmas = races.surface().logits(races.coordinates(races.points))
     enough = logits - _DOUBT_SIGMA * sigmas >= logit(races.threshold)
     smallest = min((races.candidates[i].size for i in np.flatnonzero(enough)), default=math.inf)
@@ -200,16 +206,13 @@ def _promise(races: Races, surface: Surface, points: Points) -> FloatArray:
 
     The gas ranks only the points that may serve enough devices, above all others.
     """
-    places = races.coordinates(points)
-    logits, sigmas = surface.logits(places)
+    coordinates = races.coordinates(points)
+    logits, sigmas = surface.logits(coordinates)
     hoped = np.asarray(logits + _HOPE_SIGMA * sigmas)
     if races.space.sized:
         return hoped
     energy = np.array([each.race.gas for each in races.candidates])
-    measured = np.isfinite(energy)
-    known, log_energy = (
-        races.coordinates(races.points)[measured],
-        np.log(np.maximum(energy[measured], _MIN_GAS_J)),
-    )
-    gas = RBFInterpolator(known, log_energy, kernel="linear", smoothing=_GAS_SMOOTHING)(places)
+    ran = np.isfinite(energy)
+    raced, log_energy = races.coordinates(races.points)[ran], np.log(np.maximum(energy[ran], _MIN_GAS_J))
+    gas = RBFInterpolator(raced, log_energy, kernel="linear", smoothing=_GAS_SMOOTHING)(coordinates)
     return np.where(hoped >= logit(races.threshold), _ABOVE_LOGITS - gas, hoped)

@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
-from ringbalance.design.racing import DEVICES, Place, Race, near, race
+from ringbalance.design.racing import DEVICES, GridPoint, Race, near, race
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, reach_of, static_rows
 from ringbalance.design.surface import Surface
@@ -22,29 +22,29 @@ from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.processes import dealt
 
-Told = Callable[[str], None]
+ReportProgress = Callable[[str], None]
 
-_TOGETHER: Final = 256
-_BLOCKS: Final = 8
-"""Blocks of devices over which designs are spread: what one block has by chance does not lead the search."""
-_PARENTS: Final = 6
-_BESIDE: Final = 2
-"""Settings that race beside those of the parent."""
-_SWITCH: Final = 0.1
+_POINTS_PER_BATCH: Final = 256
+_DEVICE_BLOCKS: Final = 8
+"""Blocks of devices over which designs are spread, so that chance in one block does not lead the search."""
+_MAX_PARENTS: Final = 6
+_NEIGHBOURS_PER_POINT: Final = 2
+"""Settings that race besides those of the parent."""
+_SWITCH_PROBABILITY: Final = 0.1
 """Probability that a step takes another entry of a list, such as a valve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
-    """A point that raced."""
+class RacedDesign:
+    """Design that raced."""
 
     shares: FloatArray
-    """Its place in the unit cube."""
+    """Coordinates in the unit cube."""
     reach: float
-    """Unbalance that it cancels in any direction, of what is needed."""
+    """Unbalance that it cancels in any direction, over the one that is needed."""
     point: Point
     size: float
-    """m^3."""
+    """Volume, m^3."""
     race: Race
 
 
@@ -53,32 +53,32 @@ class Points:
     """Designs that can work."""
 
     shares: FloatArray
-    """Places in the unit cube, shape (n, axes)."""
+    """Coordinates in the unit cube, shape (n, axes)."""
     points: list[Point]
     reach: FloatArray
-    """Unbalance that each cancels in any direction, of what is needed, shape (n,)."""
+    """Unbalance that each cancels in any direction, over the one that is needed, shape (n,)."""
 
-    def some(self, places: Sequence[int]) -> Points:
-        """Choose some of them by number."""
-        chosen = np.asarray(places, dtype=np.intp)
+    def some(self, numbers: Sequence[int]) -> Points:
+        """Choose points by number."""
+        chosen = np.asarray(numbers, dtype=np.intp)
         points = [self.points[i] for i in chosen.tolist()]
         return Points(shares=self.shares[chosen], points=points, reach=self.reach[chosen])
 
 
-def threshold(asked: float) -> float:
-    """Least fraction of the devices of a verdict whose lower 95 % bound is the fraction asked for."""
-    count = math.ceil(asked * MOST_DRAWS)
-    while count < MOST_DRAWS and Proportion(count=count, of=MOST_DRAWS).verdict(asked) != MET:
+def threshold(required_fraction: float) -> float:
+    """Least fraction of the devices of a verdict whose lower 95 % bound is the required fraction."""
+    count = math.ceil(required_fraction * MOST_DRAWS)
+    while count < MOST_DRAWS and Proportion(count=count, of=MOST_DRAWS).verdict(required_fraction) != MET:
         count += 1
     return count / MOST_DRAWS
 
 
 def deal(executor: Executor | None, calls: Sequence[Callable[[], Any]]) -> list[Any]:
-    """Their answers, in their order. Args: `executor`: who computes; None: this process."""
+    """Answer calls, in their order. Args: `executor`: any executor; None: this process."""
     if executor is None:
         return [call() for call in calls]
     answers = dict(dealt(executor, calls))
-    return [answers[place] for place in range(len(calls))]
+    return [answers[number] for number in range(len(calls))]
 
 
 @dataclass(kw_only=True)
@@ -91,26 +91,28 @@ class Races:
     least: float
     """Part of it that a design must cancel before it runs: its devices differ."""
     threshold: float
-    """Fraction of the devices from which on a design counts as one that meets what is required."""
+    """Fraction of the devices from which on a design counts as one that meets the requirements."""
     executor: Executor | None
-    told: Told
+    report_progress: ReportProgress
     trials: Sequence[Trials]
     random: np.random.Generator
     wide: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    """Places in the unit cube that can work, of the first sample."""
-    candidates: list[Candidate] = field(default_factory=list)
+    """Coordinates in the unit cube of the first sample's points that can work."""
+    candidates: list[RacedDesign] = field(default_factory=list)
     raced: set[str] = field(default_factory=set)
     fitted: Surface | None = None
-    """The surface through the counts of all candidates; None: one came since, or none is fitted."""
+    """Surface through the counts of all candidates; None: a candidate came since, or no surface is fitted."""
 
     def answered(self, points: Sequence[Point]) -> list[Record]:
         """Answer points without a run."""
-        batches = [points[start : start + _TOGETHER] for start in range(0, len(points), _TOGETHER)]
+        batches = [
+            points[start : start + _POINTS_PER_BATCH] for start in range(0, len(points), _POINTS_PER_BATCH)
+        ]
         calls = [partial(static_rows, self.space.scene, each, intervals=False) for each in batches]
         return [row for part in deal(self.executor, calls) for row in part or ()]
 
     def able(self, shares: FloatArray, rows: Sequence[Record] | None = None) -> Points:
-        """Keep the places in the unit cube that can work. Args: `rows`: their answers without a run."""
+        """Keep the points that can work. Args: `shares`: in the unit cube. `rows`: answers without a run."""
         points = self.space.points(shares)
         rows = self.answered(points) if rows is None else rows
         reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
@@ -119,8 +121,8 @@ class Races:
             shares=shares[chosen], points=[points[i] for i in chosen], reach=np.array(reach)[chosen]
         )
 
-    def race(self, points: Points, places: Sequence[Sequence[Place] | None]) -> None:
-        """Race points that have not yet, and keep those that have an answer."""
+    def race(self, points: Points, grid_points: Sequence[Sequence[GridPoint] | None]) -> None:
+        """Race points that have not raced yet, and keep those that have an answer."""
         keys = [repr(sorted(point.items())) for point in points.points]
         fresh = [i for i, key in enumerate(keys) if key not in self.raced and key not in keys[:i]]
         calls = [
@@ -128,10 +130,10 @@ class Races:
                 race,
                 self.space.hasty,
                 points.points[i],
-                places=places[i],
-                asked=self.threshold,
+                grid_points=grid_points[i],
+                required_fraction=self.threshold,
                 settings=not self.space.sets_controller,
-                block=(len(self.raced) + number) % _BLOCKS,
+                block=(len(self.raced) + number) % _DEVICE_BLOCKS,
             )
             for number, i in enumerate(fresh)
         ]
@@ -140,11 +142,11 @@ class Races:
             if raced is not None:
                 self.add(points, i, raced)
 
-    def add(self, points: Points, number: int, race: Race) -> Candidate:
-        """Add one of some points with its race to the candidates."""
+    def add(self, points: Points, number: int, race: Race) -> RacedDesign:
+        """Add a point, by number, with its race to the candidates."""
         self.fitted = None
         self.candidates.append(
-            Candidate(
+            RacedDesign(
                 shares=points.shares[number],
                 reach=float(points.reach[number]),
                 point=points.points[number],
@@ -164,12 +166,12 @@ class Races:
         )
 
     def coordinates(self, points: Points) -> FloatArray:
-        """Coordinates of the surface: places in the unit cube, and the unbalance that a design cancels, on
-        which the fraction depends more simply than on all that it follows from."""
+        """Coordinates of the surface: those in the unit cube, and the unbalance that a design cancels, on
+        which the fraction depends more simply than on the keys that it follows from."""
         return np.column_stack([self.space.coordinates(points.shares), np.log(points.reach)])
 
     def surface(self) -> Surface:
-        """Through the counts of all designs."""
+        """Surface through the counts of all designs."""
         if self.fitted is None:
             self.fitted = Surface.of(
                 self.coordinates(self.points),
@@ -179,55 +181,57 @@ class Races:
         return self.fitted
 
     @property
-    def _well_known(self) -> list[Candidate]:
+    def _well_known(self) -> list[RacedDesign]:
         """Candidates that ran many devices; all, where none has."""
         return [each for each in self.candidates if each.race.meets.size >= DEVICES] or self.candidates
 
-    def nearest_places(self, shares: FloatArray) -> list[Place | None]:
-        """By point the settings of the nearest design that ran many devices."""
-        whole = self._well_known
-        known = self.space.coordinates(np.array([each.shares for each in whole]))
-        apart = np.linalg.norm(self.space.coordinates(shares)[:, np.newaxis] - known, axis=2)
-        return [whole[at].race.place for at in np.argmin(apart, axis=1).tolist()]
+    def nearest_grid_points(self, shares: FloatArray) -> list[GridPoint | None]:
+        """Settings of the nearest design that ran many devices, by point."""
+        measured = self._well_known
+        coordinates = self.space.coordinates(np.array([each.shares for each in measured]))
+        distance = np.linalg.norm(self.space.coordinates(shares)[:, np.newaxis] - coordinates, axis=2)
+        return [measured[i].race.grid_point for i in np.argmin(distance, axis=1).tolist()]
 
-    def places(self, shares: FloatArray) -> list[list[Place] | None]:
-        """Settings to race for each point: those of the nearest design and a few beside them."""
-        fields: list[list[Place] | None] = []
-        for place in self.nearest_places(shares):
-            if place is None:
+    def grid_points(self, shares: FloatArray) -> list[list[GridPoint] | None]:
+        """Settings to race for each point: those of the nearest design and a few neighbours."""
+        fields: list[list[GridPoint] | None] = []
+        for grid_point in self.nearest_grid_points(shares):
+            if grid_point is None:
                 fields.append(None)
                 continue
-            neighbours = near(self.trials, place)
-            chosen = self.random.permutation(len(neighbours))[:_BESIDE].tolist()
-            fields.append([place, *(neighbours[at] for at in chosen)])
+            neighbours = near(self.trials, grid_point)
+            chosen = self.random.permutation(len(neighbours))[:_NEIGHBOURS_PER_POINT].tolist()
+            fields.append([grid_point, *(neighbours[i] for i in chosen)])
         return fields
 
     def parents(self, value: Callable[[Points], FloatArray], size: float) -> FloatArray:
-        """Places of those that would be best if they had a size, m^3."""
-        whole = self._well_known
-        shares = np.array([each.shares for each in whole])
+        """Coordinates in the unit cube of the designs that would be best if they had a size, m^3."""
+        measured = self._well_known
+        shares = np.array([each.shares for each in measured])
         if self.space.sized:
             shares = np.array([self.space.sized_at(each, size) for each in shares])
         able = self.able(shares)
         if not able.points:
-            return shares[np.argsort([-each.race.fraction for each in whole], kind="stable")[:_PARENTS]]
-        return able.shares[np.argsort(-value(able), kind="stable")[:_PARENTS]]
+            return shares[
+                np.argsort([-each.race.fraction for each in measured], kind="stable")[:_MAX_PARENTS]
+            ]
+        return able.shares[np.argsort(-value(able), kind="stable")[:_MAX_PARENTS]]
 
     def cloud(self, parents: FloatArray, step: float, sizes: FloatArray, *, anywhere: float = 0.0) -> Points:
-        """Points about some places that can work, one for each size.
+        """Draw points about parents, one for each size, and keep those that can work.
 
-        Args: `step`: standard deviation in the unit cube. `anywhere`: part of them about any place that can
-            work at some size.
+        Args: `step`: standard deviation in the unit cube. `anywhere`: fraction of them about any point of the
+            first sample that can work.
         """
-        drawn = parents[self.random.integers(0, len(parents), sizes.size)]
+        centres = parents[self.random.integers(0, len(parents), sizes.size)]
         free = self.random.random(sizes.size) < anywhere
-        drawn[free] = self.wide[self.random.integers(0, len(self.wide), int(np.count_nonzero(free)))]
+        centres[free] = self.wide[self.random.integers(0, len(self.wide), int(np.count_nonzero(free)))]
         fixed = [number for number, axis in enumerate(self.space.axes) if not axis.ranges]
-        shares = np.empty_like(drawn)
-        for row, start in zip(shares, drawn, strict=True):
+        shares = np.empty_like(centres)
+        for row, start in zip(shares, centres, strict=True):
             moved = start + step * self.random.standard_normal(start.size)
             fresh = self.random.random(start.size)
-            switch = self.random.random(start.size) < _SWITCH
+            switch = self.random.random(start.size) < _SWITCH_PROBABILITY
             moved[fixed] = np.where(switch, fresh, start)[fixed]
             row[:] = np.clip(moved, 0.0, 1.0)
         if self.space.sized:

@@ -26,13 +26,13 @@ from ringbalance.controller.judging.judge import (
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
-from ringbalance.design.static import FAULTS, point_scene
+from ringbalance.design.static import BREAKDOWNS
 from ringbalance.results.requirements import MET, OPEN
 from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 
-Place = tuple[int, tuple[float, ...]]
+GridPoint = tuple[int, tuple[float, ...]]
 """Point of the search spaces: index of the space, and the fractional level index on each of its axes."""
 HEATS: Final = (4, 8, 24, 64)
 """Numbers of devices after each heat of a race."""
@@ -43,10 +43,10 @@ _SURVIVORS: Final = (39, 8, 1)
 """Largest numbers of settings that go on after each heat but the last."""
 _MAX_BEHIND_DEVICES: Final = 2
 """Settings that serve so many devices fewer than the best drop out."""
-_MAX_SHORTFALL: Final = 0.2
+_MAX_SHORTFALL_FRACTION: Final = 0.2
 """Fraction of the devices below the required one from which on a design is given up."""
-_WATCH_TIME: Final = 10.0
-"""Time for which a settled device is watched in a race, s; a verdict watches longer."""
+_WATCH_TIME_S: Final = 10.0
+"""Time for which a settled device is watched in a race; a verdict watches longer."""
 _CHOICE_DEVICES: Final = 256
 """Devices of a verdict after which only the best settings go on."""
 _STOP_SIGMA: Final = 3.0
@@ -57,13 +57,13 @@ _STOP_SIGMA: Final = 3.0
 class Race:
     """The best settings of a design with the judgement of the devices that they ran."""
 
-    place: Place | None
-    """None: the scene's own settings."""
+    grid_point: GridPoint | None
+    """Point of the search spaces; None: the scene's own settings."""
     judgement: Judgement
 
     @property
     def settings(self) -> Settings:
-        """By path, SI."""
+        """Settings by path, SI."""
         return self.judgement.settings
 
     @property
@@ -113,21 +113,21 @@ def race(
     scene: SceneFile,
     point: Point,
     *,
-    places: Sequence[Place] | None,
-    asked: float,
+    grid_points: Sequence[GridPoint] | None,
+    required_fraction: float,
     settings: bool,
     block: int = 0,
 ) -> Race | None:
     """Find the best settings of a design; None: its scene is refused, or it breaks down.
 
-    Args: `places`: settings to race, such as the best of another design; None: the coarse grid. `asked`:
-        required fraction of devices. `settings`: False races the scene's own settings alone. `block`: index
-        of the block of devices.
+    Args: `grid_points`: settings to race, such as the best of another design; None: the coarse grid.
+        `required_fraction`: of devices that meet every demand. `settings`: False races the scene's own
+        settings alone. `block`: index of the block of devices.
     """
     try:
-        balancer = quick_balancer(point_scene(scene, point))
+        balancer = quick_balancer(scene.with_values(point))
         spaces = balancer.trials()
-        field: list[tuple[Place | None, Settings]] = [(None, {})]
+        field: list[tuple[GridPoint | None, Settings]] = [(None, {})]
         if settings and spaces:
             coarse = [
                 (kind, indices)
@@ -135,35 +135,36 @@ def race(
                 for indices in product(*(axis.first for axis in space.axes))
             ]
             candidates = [
-                (place, settings_at(spaces, place)) for place in (coarse if places is None else places)
+                (grid_point, settings_at(spaces, grid_point))
+                for grid_point in (coarse if grid_points is None else grid_points)
             ]
-            field = [(place, each) for place, each in candidates if each is not None]
+            field = [(grid_point, each) for grid_point, each in candidates if each is not None]
         if not field:
             return None
         start = block * DEVICES
         draws = Draws.block(start, HEATS[0], whole=False)
-        ran = balancer.run_all([each for _, each in field], draws, further=_WATCH_TIME)
+        ran = balancer.run_all([each for _, each in field], draws, further=_WATCH_TIME_S)
         running = [
-            Race(place=place, judgement=Judgement.of(balancer, each, outcomes))
-            for (place, each), outcomes in zip(field, ran, strict=True)
+            Race(grid_point=grid_point, judgement=Judgement.of(balancer, each, outcomes))
+            for (grid_point, each), outcomes in zip(field, ran, strict=True)
         ]
         for (first, end), survivors in zip(pairwise(HEATS), _SURVIVORS, strict=True):
             running.sort(key=lambda each: each.order)
-            if running[0].fraction < asked - _MAX_SHORTFALL:
+            if running[0].fraction < required_fraction - _MAX_SHORTFALL_FRACTION:
                 return running[0]
             least = running[0].met - _MAX_BEHIND_DEVICES
             running = [each for each in running if each.met > least][:survivors]
             draws = Draws.block(start + first, end - first, whole=False)
-            ran = balancer.run_all([each.settings for each in running], draws, further=_WATCH_TIME)
+            ran = balancer.run_all([each.settings for each in running], draws, further=_WATCH_TIME_S)
             running = [each.extended(outcomes) for each, outcomes in zip(running, ran, strict=True)]
         return min(running, key=lambda each: each.order)
-    except (SceneError, *FAULTS):
+    except (SceneError, *BREAKDOWNS):
         return None
 
 
-def settings_at(spaces: Sequence[Trials], place: Place) -> Settings | None:
+def settings_at(spaces: Sequence[Trials], grid_point: GridPoint) -> Settings | None:
     """Settings at a point of the search spaces, interpolated between levels; None: there are none."""
-    kind, indices = place
+    kind, indices = grid_point
     point = {
         axis.name: float(np.interp(index, range(len(axis.levels)), axis.levels))
         for axis, index in zip(spaces[kind].axes, indices, strict=True)
@@ -171,9 +172,9 @@ def settings_at(spaces: Sequence[Trials], place: Place) -> Settings | None:
     return spaces[kind].settings(point)
 
 
-def near(spaces: Sequence[Trials], place: Place) -> list[Place]:
+def near(spaces: Sequence[Trials], grid_point: GridPoint) -> list[GridPoint]:
     """Points one `STEP` away on one axis."""
-    kind, indices = place
+    kind, indices = grid_point
     return [
         (kind, (*indices[:axis], neighbour, *indices[axis + 1 :]))
         for axis, index in enumerate(indices)
@@ -186,25 +187,25 @@ def judged_design(
     scene: SceneFile,
     point: Point,
     *,
-    place: Place | None = None,
+    grid_point: GridPoint | None = None,
     settings: Settings | None = None,
     search: bool = False,
-    whole: bool = False,
+    verdict: bool = False,
 ) -> Judgement | None:
     """Judge the best of some settings of a design on the devices of a verdict; None: it breaks down.
 
     The devices are the same for every design, and nothing was chosen on them.  A look before the last ends
     only what is three standard deviations from the required fraction, so that a design at the edge is decided
     by all devices and not by the first look at which it happens to be above.
-    Args: `place`, `settings`: settings to judge; default the scene's own. `search`: add those that `tune`
-        would find. `whole`: as in `Draws`, and on devices that have chosen no design either.
+    Args: `grid_point`, `settings`: to judge; default the scene's own settings. `search`: add those that
+        `tune` finds. `verdict`: True judges on devices that have chosen no design, and ends no run early.
     Source: Haybittle, "Repeated Assessment of Results in Clinical Trials of Cancer Treatment", British
         Journal of Radiology 44 (1971).
     """
     try:
-        balancer = quick_balancer(point_scene(scene, point))
+        balancer = quick_balancer(scene.with_values(point))
         proposed = [
-            None if place is None else settings_at(balancer.trials(), place),
+            None if grid_point is None else settings_at(balancer.trials(), grid_point),
             settings,
             searched(balancer) if search else None,
         ]
@@ -217,8 +218,8 @@ def judged_design(
         judgements: list[Judgement] = []
         first = 0
         for last in sorted({few, min(_CHOICE_DEVICES, most), most}):
-            count, start = last - first, (FIRST_VERDICT_DEVICE if whole else FIRST_CHOOSING_DEVICE) + first
-            ran = judged_all(balancer, running, first=count, most=count, start=start, whole=whole)
+            count, start = last - first, (FIRST_VERDICT_DEVICE if verdict else FIRST_CHOOSING_DEVICE) + first
+            ran = judged_all(balancer, running, first=count, most=count, start=start, whole=verdict)
             pairs = zip(judgements, ran, strict=True)
             judgements = [a.extended(b.outcomes) for a, b in pairs] if judgements else list(ran)
             best = max(judgements, key=lambda judgement: judgement.fraction.value)
@@ -228,23 +229,23 @@ def judged_design(
                 judgements, running = [best], [best.settings]
             first = last
         return best
-    except (SceneError, *FAULTS):
+    except (SceneError, *BREAKDOWNS):
         return None
 
 
 def tuned_settings(scene: SceneFile, point: Point) -> Settings | None:
     """Find the settings of a design as `tune` does; None: it breaks down."""
     try:
-        return searched(quick_balancer(point_scene(scene, point)))
-    except (SceneError, *FAULTS):
+        return searched(quick_balancer(scene.with_values(point)))
+    except (SceneError, *BREAKDOWNS):
         return None
 
 
 def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> BoolArray | None:
     """True for each device of a design that meets every demand; None: the scene is refused or breaks down."""
     try:
-        balancer = quick_balancer(point_scene(scene, point))
-        (outcomes,) = balancer.run_all([settings], draws, further=_WATCH_TIME)
+        balancer = quick_balancer(scene.with_values(point))
+        (outcomes,) = balancer.run_all([settings], draws, further=_WATCH_TIME_S)
         return Judgement.of(balancer, settings, outcomes).meets
-    except (SceneError, *FAULTS):
+    except (SceneError, *BREAKDOWNS):
         return None

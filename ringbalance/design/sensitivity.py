@@ -12,16 +12,15 @@ from numpy.polynomial.legendre import legvander
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
 
-LEAST_ROWS: Final = 64
-"""Below this an interval says nothing."""
+MIN_ROWS: Final = 64
+"""Rows below which an interval says nothing."""
 _WAVES: Final = 8
 """Cosines along an input: of a step in its middle they hold 95 % of the variance."""
 _HALVES: Final = 200
 """Random halves of the rows from which the interval is estimated."""
-_DEGREES: Final = 10
-"""Of a polynomial, at most."""
-_ROWS_A_TERM: Final = 4
-"""Rows at least for each term of a polynomial, so that it predicts what it has not seen."""
+_MAX_DEGREE: Final = 10
+_ROWS_PER_TERM: Final = 4
+"""Least rows for each term of a polynomial, so that it predicts left-out rows."""
 
 
 def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -30,12 +29,12 @@ def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, Flo
     The variance of a cosine series of the result over the input's rank, less what noise alone would put into
     it.  Inputs are independent; where they act together, the shares add up to less than 1.
     Args: `inputs`: shape (n, k). `result`: shape (n,).
-    Returns: Both of shape (k,); NaN for a result that does not vary, or below `LEAST_ROWS` rows.
+    Returns: Both of shape (k,); NaN for a result that does not vary, or below `MIN_ROWS` rows.
     Source: Plischke, Reliab. Eng. Syst. Saf. 95 (2010) 354; half-widths by the jackknife that leaves half of
         the rows out, Shao and Wu, Ann. Statist. 17 (1989) 1176: of Sobol's points, too wide.
     """
     rows, count = inputs.shape
-    if rows < LEAST_ROWS or np.ptp(result) <= 1e-12 * np.max(np.abs(result)):
+    if rows < MIN_ROWS or np.ptp(result) <= 1e-12 * np.max(np.abs(result)):
         return np.full(count, np.nan), np.full(count, np.nan)
     random = np.random.default_rng(0)
     # Rows with equal inputs come in any order, not in that of the sample.
@@ -48,8 +47,8 @@ def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, Flo
 
 def _shares(inputs: FloatArray, result: FloatArray) -> FloatArray:
     rows, y = result.size, result - np.mean(result)
-    along = np.pi * (np.arange(rows) + 0.5) / rows
-    waves = np.cos(np.arange(1, _WAVES + 1)[:, None] * along)
+    phases = np.pi * (np.arange(rows) + 0.5) / rows
+    waves = np.cos(np.arange(1, _WAVES + 1)[:, None] * phases)
     parts = waves @ y[np.argsort(inputs, axis=0, kind="stable")] / rows
     raw, noise = 2 * np.sum(parts**2, axis=0) / np.mean(y**2), _WAVES / rows
     return np.asarray((raw - noise) / (1 - noise))
@@ -66,18 +65,18 @@ def total_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, Flo
         Sudret, J. Comput. Phys. 230 (2011) 2345.
     """
     rows, count = inputs.shape
-    if rows < LEAST_ROWS or np.ptp(result) <= 1e-12 * np.max(np.abs(result)):
+    if rows < MIN_ROWS or np.ptp(result) <= 1e-12 * np.max(np.abs(result)):
         return np.full(count, np.nan), np.full(count, np.nan)
     y = (result - np.mean(result)) / np.std(result)
     fits = [_fit(powers, inputs, y) for powers in _powers(rows, count)]
     powers, weights, spread, missed = min(fits, key=lambda fit: fit[-1])
     squares, missed = weights**2, min(missed, 1.0)
-    whole = np.sum(squares) + missed
+    total = np.sum(squares) + missed
     takes_part = (powers > 0).T
     variance = np.array([(2 * weights * part) @ spread @ (2 * weights * part) for part in takes_part])
     return (
-        np.asarray((takes_part @ squares + missed / 2) / whole),
-        np.asarray((missed / 2 + NORMAL_95 * np.sqrt(variance)) / whole),
+        np.asarray((takes_part @ squares + missed / 2) / total),
+        np.asarray((missed / 2 + NORMAL_95 * np.sqrt(variance)) / total),
     )
 
 
@@ -86,17 +85,17 @@ _Fit = tuple[IntArray, FloatArray, FloatArray, float]
 
 def _powers(rows: int, count: int) -> list[IntArray]:
     """Degrees of each term in each input, shape (terms, count), of polynomials that so many rows bear."""
-    found: list[IntArray] = []
-    for degree in range(1, _DEGREES + 1):
-        if math.comb(degree + count, count) * _ROWS_A_TERM > rows and found:
+    powers: list[IntArray] = []
+    for degree in range(1, _MAX_DEGREE + 1):
+        if math.comb(degree + count, count) * _ROWS_PER_TERM > rows and powers:
             break
         each = (
             np.bincount(axes, minlength=count)
             for n in range(1, degree + 1)
             for axes in combinations_with_replacement(range(count), n)
         )
-        found.append(np.array(list(each)))
-    return found
+        powers.append(np.array(list(each)))
+    return powers
 
 
 def _fit(powers: IntArray, inputs: FloatArray, result: FloatArray) -> _Fit:

@@ -8,6 +8,6 @@ from ringbalance.scene.arrays import FloatArray
 
 
 def sobol(axes: int, count: int, *, seed: int = 0) -> FloatArray:
-    """The first points of the sequence in the unit cube, scrambled after Owen, shape (count, axes)."""
-    whole: FloatArray = Sobol(axes, rng=seed).random(1 << max(count - 1, 0).bit_length())
-    return whole[:count]
+    """First points of the sequence in the unit cube, scrambled after Owen, shape (count, axes)."""
+    points: FloatArray = Sobol(axes, rng=seed).random(1 << max(count - 1, 0).bit_length())
+    return points[:count]

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.design.axes import Axis, Point, Range, plan_of, plan_of_texts
+from ringbalance.design.axes import Point, Range, SweepAxis, plan_of, plan_of_texts
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError
@@ -19,14 +19,14 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.toml import toml_text
 
-BORES: Final = (0.3e-3, 3e-3)
-"""m, where the scene gives no range of its own: tubes that can be bought drawn, and cleaned."""
-_LEAST: Final = 0.1
+BORES_M: Final = (0.3e-3, 3e-3)
+"""Range of the bore where the scene gives none: tubes that can be bought drawn, and cleaned."""
+_LEAST_FRACTION: Final = 0.1
 """Lower end over the largest width or pressure, where the scene gives no range; of R2 - R1 twice as much."""
 _DIGITS: Final = 3
-"""Of a value that is tried, so that it can stand in a drawing."""
-_HASTY: Final = 2.0
-"""Times the settling time asked for: what has not settled by then need not be seen to settle."""
+"""Digits of a value that is tried, so that it can stand in a drawing."""
+_HASTY_FACTOR: Final = 2.0
+"""Run time over the required settling time: a later end of settling need not be seen."""
 _VALVE: Final = ("gas.conductance", "gas.critical_ratio", "gas.valve_lag")
 
 
@@ -35,18 +35,18 @@ class Space:
     """Designs that may be tried: points of a unit cube."""
 
     scene: Scene
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
 
     @classmethod
     def of(cls, scene: Scene) -> Space:
-        """From [design]. Raises: SceneError: nothing may vary, or something there cannot be used."""
-        wanted = scene.design
+        """Make the space of [design]. Raises: SceneError: nothing may vary, or a key cannot be used."""
+        keys = scene.design
         axes = [*_listed(scene), *_valves(scene)]
         taken = {path for axis in axes for path in axis.paths}
         for path, (low, high, log) in _ranges(scene).items():
             if path not in taken:
-                axes.append(Axis(ranges={path: Range(low=low, high=high, log=log)}))
-        if not any((wanted.outer_radius, wanted.axial_width, wanted.pressure, taken)):
+                axes.append(SweepAxis(ranges={path: Range(low=low, high=high, log=log)}))
+        if not any((keys.outer_radius, keys.axial_width, keys.pressure, taken)):
             allowed = (
                 "a table [design] with the space (outer_radius, axial_width), the highest pressure, valves, "
                 "valve_file or vary; for a given disc, `ringbalance tune` recommends pressure and controller"
@@ -56,11 +56,11 @@ class Space:
 
     @cached_property
     def hasty(self) -> SceneFile:
-        """The scene with runs that end soon after the settling time asked for, which is met by the same."""
-        asked = self.scene.requirement.settling_time
-        if asked is None or _HASTY * asked >= self.scene.run.time_limit:
+        """Scene with runs that end soon after the required settling time, which the same devices meet."""
+        required = self.scene.requirement.settling_time
+        if required is None or _HASTY_FACTOR * required >= self.scene.run.time_limit:
             return self.scene
-        return self.scene.with_values({"run.time_limit": _HASTY * asked})
+        return self.scene.with_values({"run.time_limit": _HASTY_FACTOR * required})
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -78,7 +78,7 @@ class Space:
         return any(path.startswith("controller.") for path in self.paths)
 
     def points(self, shares: FloatArray) -> list[Point]:
-        """Changes of the scene at places in the unit cube, shape (n, axes), with what follows from them."""
+        """Changes of the scene by coordinates in the unit cube, shape (n, axes), with those that follow."""
         columns = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
         points = []
         for row in zip(*columns, strict=True):
@@ -105,16 +105,16 @@ class Space:
         if (outer, inner) == (disc.outer_radius, disc.inner_radius) or disc.geometry is not None:
             return point
         port = outer - (disc.outer_radius - tube.port_radius)
-        found: dict[str, Any] = {"tube.port_radius": _up(port)}
+        follows: dict[str, Any] = {"tube.port_radius": _up(port)}
         crest = tube.hump_radius
         if crest is not None:
             share = (crest**2 - disc.inner_radius**2) / (disc.outer_radius**2 - disc.inner_radius**2)
             crest = math.sqrt(max(inner**2 + share * (outer**2 - inner**2), inner**2))
-            found["tube.hump_radius"] = round(crest, 5)
-        crest = point.get("tube.hump_radius", found.get("tube.hump_radius"))
-        stretch = _path(found["tube.port_radius"], crest) / _path(tube.port_radius, tube.hump_radius)
-        found["tube.length"] = _up(max(stretch, 0.0) * tube.length)
-        return {**found, **point}
+            follows["tube.hump_radius"] = round(crest, 5)
+        crest = point.get("tube.hump_radius", follows.get("tube.hump_radius"))
+        stretch = _path(follows["tube.port_radius"], crest) / _path(tube.port_radius, tube.hump_radius)
+        follows["tube.length"] = _up(max(stretch, 0.0) * tube.length)
+        return {**follows, **point}
 
     def size(self, point: Point) -> float:
         """Volume of the cylinder around the chambers, pi R2^2 B, m^3."""
@@ -123,19 +123,19 @@ class Space:
         return math.pi * outer**2 * float(point.get("disc.axial_width", disc.axial_width))
 
     def sized_at(self, shares: FloatArray, size: float) -> FloatArray:
-        """A place in the unit cube with another size, m^3, by its width where that varies, else by its outer
-        radius; as near to it as the range lets it come."""
+        """Coordinates in the unit cube for another size, m^3, by the width where it varies, else by the outer
+        radius; as near to it as the range allows."""
         moved = shares.copy()
-        for place, axis in enumerate(self.axes):
+        for i, axis in enumerate(self.axes):
             for path, power in (("disc.axial_width", 1.0), ("disc.outer_radius", 0.5)):
                 if path in axis.ranges and (power == 1.0 or "disc.axial_width" not in self.paths):
                     (point,) = self.points(moved[np.newaxis])
                     value = float(point[path]) * (size / self.size(point)) ** power
-                    moved[place] = axis.ranges[path].share(value)
+                    moved[i] = axis.ranges[path].share(value)
         return moved
 
     def coordinates(self, shares: FloatArray) -> FloatArray:
-        """Coordinates of places in the unit cube, shape (n, axes); entries of lists are equally far apart."""
+        """Coordinates of the surface, by those in the unit cube; entries of lists are equally far apart."""
         return np.concatenate(
             [
                 column[:, np.newaxis]
@@ -149,7 +149,7 @@ class Space:
 
     @property
     def valves(self) -> tuple[str, ...]:
-        """Names of those at hand."""
+        """Names of the valves at hand."""
         return tuple(name for axis in self.axes for name in axis.names if name)
 
     @property
@@ -195,7 +195,7 @@ def _up(length: float) -> float:
     return math.ceil(length * 1e5 - 1e-6) / 1e5
 
 
-def _listed(scene: Scene) -> tuple[Axis, ...]:
+def _listed(scene: Scene) -> tuple[SweepAxis, ...]:
     """Axes of `vary`."""
     folder = scene.checked.folder if scene.checked is not None else None
     try:
@@ -204,21 +204,21 @@ def _listed(scene: Scene) -> tuple[Axis, ...]:
         raise SceneError([_placed(scene, "vary", each) for each in error.faults]) from error
 
 
-def _valves(scene: Scene) -> tuple[Axis, ...]:
+def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
     """One axis of all valves at hand; none where there are none."""
-    wanted = scene.design
-    if wanted.valve_file is not None:
+    keys = scene.design
+    if keys.valve_file is not None:
         folder = scene.checked.folder if scene.checked is not None else Path()
         try:
-            return plan_of(scene, {"gas": folder / wanted.valve_file}).axes
+            return plan_of(scene, {"gas": folder / keys.valve_file}).axes
         except SceneError as error:
             raise SceneError([_placed(scene, "valve_file", each) for each in error.faults]) from error
-    if not wanted.valves:
+    if not keys.valves:
         return ()
     choices = tuple(
-        {path: getattr(valve, path.partition(".")[2]) for path in _VALVE} for valve in wanted.valves
+        {path: getattr(valve, path.partition(".")[2]) for path in _VALVE} for valve in keys.valves
     )
-    return (Axis(ranges={}, choices=choices, names=tuple(valve.name for valve in wanted.valves)),)
+    return (SweepAxis(ranges={}, choices=choices, names=tuple(valve.name for valve in keys.valves)),)
 
 
 def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
@@ -236,27 +236,24 @@ def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
 
 
 def _ranges(scene: Scene) -> dict[str, tuple[float, float, bool]]:
-    """Lower and upper end by path, and whether small values are tried as often as large ones."""
-    wanted, disc = scene.design, scene.disc
-    found: dict[str, tuple[float, float, bool]] = {"tube.bore": (*BORES, True)}
-    if wanted.outer_radius is not None:
-        low = disc.inner_radius + 2 * _LEAST * (wanted.outer_radius - disc.inner_radius)
+    """Lower and upper end by path, and True where small values are tried as often as large ones."""
+    keys, disc = scene.design, scene.disc
+    ranges: dict[str, tuple[float, float, bool]] = {"tube.bore": (*BORES_M, True)}
+    if keys.outer_radius is not None:
+        low = disc.inner_radius + 2 * _LEAST_FRACTION * (keys.outer_radius - disc.inner_radius)
         if low <= disc.inner_radius:
-            value = toml_text(f"{1e3 * wanted.outer_radius:g} mm")
-            allowed = f"above inner_radius of [disc], {1e3 * disc.inner_radius:g} mm"
-            problem = "no chamber has room there"
             fault = Fault(
                 file=scene.file,
                 table="design",
                 key="outer_radius",
-                value=value,
-                problem=problem,
-                allowed=allowed,
+                value=toml_text(f"{1e3 * keys.outer_radius:g} mm"),
+                problem="no chamber has room there",
+                allowed=f"above inner_radius of [disc], {1e3 * disc.inner_radius:g} mm",
             )
             raise SceneError([fault])
-        found["disc.outer_radius"] = (low, wanted.outer_radius, False)
-    if wanted.axial_width is not None:
-        found["disc.axial_width"] = (_LEAST * wanted.axial_width, wanted.axial_width, True)
-    if wanted.pressure is not None:
-        found["gas.pressure"] = (_LEAST * wanted.pressure, wanted.pressure, True)
-    return found
+        ranges["disc.outer_radius"] = (low, keys.outer_radius, False)
+    if keys.axial_width is not None:
+        ranges["disc.axial_width"] = (_LEAST_FRACTION * keys.axial_width, keys.axial_width, True)
+    if keys.pressure is not None:
+        ranges["gas.pressure"] = (_LEAST_FRACTION * keys.pressure, keys.pressure, True)
+    return ranges

@@ -50,8 +50,8 @@ UNITS: Final[Mapping[str, str]] = MappingProxyType(
         "loop_factor": "1",
     }
 )
-"""SI unit of what is answered of a liquid ring, in the order of the table."""
-_FIELDS: Final = {"lambda": "moment_per_mass"}
+"""SI unit of each answer for a liquid ring, in the order of the table."""
+_ANSWER_FIELDS: Final = {"lambda": "moment_per_mass"}
 """Names in `Answers` that differ."""
 BLOCKED: Final = "blocked"
 REFUSED: Final = "point_refused"
@@ -65,10 +65,10 @@ EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
     }
 )
 """Result of `run_row` for a point without runs."""
-_CEILING: Final = ", at most"
-"""End of a name of a quantity that only limits what is set."""
-FAULTS: Final = (ValueError, ArithmeticError, RuntimeError)
-"""Besides `SceneError`, how a point may break down."""
+_LIMIT_SUFFIX: Final = ", at most"
+"""End of a name of a quantity that only limits a setting."""
+BREAKDOWNS: Final = (ValueError, ArithmeticError, RuntimeError)
+"""Exceptions besides `SceneError` with which a point may break down."""
 
 
 def reach_of(row: Record) -> float | None:
@@ -77,21 +77,16 @@ def reach_of(row: Record) -> float | None:
     return reach
 
 
-def point_scene(scene: SceneFile, point: Point) -> SceneFile:
-    """The scene of a point. Raises: SceneError: the changed values are refused."""
-    return scene.with_values(point)
-
-
 def refusal(error: Exception) -> Record:
-    """A failed point as a row: its finding."""
+    """Finding of a point that failed, as a document."""
     text = str(error.faults[0]) if isinstance(error, SceneError) else f"{type(error).__name__}: {error}"
     return Finding(code=REFUSED, values={"text": text}).document()
 
 
 def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = True) -> list[Record]:
-    """A row for each point, plain data.
+    """Answer points without a run, a row of plain data for each.
 
-    Args: `intervals`: whether both sides of every uncertain input are answered too, 2 m + 1 designs a point.
+    Args: `intervals`: True answers both sides of every uncertain input too, 2 m + 1 designs a point.
     Returns: By point `sha256` of its scene (empty where refused), `values` with pairs of value and
         half-width (95 %, of the inputs; None: not known) by name, `units`, `status` and `finding`.
     """
@@ -101,13 +96,13 @@ def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = 
     for point in points:
         try:
             if not by_core:
-                rows.append(_row_without_core(point_scene(scene, point)))
+                rows.append(_row_without_core(scene.with_values(point)))
                 continue
-            made, digest = nameless(liquid_ring_scene(scene), point)
-            check_ring(made)
-            scenes.append(made)
+            design, digest = nameless(liquid_ring_scene(scene), point)
+            check_ring(design)
+            scenes.append(design)
             rows.append({"sha256": digest})
-        except (SceneError, *FAULTS) as error:
+        except (SceneError, *BREAKDOWNS) as error:
             rows.append(_failed(error))
     answers = iter(_answered(scenes, intervals))
     return [row if "status" in row else {**row, **next(answers)} for row in rows]
@@ -123,7 +118,7 @@ def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
         return []
     try:
         table = in_batches(scenes, partial(core_table, intervals=intervals))
-    except FAULTS as error:
+    except BREAKDOWNS as error:
         if len(scenes) == 1:
             return [_failed(error)]
         return [row for each in scenes for row in _answered([each], intervals)]
@@ -162,20 +157,20 @@ def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
 
 
 def _values(designs: Designs, *, near: TubeFlow | None = None) -> FloatArray:
-    """Regime, and what `UNITS` names. Args: `near`: as for `Answers.of`."""
+    """Regime, and the answers that `UNITS` names. Args: `near`: as for `Answers.of`."""
     answers = Answers.of(designs, near=near)
-    return np.array([answers.regime, *(getattr(answers, _FIELDS.get(name, name)) for name in UNITS)])
+    return np.array([answers.regime, *(getattr(answers, _ANSWER_FIELDS.get(name, name)) for name in UNITS)])
 
 
 def _row_without_core(scene: SceneFile) -> Record:
-    """Answer a point of a balancer without the array core by what that knows of itself without a run."""
+    """Answer a point of a balancer without the array core by the quantities that it knows without a run."""
     values: dict[str, list[float | None]] = {}
     units: dict[str, str] = {}
     for each in balancer_of(scene).quantities():
         if each.value is None:
             continue
         # A name that cannot be taken for a setting where the quantity is the most that a setting may be.
-        name = each.key + _CEILING * each.name.endswith(_CEILING)
+        name = each.key + _LIMIT_SUFFIX * each.name.endswith(_LIMIT_SUFFIX)
         width = None
         if each.lower is not None and each.upper is not None and each.value:
             width = max(abs(each.lower - each.value), abs(each.upper - each.value))
@@ -184,5 +179,5 @@ def _row_without_core(scene: SceneFile) -> Record:
 
 
 def content_of(scene: SceneFile) -> Record:
-    """All that decides a scene's answers, plain data: its document and the mesh that it names."""
+    """Content of a scene that decides its answers, plain data: its document and the mesh that it names."""
     return {"document": dict(document_of(scene)), "mesh": scene.mesh_digest}

@@ -25,14 +25,14 @@ from ringbalance.scene.draws import BLOCK
 _PRIOR: Final = (2.0, 0.5)
 """Standard deviation of the process in logits and lengths on which it changes: medians of their priors, whose
 logarithms have a standard deviation of 1."""
-_LEVEL: Final = 1.0
+_MEAN_SIGMA: Final = 1.0
 """Standard deviation of the process's mean, in logits."""
-_EVEN: Final = 0.5
+_BLOCK_VARIANCE_FACTOR: Final = 0.5
 """Variance of the count of a block, relative to that of independent devices: the block's inputs are spread
 evenly."""
-_ROUGH: Final = 0.01
+_ROUGH_VARIANCE: Final = 0.01
 """Variance of what is not smooth, such as the settings that served best."""
-_STEPS: Final = 40
+_MAX_STEPS: Final = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +45,7 @@ class Surface:
     scale: float
     """Standard deviation, in logits."""
     lengths: FloatArray
-    """Shape (k,)."""
+    """Lengths on which the process changes, shape (k,)."""
     factor: tuple[FloatArray, bool]
     """Cholesky factor of the covariance of the logits, as `scipy.linalg.cho_factor` has it."""
     weights: FloatArray
@@ -53,16 +53,16 @@ class Surface:
 
     @classmethod
     def of(cls, places: FloatArray, *, met: IntArray, devices: IntArray) -> Surface:
-        """Args: `places`: coordinates, shape (n, k). `met`, `devices`: counts of each design."""
+        """Fit the process. Args: `places`: coordinates, shape (n, k). `met`, `devices`: counts of designs."""
         seen = np.log((met + 0.5) / (devices - met + 0.5))
-        even = np.where(devices >= BLOCK, _EVEN, 1.0)
-        noise = even * (1 / (met + 0.5) + 1 / (devices - met + 0.5)) + _ROUGH
+        even = np.where(devices >= BLOCK, _BLOCK_VARIANCE_FACTOR, 1.0)
+        noise = even * (1 / (met + 0.5) + 1 / (devices - met + 0.5)) + _ROUGH_VARIANCE
         mean = float(np.average(seen, weights=1 / (noise + 1.0)))
         start = np.log([_PRIOR[0], *[_PRIOR[1]] * places.shape[1]])
         apart = (places[:, np.newaxis] - places) ** 2
         loss = partial(_loss, start=start, apart=apart, seen=seen - mean, noise=noise)
-        best = np.exp(minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": _STEPS}).x)
-        covariance = best[0] ** 2 * _matern(_distance(apart, best[1:])) + _LEVEL**2
+        best = np.exp(minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": _MAX_STEPS}).x)
+        covariance = best[0] ** 2 * _matern(_distance(apart, best[1:])) + _MEAN_SIGMA**2
         factor = cho_factor(covariance + np.diag(noise), lower=True)
         return cls(
             places=places,
@@ -76,9 +76,9 @@ class Surface:
     def logits(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Logits of the fractions at places, shape (n, k), and their standard deviations."""
         apart = (places[:, np.newaxis] - self.places) ** 2
-        shared = self.scale**2 * _matern(_distance(apart, self.lengths)) + _LEVEL**2
-        known = np.einsum("ij,ji->i", shared, cho_solve(self.factor, shared.T))
-        variance = np.maximum(self.scale**2 + _LEVEL**2 - known, 0.0)
+        shared = self.scale**2 * _matern(_distance(apart, self.lengths)) + _MEAN_SIGMA**2
+        explained = np.einsum("ij,ji->i", shared, cho_solve(self.factor, shared.T))
+        variance = np.maximum(self.scale**2 + _MEAN_SIGMA**2 - explained, 0.0)
         return self.mean + shared @ self.weights, np.sqrt(variance)
 
 
@@ -93,7 +93,7 @@ def _loss(
     scale, lengths = np.exp(2 * parameters[0]), np.exp(parameters[1:])
     distance = _distance(apart, lengths)
     smooth = scale * _matern(distance)
-    factor = cho_factor(smooth + _LEVEL**2 + np.diag(noise), lower=True)
+    factor = cho_factor(smooth + _MEAN_SIGMA**2 + np.diag(noise), lower=True)
     weights = cho_solve(factor, seen)
     from_prior = parameters - start
     loss = 0.5 * seen @ weights + np.sum(np.log(np.diag(factor[0]))) + 0.5 * from_prior @ from_prior

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.design.axes import Axis, Plan, Point, unit_of_path
+from ringbalance.design.axes import Plan, Point, SweepAxis, unit_of_path
 from ringbalance.design.sensitivity import first_order, total_order
-from ringbalance.design.static import EMPTY, Record, content_of, point_scene, reach_of, static_rows
+from ringbalance.design.static import EMPTY, Record, content_of, reach_of, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
-from ringbalance.results.numbers import format_given as given_text
+from ringbalance.results.numbers import format_given
 from ringbalance.results.numbers import percent
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
@@ -30,15 +30,15 @@ from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
 
-_TOGETHER: Final = {True: 256, False: 1024}
+_POINTS_PER_BATCH: Final = {True: 256, False: 1024}
 """Points that are answered in one batch, with intervals and without: of one composition, since a batch's last
 bits may depend on it.
 """
-_EDGE: Final = 0.02
+_EDGE_FRACTION: Final = 0.02
 """Fraction of the varied range: nearer to its end, a value stands at it."""
 STORE: Final = "store"
-"""Folder of kept answers in that of a sweep."""
-_OF_RUNS: Final = {
+"""Folder of stored answers in that of a sweep."""
+_RUN_COLUMNS: Final = {
     "devices": ("devices", ""),
     "fraction": ("fraction", "1"),
     "low": ("fraction low", "1"),
@@ -46,13 +46,33 @@ _OF_RUNS: Final = {
     "settling_time": ("settling_time", "s"),
     "settling_time_high": ("settling_time high", "s"),
 }
-"""Columns of runs: name and SI unit."""
+"""Columns of runs: name and SI unit by key of `run_row`."""
 
 
 Shares = dict[str, dict[str, tuple[float, float]]]
-"""By result and axis, which its first key or the column of its names stands for: the share of the result's
-variance, and the half-width of that (95 %).
+"""Share of a result's variance and its half-width (95 %), by result and axis, for which its first key or the
+column of its names stands.
 """
+
+
+class SweepColumn(NamedTuple):
+    """Column of the table of a sweep."""
+
+    name: str
+    unit: str
+    """SI unit; empty for texts and numbers of rows."""
+    values: list[Any]
+    """Values by point; None where not known."""
+
+    @property
+    def head(self) -> str:
+        """Name with SI unit, such as "velocity [m/s]"."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
+    def array(self) -> Any:
+        """Values as an array: numbers with NaN for what is not known, or texts."""
+        return _array(self.values)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -78,7 +98,7 @@ class Sweep(Result):
     scene: SceneFile
     plan: Plan
     points: tuple[Point, ...]
-    """Changed values, SI or text, by path."""
+    """Changed values of each point, SI or text, by path."""
     static: tuple[Record, ...]
     """Rows without runs, as `static_rows` returns them."""
     driven: tuple[Mapping[str, Any], ...]
@@ -86,11 +106,11 @@ class Sweep(Result):
     runs: int
     """Drawn devices a point at most; 0: static alone."""
     errors: tuple[Record, ...]
-    """By quantity, of what the array core leaves out, see `trade.errors`; empty where nothing was checked."""
+    """Errors of the array core by quantity, see `trade.left_out`; empty where nothing was checked."""
     designs_per_second: Mapping[str, float]
-    """Rates of the points that this run computed, "static" and "runs"; wall time."""
+    """Points a second that this run computed, "static" and "runs"; wall time."""
     resumed: Mapping[str, int]
-    """Points whose answers an earlier run had kept, likewise."""
+    """Points whose answers an earlier run had stored, "static" and "runs"."""
 
     @cached_property
     def verdicts(self) -> tuple[str, ...]:
@@ -121,20 +141,20 @@ class Sweep(Result):
 
     @property
     def best_or_nearest(self) -> int | None:
-        """The best row, or the nearest where none is feasible."""
+        """Best row, or the nearest where none is feasible."""
         return self.nearest if self.best is None else self.best
 
     @cached_property
     def nearest(self) -> int | None:
         """Point that serves most devices where runs show no feasible one; None: none serves any."""
         ranked = [(run["fraction"] or 0.0, -i) for i, run in enumerate(self.driven)]
-        fraction, place = max(ranked, default=(0.0, 0))
-        return -place if self.runs and self.best is None and fraction > 0 else None
+        fraction, negative_row = max(ranked, default=(0.0, 0))
+        return -negative_row if self.runs and self.best is None and fraction > 0 else None
 
     def point_scene(self, row: int) -> SceneFile:
-        """The scene of a row. Raises: SceneError: the row was refused, or there is none."""
+        """Scene of a row. Raises: SceneError: the row was refused, or there is none."""
         check_rows([row], len(self.points))
-        return point_scene(self.scene, self.points[row])
+        return self.scene.with_values(self.points[row])
 
     def columns(self) -> dict[str, list[Any]]:
         """The table, one list a column, by name with SI unit such as "velocity [m/s]".
@@ -145,36 +165,32 @@ class Sweep(Result):
         its bounds, and `settling_time` with its upper one; `status`, `verdict`, `finding` (why a point has no
         answer) and `scene sha256`. None where a value is not known.
         """
-        return {f"{name} [{unit}]" if unit else name: values for name, unit, values in self.fields()}
+        return {column.head: column.values for column in self.fields()}
 
-    def fields(self) -> list[tuple[str, str, list[Any]]]:
-        """Columns as name, SI unit (empty for texts and numbers of rows) and values."""
-        of_runs = _OF_RUNS if self.runs else {}
-        return [
-            ("row", "", list(range(len(self.points)))),
-            *self._changed_columns(),
-            *self._static_columns(),
-            *((name, unit, [run[key] for run in self.driven]) for key, (name, unit) in of_runs.items()),
-            ("status", "", [row["status"] for row in self.static]),
-            ("verdict", "", list(self.verdicts)),
-            ("finding", "", self.failures),
-            ("scene sha256", "", [row["sha256"] for row in self.static]),
-        ]
-
-    def _changed_columns(self) -> Iterator[tuple[str, str, list[Any]]]:
+    def fields(self) -> list[SweepColumn]:
+        """Columns of the table, in the order of `columns`."""
+        columns = [SweepColumn("row", "", list(range(len(self.points))))]
         for axis in self.plan.axes:
             if axis.names:
-                yield axis.head, "", [axis.name_of(point) for point in self.points]
+                columns.append(SweepColumn(axis.head, "", [axis.name_of(point) for point in self.points]))
             for path in axis.paths:
-                yield path, unit_of_path(self.scene, path), [point.get(path) for point in self.points]
-
-    def _static_columns(self) -> Iterator[tuple[str, str, list[Any]]]:
+                values = [point.get(path) for point in self.points]
+                columns.append(SweepColumn(path, unit_of_path(self.scene, path), values))
         units = {name: unit for row in self.static for name, unit in row["units"].items()}
         for name, unit in units.items():
             pairs = [row["values"].get(name, (None, None)) for row in self.static]
-            yield name, unit, [value for value, _ in pairs]
+            columns.append(SweepColumn(name, unit, [value for value, _ in pairs]))
             if any(width is not None for _, width in pairs):
-                yield f"{name} half-width", unit, [width for _, width in pairs]
+                columns.append(SweepColumn(f"{name} half-width", unit, [width for _, width in pairs]))
+        for key, (name, unit) in _RUN_COLUMNS.items() if self.runs else ():
+            columns.append(SweepColumn(name, unit, [run[key] for run in self.driven]))
+        return [
+            *columns,
+            SweepColumn("status", "", [row["status"] for row in self.static]),
+            SweepColumn("verdict", "", list(self.verdicts)),
+            SweepColumn("finding", "", self.failures),
+            SweepColumn("scene sha256", "", [row["sha256"] for row in self.static]),
+        ]
 
     @property
     def failures(self) -> list[str]:
@@ -203,27 +219,27 @@ class Sweep(Result):
         grids = self.grid()
         names, shape = list(grids), tuple(map(len, grids.values()))
         array, dataset = extra("xarray", "xarray_array"), extra("xarray", "xarray_dataset")
-        fields = self.fields()
-        units = {name: {"units": unit} if unit else {} for name, unit, _ in fields}
+        fields = {column.name: column for column in self.fields()}
+        units = {name: {"units": column.unit} if column.unit else {} for name, column in fields.items()}
         coords = {name: (name, _array(values), units[name]) for name, values in grids.items()}
         variables = {
-            name: array(_array(values).reshape(shape), dims=names, attrs=units[name])
-            for name, _, values in fields
+            name: array(column.array.reshape(shape), dims=names, attrs=units[name])
+            for name, column in fields.items()
             if name not in names
         }
         source = {"title": self.scene.name, "source": f"ringbalance sweep of {self.scene.source}"}
         return dataset(variables, coords=coords, attrs=source | {"scene_sha256": self.scene.sha256})
 
     def sensitivity(self, *, total: bool = False) -> Shares:
-        """By result and axis: the share of the variance that it explains, and its half-width (95 %).
+        """Share of the variance of each result that each axis explains, and its half-width (95 %).
 
         Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.  A share
         below zero, or shares that sum to more than 1, are noise of the sample: an interval that holds zero
         shows no influence, and more points narrow it.
-        Args: `total`: whether what it explains together with others counts too, see `total_order`.
+        Args: `total`: True counts what an axis explains together with others too, see `total_order`.
         """
         changed = {*self.plan.paths, *(axis.head for axis in self.plan.axes)}
-        names = [name for name, _, _ in self.fields() if name not in changed]
+        names = [column.name for column in self.fields() if column.name not in changed]
         return self._shares(names, total=total)
 
     @cached_property
@@ -234,25 +250,24 @@ class Sweep(Result):
     def _shares(self, names: Sequence[str], *, total: bool = False) -> Shares:
         if not self.plan.sample:
             return {}
-        columns = {name: _array(values) for name, _, values in self.fields()}
+        columns = {column.name: column.array for column in self.fields()}
         numbers = {name: each for name, each in columns.items() if each.dtype == np.float64}
         for axis in self.plan.axes:
             if axis.names:
                 numbers[axis.head] = np.array([axis.names.index(each) for each in columns[axis.head]], float)
-        paths = [axis.head for axis in self.plan.axes if axis.head in numbers]
-        found = {}
-        for name in names if paths else ():
+        heads = [axis.head for axis in self.plan.axes if axis.head in numbers]
+        shares_by_name = {}
+        for name in names if heads else ():
             if name not in numbers:
                 continue
-            known = np.isfinite(np.array([numbers[each] for each in (name, *paths)])).all(axis=0)
-            if known.any():
-                inputs = np.array([numbers[path][known] for path in paths]).T
-                shares, widths = (total_order if total else first_order)(inputs, numbers[name][known])
+            complete = np.isfinite(np.array([numbers[each] for each in (name, *heads)])).all(axis=0)
+            if complete.any():
+                inputs = np.array([numbers[head][complete] for head in heads]).T
+                shares, widths = (total_order if total else first_order)(inputs, numbers[name][complete])
                 if np.isfinite(shares).all():
-                    found[name] = dict(
-                        zip(paths, zip(shares.tolist(), widths.tolist(), strict=True), strict=True)
-                    )
-        return found
+                    pairs = zip(shares.tolist(), widths.tolist(), strict=True)
+                    shares_by_name[name] = dict(zip(heads, pairs, strict=True))
+        return shares_by_name
 
     def grid(self) -> dict[str, list[Any]]:
         """Values of each axis of a grid, the last fastest: names of its rows, else its first key; of a sample
@@ -286,8 +301,8 @@ class Sweep(Result):
             "points": len(self.points),
             "runs": self.runs,
             "verdicts": dict(Counter(self.verdicts)),
-            "best": None if best is None else self._place(best),
-            "nearest": None if nearest is None else self._place(nearest),
+            "best": None if best is None else self._row_document(best),
+            "nearest": None if nearest is None else self._row_document(nearest),
             "left_out": list(self.errors),
             "sensitivity": self._main_shares,
             "times": dict(self.designs_per_second),
@@ -296,7 +311,7 @@ class Sweep(Result):
         }
 
     def rows(self) -> Rows:
-        """Number of points that meet what is required, the best of them, and errors of the array core."""
+        """Number of points that meet the requirements, the best of them, and errors of the array core."""
         quantities = [
             Quantity(
                 key=f"{name}_designs_per_second",
@@ -314,110 +329,89 @@ class Sweep(Result):
             tables=tuple(self._tables()),
         )
 
-    def _findings(self) -> list[Finding]:
+    def _findings(self) -> Iterator[Finding]:
         count, total, best = sum(self.feasible), len(self.points), self.best
-        numbers = {"count": count, "total": total, "runs": self.runs}
         code = "sweep_met" if self.runs else "sweep_flows" if self._flows else "sweep_not_judged"
-        found = [Finding(code=code, values=numbers)]
-        for what, kept in self.resumed.items():
-            found.append(Finding(code="sweep_resumed", values={"count": kept, "what": what}))
+        yield Finding(code=code, values={"count": count, "total": total, "runs": self.runs})
+        for what, stored in self.resumed.items():
+            yield Finding(code="sweep_resumed", values={"count": stored, "what": what})
         if best is not None:
             by = "settles first" if self.runs else "cancels most in any direction, nothing was run"
             values: dict[str, Value] = {"row": best, "by": by, "changes": self._change_text(best)}
-            found += [Finding(code="sweep_best", values=values), *self._edges(best)]
+            yield Finding(code="sweep_best", values=values)
+            # Keys whose value stands at an end of what was varied.
+            for path in (path for axis in self.plan.axes if not axis.names for path in axis.paths):
+                numbers = [value for point in self.points if isinstance(value := point.get(path), float)]
+                low, high = min(numbers, default=0.0), max(numbers, default=0.0)
+                value = self.points[best].get(path)
+                for end in (low, high):
+                    near = isinstance(value, float) and abs(value - end) <= _EDGE_FRACTION * (high - low)
+                    if low < high and near:
+                        text = setting_text(path, end)
+                        yield Finding(code="sweep_edge", values={"path": path, "end": text})
         if (nearest := self.nearest) is not None:
             fraction = self.driven[nearest]["fraction"]
             values = {"row": nearest, "changes": self._change_text(nearest), "fraction": fraction}
-            found.append(Finding(code="sweep_nearest", values=values))
+            yield Finding(code="sweep_nearest", values=values)
         if failed := [text for text in self.failures if text]:
-            found.append(Finding(code="sweep_refused", values={"count": len(failed), "text": failed[0]}))
+            yield Finding(code="sweep_refused", values={"count": len(failed), "text": failed[0]})
         tolerance = float(getattr(self.scene, "tolerance", math.inf))
-        found += [
-            Finding(code="sweep_too_coarse", values={**each, "tolerance": tolerance})
-            for each in self.errors
-            if each["error"] > tolerance
-        ]
+        for each in self.errors:
+            if each["error"] > tolerance:
+                yield Finding(code="sweep_too_coarse", values={**each, "tolerance": tolerance})
         if self.errors:
             worst = max(self.errors, key=lambda each: float(each["error"]))
-            found.append(Finding(code="sweep_left_out", values={**worst, "tolerance": tolerance}))
-        return found
-
-    def _edges(self, row: int) -> Iterator[Finding]:
-        """Keys that stand at an end of what was varied."""
-        for path in (path for axis in self.plan.axes if not axis.names for path in axis.paths):
-            values = [value for point in self.points if isinstance(value := point.get(path), float)]
-            here, low, high = self.points[row].get(path), min(values, default=0.0), max(values, default=0.0)
-            for end in (low, high):
-                if low < high and isinstance(here, float) and abs(here - end) <= _EDGE * (high - low):
-                    yield Finding(code="sweep_edge", values={"path": path, "end": setting_text(path, end)})
+            yield Finding(code="sweep_left_out", values={**worst, "tolerance": tolerance})
 
     def _change_text(self, row: int) -> str:
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)
 
-    def axis_text(self, axis: Axis, row: int) -> str:
-        """Value of an axis at a row: its name where it was chosen by name, else keys with values."""
+    def axis_text(self, axis: SweepAxis, row: int) -> str:
+        """Value of an axis in a row: its name where it was chosen by name, else keys with values."""
         point = self.points[row]
         if axis.names:
             return f"{axis.head} = {axis.name_of(point)}"
         return ", ".join(f"{path} = {setting_text(path, point.get(path))}" for path in axis.paths)
 
-    def _place(self, row: int) -> Record:
-        """A row as the summary names it."""
+    def _row_document(self, row: int) -> Record:
         point = self.points[row]
         names = {axis.head: axis.name_of(point) for axis in self.plan.axes if axis.names}
         return {"row": row, "changes": dict(point), "names": names}
 
     def _tables(self) -> Iterator[Table]:
-        counts = Counter(self.verdicts)
+        counts, row = Counter(self.verdicts), self.best_or_nearest
         yield Table(heads=("verdict", "points"), rows=[(name, str(n)) for name, n in counts.most_common()])
-        yield from self._best_table()
-        yield from self._shares_table()
-        yield from self._left_out_table()
-
-    def _best_table(self) -> Iterator[Table]:
-        """Table of the answers of the best or the nearest point."""
-        place = self.best_or_nearest
-        if place is None:
-            return
-        row, run = self.static[place], self.driven[place]
-        answers = {name: (pair, row["units"][name]) for name, pair in row["values"].items()}
-        cells = [
-            (name, Quantity(key=name, name=name, value=value, unit=unit, lower=low, upper=high).text)
-            for name, ((value, width), unit) in answers.items()
-            if value is not None
-            for low, high in (around(value, width, stated=bool(self.scene.uncertainty)),)
-        ]
-        if self.runs:
-            shown = ("fraction low", "fraction", "fraction high", "settling_time")
-            cells = [
-                ("devices", str(run["devices"])),
-                *(
-                    (name, given_text(run[key], unit, digits=3))
-                    for key, (name, unit) in _OF_RUNS.items()
-                    if name in shown
-                ),
-                *cells,
-            ]
-        what = "Nearest" if self.best is None else "Best"
-        yield Table(caption=f"{what}: row {place}", heads=("quantity", "value"), rows=cells)
-
-    def _shares_table(self) -> Iterator[Table]:
+        if row is not None:
+            static, run = self.static[row], self.driven[row]
+            cells = []
+            if self.runs:
+                cells.append(("devices", str(run["devices"])))
+                for key in ("fraction", "low", "high", "settling_time"):
+                    name, unit = _RUN_COLUMNS[key]
+                    cells.append((name, format_given(run[key], unit, digits=3)))
+            for name, (value, width) in static["values"].items():
+                if value is not None:
+                    low, high = around(value, width, stated=bool(self.scene.uncertainty))
+                    unit = static["units"][name]
+                    quantity = Quantity(key=name, name=name, value=value, unit=unit, lower=low, upper=high)
+                    cells.append((name, quantity.text))
+            what = "Nearest" if self.best is None else "Best"
+            yield Table(caption=f"{what}: row {row}", heads=("quantity", "value"), rows=cells)
         for name, shares in self._main_shares.items():
             rows = [(path, percent(share), percent(width)) for path, (share, width) in shares.items()]
             heads = ("key", "share of its variance", "half-width, 95 %")
             yield Table(caption=f"What decides {name.replace('_', ' ')}", heads=heads, rows=rows)
-
-    def _left_out_table(self) -> Iterator[Table]:
-        rows = [
-            (each["quantity"], percent(each["error"]), percent(each["uncertainty"])) for each in self.errors
-        ]
-        heads = ("quantity", "rows err by at most", "the models themselves")
-        if rows:
+        if self.errors:
+            rows = [
+                (each["quantity"], percent(each["error"]), percent(each["uncertainty"]))
+                for each in self.errors
+            ]
+            heads = ("quantity", "rows err by at most", "the models themselves")
             yield Table(caption="Beside a calibration of some rows", heads=heads, rows=rows)
 
 
 def check_rows(rows: Sequence[int], count: int) -> None:
-    """Raises: SceneError: a row that a table of so many rows does not have."""
+    """Refuse a row that a table of so many rows does not have. Raises: SceneError: there is one."""
     for row in rows:
         if not 0 <= row < count:
             allowed = f"0 to {count - 1}"
@@ -425,7 +419,6 @@ def check_rows(rows: Sequence[int], count: int) -> None:
 
 
 def _array(values: Sequence[Any]) -> Any:
-    """Numbers with NaN for what is not known, or texts."""
     if all(value is None or isinstance(value, int | float) for value in values):
         return np.array([math.nan if value is None else value for value in values])
     return np.array(values, dtype=object)
@@ -448,7 +441,7 @@ def run_sweep(
     rates: dict[str, float] = {}
     resumed: dict[str, int] = {}
 
-    def shown(done: Done) -> None:
+    def report(done: Done) -> None:
         if done.computed:
             rates[done.what] = done.rate
         elif done.points:
@@ -456,21 +449,22 @@ def run_sweep(
         if progress is not None:
             progress(done)
 
-    deal = partial(answers, store=Store(folder=store) if store else None, progress=shown)
-    everywhere = partial(deal, executor=executor, workers=workers)
-    content, size = content_of(scene), _TOGETHER[intervals]
+    deal = partial(answers, store=Store(folder=store) if store else None, progress=report)
+    deal_out = partial(deal, executor=executor, workers=workers)
+    content, size = content_of(scene), _POINTS_PER_BATCH[intervals]
     batches = [points[start : start + size] for start in range(0, len(points), size)]
     calls = [partial(static_rows, scene, each, intervals=intervals) for each in batches]
-    static = [row for rows in everywhere("static", tasks_of(content, calls)) for row in rows]
+    static = [row for rows in deal_out("static", tasks_of(content, calls)) for row in rows]
     driven: list[Mapping[str, Any]] = [dict(EMPTY) for _ in points]
-    places = [i for i, row in enumerate(static) if row["sha256"]] if runs else []
-    if places:
+    accepted = [i for i, row in enumerate(static) if row["sha256"]] if runs else []
+    if accepted:
         run_row = registered("function", "run_row")
-        calls = [partial(run_row, scene, points[i], runs=runs) for i in places]
-        for i, row in zip(places, everywhere("runs", tasks_of(content, calls)), strict=True):
+        calls = [partial(run_row, scene, points[i], runs=runs) for i in accepted]
+        for i, row in zip(accepted, deal_out("runs", tasks_of(content, calls)), strict=True):
             driven[i] = row
-    here = partial(deal, executor=None)
-    left_out = registered("function", "left_out")(scene, points, static, check, here) if check else []
+    deal_in_process = partial(deal, executor=None)
+    left_out = registered("function", "left_out")
+    errors = left_out(scene, points, static, check, deal_in_process) if check else []
     return Sweep(
         scene=scene,
         plan=plan,
@@ -478,7 +472,7 @@ def run_sweep(
         static=tuple(static),
         driven=tuple(driven),
         runs=runs,
-        errors=tuple(left_out),
+        errors=tuple(errors),
         designs_per_second=rates,
         resumed=resumed,
     )

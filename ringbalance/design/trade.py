@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.design.axes import Point
-from ringbalance.design.static import FAULTS, Record, content_of, point_scene
+from ringbalance.design.static import BREAKDOWNS, Record, content_of
 from ringbalance.design.work import Task, tasks_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.faults import SceneError
@@ -20,15 +20,15 @@ QUANTITIES: Final = ("lambda", "moment", "velocity", "drag_coefficient", "stall_
 
 
 def calibrated_row(scene: SceneFile, point: Point) -> Record:
-    """Value and expanded uncertainty (95 %) by numerics and models of what `calibrate` finds, by name."""
+    """Value and expanded uncertainty (95 %, numerics and models) of quantities of `calibrate`, by name."""
     try:
-        known = calibrate(point_scene(scene, point)).quantities
-    except (SceneError, *FAULTS):
+        quantities = calibrate(scene.with_values(point)).quantities
+    except (SceneError, *BREAKDOWNS):
         return {}
     return {
-        name: [known[name].value, math.hypot(parts.numerical, parts.model)]
+        name: [quantities[name].value, math.hypot(parts.numerical, parts.model)]
         for name in QUANTITIES
-        if name in known and (parts := known[name].parts)
+        if name in quantities and (parts := quantities[name].parts)
     }
 
 

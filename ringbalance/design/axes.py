@@ -19,8 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.design.choices import NAME, as_toml, read_choices
-from ringbalance.results.numbers import format_given
-from ringbalance.results.numbers import plain
+from ringbalance.results.numbers import format_given, plain
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.faults import COMMAND_LINE, Fault, SceneError, did_you_mean

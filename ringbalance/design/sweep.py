@@ -19,8 +19,7 @@ from ringbalance.design.sensitivity import first_order, total_order
 from ringbalance.design.static import EMPTY, Record, content_of, reach_of, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
-from ringbalance.results.numbers import format_given
-from ringbalance.results.numbers import percent
+from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Result, Rows, Table, csv_text, extra
 from ringbalance.results.rows import Finding, Quantity, Value, around

@@ -47,27 +47,27 @@ def open_scene(vary: tuple[str, ...] = WIDTHS, **changes: Any) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def found() -> rb.Design:
+def design() -> rb.Design:
     return rb.find_design(open_scene(requirement__fraction=0.7))
 
 
-def test_the_smallest_of_a_whole_space_that_meets_what_is_required(found: rb.Design) -> None:
+def test_the_smallest_of_a_whole_space_that_meets_what_is_required(design: rb.Design) -> None:
     """Against every width, each with settings that are searched for and judged as `tune` does."""
     verdicts = {}
     for width in (14e-3, 26e-3, 38e-3):
-        balancer = balancer_of(found.given.with_values({**found.point, "disc.axial_width": width}))
+        balancer = balancer_of(design.given.with_values({**design.point, "disc.axial_width": width}))
         verdicts[width] = judged(balancer, searched(balancer)).verdict
     smallest = min(width for width, verdict in verdicts.items() if verdict == MET)
-    assert found.succeeded
-    assert all(each.size >= found.size for each in found.front)
-    assert found.point["disc.axial_width"] == smallest > 14e-3
+    assert design.succeeded
+    assert all(each.size >= design.size for each in design.front)
+    assert design.point["disc.axial_width"] == smallest > 14e-3
 
 
-def test_the_scene_as_designed_is_judged_alike(found: rb.Design) -> None:
-    scene = found.recommended_scene
+def test_the_scene_as_designed_is_judged_alike(design: rb.Design) -> None:
+    scene = design.recommended_scene
     again = judged(balancer_of(scene), {})
-    assert found.judgement is not None
-    assert again.fraction == found.judgement.fraction
+    assert design.judgement is not None
+    assert again.fraction == design.judgement.fraction
 
 
 def test_what_lost_workers_had_to_do_is_done_again() -> None:
@@ -79,16 +79,16 @@ def test_what_lost_workers_had_to_do_is_done_again() -> None:
     assert deal(executor, [partial(int, text) for text in ("7", "8", "9")]) == [7, 8, 9]
 
 
-def test_threads_make_no_difference(found: rb.Design) -> None:
+def test_threads_make_no_difference(design: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
         other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
-    assert other.to_dict() == found.to_dict()
+    assert other.to_dict() == design.to_dict()
 
 
 @pytest.mark.heavy
-def test_workers_make_no_difference(found: rb.Design) -> None:
+def test_workers_make_no_difference(design: rb.Design) -> None:
     of_its_own = rb.find_design(open_scene(requirement__fraction=0.7), workers=2)
-    assert of_its_own.to_dict() == found.to_dict()
+    assert of_its_own.to_dict() == design.to_dict()
 
 
 def test_an_unbalance_that_no_design_cancels_is_named() -> None:
@@ -122,14 +122,14 @@ def test_designs_that_are_refused_are_counted_with_the_most_frequent_reason() ->
     assert refused["values"].items() >= {"count": 3, "points": 6, "reasons": 1, "most": 3}.items()
 
 
-def test_a_default_end_of_a_range_is_told_apart_from_a_given_one(found: rb.Design) -> None:
-    def edges(design: rb.Design, **point: float) -> dict[str, Any]:
-        at = {**design.point, **{key.replace("__", "."): value for key, value in point.items()}}
-        findings = replace(design, point=at).rows().findings
+def test_a_default_end_of_a_range_is_told_apart_from_a_given_one(design: rb.Design) -> None:
+    def edges(of: rb.Design, **point: float) -> dict[str, Any]:
+        moved = {**of.point, **{key.replace("__", "."): value for key, value in point.items()}}
+        findings = replace(of, point=moved).rows().findings
         return {each.code: each.values for each in findings if each.code.startswith("design_edge")}
 
     scene = open_scene((), design__axial_width="38 mm")
-    open_ended = replace(found, given=scene, space=Space.of(scene))
+    open_ended = replace(design, given=scene, space=Space.of(scene))
     narrow = edges(open_ended, disc__axial_width=3.8e-3)
     assert set(narrow) == {"design_edge_default"}
     vary = narrow["design_edge_default"]["vary"]
@@ -137,14 +137,14 @@ def test_a_default_end_of_a_range_is_told_apart_from_a_given_one(found: rb.Desig
     # What it says to set is a range that goes on beyond that end.
     wider = Space.of(open_scene(tuple(json.loads(vary)), design__axial_width="38 mm"))
     assert wider.range_text("disc.axial_width") == "1.9 mm to 38 mm"
-    assert set(edges(replace(found, space=wider), disc__axial_width=1.9e-3)) == {"design_edge"}
+    assert set(edges(replace(design, space=wider), disc__axial_width=1.9e-3)) == {"design_edge"}
     assert set(edges(open_ended, disc__axial_width=38e-3)) == {"design_edge"}
     (bore,) = edges(open_ended, tube__bore=3e-3, disc__axial_width=20e-3).values()
     assert bore["vary"] == '["tube.bore=0.3 mm:6 mm:log"]'
 
 
-def test_all_listed_designs_that_can_work_count_as_raced(found: rb.Design) -> None:
-    assert found.raced == found.static.able > 1
+def test_all_listed_designs_that_can_work_count_as_raced(design: rb.Design) -> None:
+    assert design.raced == design.static.able > 1
 
 
 @pytest.fixture(scope="module")
@@ -196,11 +196,11 @@ def test_the_tube_follows_the_disc() -> None:
     scene.with_values(point)
 
 
-@pytest.mark.parametrize("asked", [0.5, 0.9, 0.99])
-def test_the_threshold_is_the_least_fraction_that_is_surely_enough(asked: float) -> None:
-    count = round(threshold(asked) * MOST_DRAWS)
-    assert Proportion(count=count, of=MOST_DRAWS).verdict(asked) == MET
-    assert Proportion(count=count - 1, of=MOST_DRAWS).verdict(asked) == OPEN
+@pytest.mark.parametrize("fraction", [0.5, 0.9, 0.99])
+def test_the_threshold_is_the_least_fraction_that_is_surely_enough(fraction: float) -> None:
+    count = round(threshold(fraction) * MOST_DRAWS)
+    assert Proportion(count=count, of=MOST_DRAWS).verdict(fraction) == MET
+    assert Proportion(count=count - 1, of=MOST_DRAWS).verdict(fraction) == OPEN
 
 
 def test_an_error_in_a_file_of_valves_names_its_cell(tmp_path: Path) -> None:
@@ -249,13 +249,13 @@ def test_only_a_disc_with_liquid_is_designed() -> None:
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_a_design_is_the_best_of_a_whole_grid_or_says_why_there_is_none(name: str) -> None:
-    found = compared(name)
-    assert found.beyond <= 0.02, found.text
+    answer_of_grid = compared(name)
+    assert answer_of_grid.beyond <= 0.02, answer_of_grid.text
 
 
 @pytest.mark.heavy
 def test_the_size_does_not_depend_on_where_the_search_starts() -> None:
-    """Of six dimensions; other valves and pressures may lead to it."""
+    """The space has six dimensions; other valves and pressures may lead to the size."""
     answers = [answer(start, 0) for start in (0, 1)]
     assert all(each.design.succeeded and each.fraction > 0.9 for each in answers)
     assert answers[1].design.size == pytest.approx(answers[0].design.size, rel=0.02)

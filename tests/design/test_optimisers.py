@@ -12,7 +12,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "optimisers.md"
 
 
 def names_of(section: str) -> dict[str, Any]:
-    """What the blocks of the page's beginning and of a section come to."""
+    """Variables after the blocks of the page's beginning and of a section."""
     head, *sections = PAGE.read_text(encoding="utf-8").split("\n## ")
     (chosen,) = (each for each in sections if each.startswith(section))
     names: dict[str, Any] = {}

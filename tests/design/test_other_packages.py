@@ -17,35 +17,35 @@ VARY = {"tube.bore": [1e-3, 2e-3], "gas.pressure": np.linspace(0.4e6, 0.8e6, 3)}
 
 
 @pytest.fixture
-def found(paper_scene: Scene) -> rb.Sweep:
+def sweep(paper_scene: Scene) -> rb.Sweep:
     return rb.sweep(paper_scene, VARY, intervals=False)
 
 
 @pytest.mark.parametrize(("package", "method"), [("pandas", "to_pandas"), ("xarray", "to_xarray")])
 def test_a_missing_package_is_named(
-    found: rb.Sweep, monkeypatch: pytest.MonkeyPatch, package: str, method: str
+    sweep: rb.Sweep, monkeypatch: pytest.MonkeyPatch, package: str, method: str
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ModuleNotFoundError, match=rf"{package}: pip install .*sweep-tables"):
-        getattr(found, method)()
+        getattr(sweep, method)()
 
 
-def test_a_frame_goes_through_parquet(found: rb.Sweep, tmp_path: Path) -> None:
+def test_a_frame_goes_through_parquet(sweep: rb.Sweep, tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
-    frame = found.to_pandas()
+    frame = sweep.to_pandas()
     frame.to_parquet(tmp_path / "sweep.parquet")
     pandas.testing.assert_frame_equal(pandas.read_parquet(tmp_path / "sweep.parquet"), frame)
-    assert frame["velocity [m/s]"][5] == found.static[5]["values"]["velocity"][0]
+    assert frame["velocity [m/s]"][5] == sweep.static[5]["values"]["velocity"][0]
 
 
-def test_a_dataset_has_axes_and_units(found: rb.Sweep) -> None:
+def test_a_dataset_has_axes_and_units(sweep: rb.Sweep) -> None:
     pytest.importorskip("xarray")
-    data = found.to_xarray()
+    data = sweep.to_xarray()
     assert data["gas.pressure"].attrs["units"] == "Pa"
     assert data["velocity"].attrs["units"] == "m/s"
     assert data["velocity"].dims == ("tube.bore", "gas.pressure")
-    assert data["velocity"].values[1, 2] == found.static[5]["values"]["velocity"][0]
+    assert data["velocity"].values[1, 2] == sweep.static[5]["values"]["velocity"][0]
 
 
 @pytest.fixture
@@ -65,5 +65,5 @@ def executor(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
 def test_two_dask_workers_give_the_same_table(paper_scene: Scene, executor: object) -> None:
     vary = {"tube.bore": "1mm:2mm", "gas.pressure": "0.5MPa:0.9MPa"}
     serial = rb.sweep(paper_scene, vary, sample="latin:8", runs=16)
-    there = rb.sweep(paper_scene, vary, sample="latin:8", runs=16, executor=executor, workers=2)  # type: ignore[arg-type]
-    assert there.to_csv() == serial.to_csv()
+    spread = rb.sweep(paper_scene, vary, sample="latin:8", runs=16, executor=executor, workers=2)  # type: ignore[arg-type]
+    assert spread.to_csv() == serial.to_csv()

@@ -17,7 +17,7 @@ A, B = 7.0, 0.1
 
 
 def ishigami(x: FloatArray) -> FloatArray:
-    """Of x over (-pi, pi): Ishigami and Homma (1990)."""
+    """Function of x over (-pi, pi): Ishigami and Homma (1990)."""
     y = np.sin(x[:, 0]) + A * np.sin(x[:, 1]) ** 2 + B * x[:, 2] ** 4 * np.sin(x[:, 0])
     return np.asarray(y)
 
@@ -26,13 +26,13 @@ def test_indices_of_ishigami_lie_in_their_intervals() -> None:
     x = math.pi * (2 * sobol(3, 4096) - 1)
     alone = np.array([(1 + B * math.pi**4 / 5) ** 2 / 2, A**2 / 8, 0.0])
     together = B**2 * math.pi**8 * (1 / 18 - 1 / 50)
-    whole = np.sum(alone) + together
+    variance = np.sum(alone) + together
     shares, widths = first_order(x, ishigami(x))
-    assert np.all(np.abs(shares - alone / whole) < widths)
+    assert np.all(np.abs(shares - alone / variance) < widths)
     assert np.all(widths < 0.06)
     for rows, narrow in ((256, 0.25), (1024, 0.003)):
         shares, widths = total_order(x[:rows], ishigami(x[:rows]))
-        exact = (alone + together * np.array([1, 0, 1])) / whole
+        exact = (alone + together * np.array([1, 0, 1])) / variance
         assert np.all(np.abs(shares - exact) < widths)
         assert np.all(widths < narrow)
 
@@ -44,14 +44,14 @@ def test_total_indices_are_those_of_salib() -> None:
     analyze = pytest.importorskip("SALib.analyze.sobol").analyze
     problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[-math.pi, math.pi]] * 3}
     theirs = sample(problem, 1024, calc_second_order=False, seed=1)
-    found = analyze(problem, ishigami(theirs), calc_second_order=False, seed=1)
+    indices = analyze(problem, ishigami(theirs), calc_second_order=False, seed=1)
     x = math.pi * (2 * sobol(3, 1024) - 1)
     shares, widths = total_order(x, ishigami(x))
-    assert np.all(np.abs(shares - found["ST"]) < widths + found["ST_conf"])
+    assert np.all(np.abs(shares - indices["ST"]) < widths + indices["ST_conf"])
 
 
 def test_intervals_hold_what_they_promise() -> None:
-    """Of 100 samples of x1 + x2/2, some 95 intervals hold 0.8 and 0.2."""
+    """In 100 samples of x1 + x2/2, some 95 intervals hold 0.8 and 0.2."""
     random, held = np.random.default_rng(5), np.zeros(2)
     for _ in range(100):
         x = random.random((256, 2))
@@ -62,11 +62,11 @@ def test_intervals_hold_what_they_promise() -> None:
 
 @pytest.mark.parametrize("noise", [0.0, 0.1])
 def test_total_intervals_hold_what_they_promise(noise: float) -> None:
-    """Of 40 Latin samples of a sum with a product in it, and a noise that may belong to either input."""
+    """In 40 Latin samples of a sum with a product in it, and a noise that may belong to either input."""
     random, held = np.random.default_rng(5), np.zeros(2)
     both = 4 / 144
-    whole = 1 / 12 + 1 / 48 + both + noise**2
-    exact = (np.array([1 / 12, 1 / 48]) + both + noise**2 / 2) / whole
+    variance = 1 / 12 + 1 / 48 + both + noise**2
+    exact = (np.array([1 / 12, 1 / 48]) + both + noise**2 / 2) / variance
     for _ in range(40):
         x = np.stack([(random.permutation(256) + random.random(256)) / 256 for _ in range(2)], axis=1)
         y = x[:, 0] + x[:, 1] / 2 + 2 * (x[:, 0] - 0.5) * (x[:, 1] - 0.5)
@@ -86,13 +86,13 @@ def test_nothing_is_said_of_few_rows_or_of_a_constant() -> None:
 def test_a_sample_tells_what_moves_its_results(paper_scene: Scene) -> None:
     vary = {"tube.bore": "0.7mm:2mm", "gas.pressure": "0.6MPa:1MPa"}
     table = rb.sweep(paper_scene, vary, sample="sobol:128", intervals=False)
-    found, total = table.sensitivity(), table.sensitivity(total=True)
-    assert "lambda" not in found
-    share, width = found["drag_coefficient"]["tube.bore"]
-    assert share - width > found["drag_coefficient"]["gas.pressure"][0]
-    for path, (whole, half) in total["drag_coefficient"].items():
-        share, width = found["drag_coefficient"][path]
-        assert whole + half > share - width
+    first, total = table.sensitivity(), table.sensitivity(total=True)
+    assert "lambda" not in first
+    share, width = first["drag_coefficient"]["tube.bore"]
+    assert share - width > first["drag_coefficient"]["gas.pressure"][0]
+    for path, (share_total, half) in total["drag_coefficient"].items():
+        share, width = first["drag_coefficient"][path]
+        assert share_total + half > share - width
     with pytest.raises(KeyError):
         rb.sweep(paper_scene, {"tube.bore": "0.7mm:2mm:3"}).sensitivity()["velocity"]
 

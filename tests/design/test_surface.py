@@ -20,37 +20,37 @@ def true_logits(places: FloatArray) -> FloatArray:
 
 
 def counted(fraction: FloatArray, *, seed: int) -> IntArray:
-    """Of a block each, whose inputs are spread evenly: half the variance of independent devices."""
+    """Counts of a block each, whose inputs are spread evenly: half the variance of independent devices."""
     spread = np.sqrt(0.5 * DEVICES * fraction * (1 - fraction))
     count = DEVICES * fraction + spread * np.random.default_rng(seed).standard_normal(fraction.size)
     return np.clip(np.rint(count), 0, DEVICES).astype(np.intp)
 
 
 @pytest.fixture(scope="module")
-def known() -> tuple[FloatArray, Surface]:
+def raced() -> tuple[FloatArray, Surface]:
     random = np.random.default_rng(1)
     places = random.random((160, 3))
     met = counted(expit(true_logits(places)), seed=2)
     return random.random((400, 3)), Surface.of(places, met=met, devices=np.full(160, DEVICES))
 
 
-def test_many_designs_say_more_than_each(known: tuple[FloatArray, Surface]) -> None:
+def test_many_designs_say_more_than_each(raced: tuple[FloatArray, Surface]) -> None:
     """One design alone: 3 % at nine tenths."""
-    places, surface = known
+    places, surface = raced
     logits, spread = surface.logits(places)
     error = expit(logits) - expit(true_logits(places))
     assert np.sqrt(np.mean(error**2)) < 0.015
     assert 0.8 < np.mean(np.abs(logits - true_logits(places)) < 2 * spread) <= 1.0
 
 
-def test_the_optimum_is_found_where_it_lies(known: tuple[FloatArray, Surface]) -> None:
-    _, surface = known
+def test_the_optimum_is_found_where_it_lies(raced: tuple[FloatArray, Surface]) -> None:
+    _, surface = raced
     line = np.column_stack([np.full(101, 0.5), np.linspace(0, 1, 101), np.full(101, 0.5)])
     assert line[np.argmax(surface.logits(line)[0]), 1] == pytest.approx(0.4, abs=0.05)
 
 
-def test_what_does_not_matter_is_recognised(known: tuple[FloatArray, Surface]) -> None:
-    _, surface = known
+def test_what_does_not_matter_is_recognised(raced: tuple[FloatArray, Surface]) -> None:
+    _, surface = raced
     assert surface.lengths[2] > 3 * min(surface.lengths[:2])
 
 
@@ -69,8 +69,8 @@ def test_a_cliff_does_not_hide_what_matters_on_the_plain_behind_it() -> None:
     assert np.max(np.abs(expit(surface.logits(cliff)[0]) - true(cliff))) < 0.08
 
 
-def test_a_design_of_many_devices_is_known_better(known: tuple[FloatArray, Surface]) -> None:
-    places, _ = known
+def test_a_design_of_many_devices_is_known_better(raced: tuple[FloatArray, Surface]) -> None:
+    places, _ = raced
     some, met = places[:2], np.array([58, 928])
     surface = Surface.of(some, met=met, devices=np.array([DEVICES, 16 * DEVICES]))
     _, spread = surface.logits(some)
@@ -80,7 +80,7 @@ def test_a_design_of_many_devices_is_known_better(known: tuple[FloatArray, Surfa
 def test_the_gradient_by_which_lengths_are_found_is_right() -> None:
     random = np.random.default_rng(5)
     places, start = random.random((20, 3)), np.log([2.0, 0.5, 0.5, 0.5])
-    given = {
+    arguments = {
         "start": start,
         "apart": (places[:, np.newaxis] - places) ** 2,
         "seen": random.standard_normal(20),
@@ -88,6 +88,6 @@ def test_the_gradient_by_which_lengths_are_found_is_right() -> None:
     }
     at = start + 0.3 * random.standard_normal(4)
     difference = check_grad(
-        lambda x: under_test._loss(x, **given)[0], lambda x: under_test._loss(x, **given)[1], at
+        lambda x: under_test._loss(x, **arguments)[0], lambda x: under_test._loss(x, **arguments)[1], at
     )
     assert difference < 1e-5

@@ -45,12 +45,12 @@ def test_nine_of_ten_built_machines_settle(name: str) -> None:
 def test_a_step_leaves_what_the_wrong_influence_leaves() -> None:
     """|1 - alpha_true/alpha|, with a stiffness 3 % off; masses come to rest within a tenth of a degree."""
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=45.0)
-    told = StrategySettings.of(paper)
+    settings = StrategySettings.of(paper)
     plant = changed(paper, {"rotor.stiffness": 1.03 * paper.rotor.stiffness})
-    run = simulate_eccentric(plant, settings=told)
+    run = simulate_eccentric(plant, settings=settings)
     checks = [stage for stage in run.stages if stage.name == "check"]
     left = [
-        complex(run.whirl[(run.time > stage.end - told.gates.average) & (run.time <= stage.end)].mean())
+        complex(run.whirl[(run.time > stage.end - settings.gates.average) & (run.time <= stage.end)].mean())
         for stage in checks
     ]
     speed = paper.rotor.speed_profile[0].speed
@@ -101,9 +101,9 @@ def test_a_wrong_influence_is_met_by_smaller_steps() -> None:
 def test_trials_alone_are_asked_for_by_a_key() -> None:
     """Masses ten degrees beside their targets: by trials in minutes, by the measured vibration in seconds."""
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=200.0)
-    beside = changed(paper, {"supervisor.target_error": (math.radians(10), math.radians(10))})
-    measured = simulate_eccentric(beside)
-    trials = simulate_eccentric(changed(beside, {"supervisor.correction": "trials"}))
+    off_target = changed(paper, {"supervisor.target_error": (math.radians(10), math.radians(10))})
+    measured = simulate_eccentric(off_target)
+    trials = simulate_eccentric(changed(off_target, {"supervisor.correction": "trials"}))
     assert "correction" in stage_names(measured)
     assert "fine tuning" not in stage_names(measured)
     assert "fine tuning" in stage_names(trials)

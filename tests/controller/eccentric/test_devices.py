@@ -30,7 +30,7 @@ def small() -> EccentricScene:
 
 
 def stating(scene: EccentricScene, **widths: tuple[float, bool]) -> EccentricScene:
-    """With these uncertainties alone, by path with __ for the dot: half-width, and whether it is relative."""
+    """Scene with these uncertainties alone, by path with __ for the dot: half-width, and True if relative."""
     stated = (
         InputUncertainty(quantity=path.replace("__", "."), half_width=width, relative=relative)
         for path, (width, relative) in widths.items()
@@ -83,7 +83,7 @@ def test_the_direction_of_the_imbalance_is_any_unless_the_scene_restricts_it(pap
 
 
 def test_devices_whose_imbalance_is_beyond_reach_do_not_settle(paper: EccentricScene) -> None:
-    """Of an imbalance as large as the reach half of the devices have more; those and no others fail."""
+    """Half of the devices have an imbalance beyond the reach; those and no others fail."""
     short = at_constant_speed(paper, time_limit=40.0)
     size = reach_of(short) / short.imbalance.radius
     scene = changed(stating(short, imbalance__mass=(0.5, True)), {"imbalance.mass": size})
@@ -97,10 +97,10 @@ def test_devices_whose_imbalance_is_beyond_reach_do_not_settle(paper: EccentricS
 def test_what_is_required_is_judged_over_the_devices(paper: EccentricScene) -> None:
     """A residual that none reaches decides, whatever settles."""
     scene = at_constant_speed(paper, time_limit=40.0)
-    asked = changed(
+    demanding = changed(
         scene, {"requirement.residual": 1e-9, "requirement.settling_time": 39.0, "requirement.fraction": 0.8}
     )
-    (judgement,) = judged_all(balancer_of(asked), [{}], first=8, most=8)
+    (judgement,) = judged_all(balancer_of(demanding), [{}], first=8, most=8)
     settled, residual = (judgement.fraction_of(each) for each in judgement.demands)
     assert settled.value > 0.5
     assert judgement.fraction == residual == Proportion(count=0, of=8)

@@ -119,7 +119,7 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
 
 
 def test_the_printed_jacobian_never_starts_from_zero() -> None:
-    """With chi in d/d mu an estimate of zero has no sensitivity, no gain, and stays zero."""
+    """Chi in d/d mu: an estimate of zero has no sensitivity, no gain, and stays zero."""
     printed = drive(arm=0.01, seed=1, stray=True)
     right = drive(arm=0.01, seed=1)
     assert printed["arm"] == 0.0
@@ -165,10 +165,10 @@ def test_the_printed_jacobian_is_that_of_a_mass_without_a_motor() -> None:
 def test_intervals_of_friction_arms_hold_the_arms_of_built_machines(name: str, time_limit: float) -> None:
     """Constants of motor and masses are in them; noise alone covers a quarter."""
     scene = at_constant_speed(bundled(name), time_limit=time_limit)
-    told, within, alone = StrategySettings.of(scene), [], []
+    settings, within, alone = StrategySettings.of(scene), [], []
     for number in range(40):
         plant = device(scene, number).scene
-        run = simulate_eccentric(plant, seed=run_noise(scene.run.seed, number), settings=told)
+        run = simulate_eccentric(plant, seed=run_noise(scene.run.seed, number), settings=settings)
         error = np.abs(run.history["friction_arm"][-1] - plant.masses.friction_arm)
         within += list(error <= run.friction_half_width)
         alone += list(error <= 1.96 * np.sqrt(run.history["friction_variance"][-1]))
@@ -182,8 +182,8 @@ def test_a_motor_that_is_off_moves_the_arms_by_what_the_drives_take_off_them() -
     stated = InputUncertainty(quantity="motor.torque_constant", half_width=0.05, relative=True)
     doubtful = replace(scene, uncertainty=(stated,))
     plant = changed(scene, {"motor.torque_constant": scene.motor.torque_constant * (1 + 0.05 / 1.96)})
-    told = StrategySettings.of(doubtful)
-    same, off = (simulate_eccentric(each, settings=told) for each in (doubtful, plant))
+    settings = StrategySettings.of(doubtful)
+    same, off = (simulate_eccentric(each, settings=settings) for each in (doubtful, plant))
     moved = np.abs(off.history["friction_arm"][-1] - same.history["friction_arm"][-1])
     doubt = same.memory["arm_doubt"]
     np.testing.assert_allclose(moved, doubt, rtol=0.15, atol=2e-5)

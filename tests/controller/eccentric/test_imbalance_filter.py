@@ -49,11 +49,11 @@ def whirl_generator(*, model: WhirlModel, angular_velocity: float) -> FloatArray
     mass, damping, stiffness = model
     w = angular_velocity
     spring, cross = w * w - stiffness / mass, damping * w / mass
-    found = np.zeros((6, 6))
-    found[0, 2] = found[1, 3] = 1.0
-    found[2] = [spring, cross, -damping / mass, 2 * w, w * w / mass, 0.0]
-    found[3] = [-cross, spring, -2 * w, -damping / mass, 0.0, w * w / mass]
-    return found
+    generator = np.zeros((6, 6))
+    generator[0, 2] = generator[1, 3] = 1.0
+    generator[2] = [spring, cross, -damping / mass, 2 * w, w * w / mass, 0.0]
+    generator[3] = [-cross, spring, -2 * w, -damping / mass, 0.0, w * w / mass]
+    return generator
 
 
 def dynamic_stiffness(*, model: WhirlModel, angular_velocity: float) -> complex:
@@ -101,12 +101,12 @@ def test_transition_is_the_matrix_exponential(model: WhirlModel, speed: float, s
 def test_generator_is_the_whirls_equation() -> None:
     """In the fixed frame a free whirl is a plain oscillator: roots s of M s^2 + C s + K, seen at s - j W."""
     roots = np.roots([MODEL.mass, MODEL.damping, MODEL.stiffness]) - 1j * SPEED
-    found = np.linalg.eigvals(whirl_generator(model=MODEL, angular_velocity=SPEED)[:4, :4])
+    eigenvalues = np.linalg.eigvals(whirl_generator(model=MODEL, angular_velocity=SPEED)[:4, :4])
     for value in (*roots, *roots.conj()):
-        assert np.min(np.abs(found - value)) < 1e-10
+        assert np.min(np.abs(eigenvalues - value)) < 1e-10
     steady = SPEED**2 * complex(*TRUE) / dynamic_stiffness(model=MODEL, angular_velocity=SPEED)
-    whole = np.array([steady.real, steady.imag, 0, 0, *TRUE])
-    np.testing.assert_allclose(whirl_transition(MODEL, SPEED, 0.7) @ whole, whole, atol=1e-14)
+    state = np.array([steady.real, steady.imag, 0, 0, *TRUE])
+    np.testing.assert_allclose(whirl_transition(MODEL, SPEED, 0.7) @ state, state, atol=1e-14)
 
 
 def test_process_covariance_is_van_loans() -> None:
@@ -115,8 +115,8 @@ def test_process_covariance_is_van_loans() -> None:
     block = expm(np.block([[-generator, power], [np.zeros((6, 6)), generator.T]]) * 0.02)
     expected = block[6:, 6:].T @ block[:6, 6:]
     settings = SETTINGS._replace(acceleration_noise=1e-3, imbalance_noise=1e-8, step=0.02)
-    found = matrix(begun(settings), "process")
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-16)
+    process = matrix(begun(settings), "process")
+    np.testing.assert_allclose(process, expected, rtol=1e-10, atol=1e-16)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -161,10 +161,10 @@ def test_last_estimate_is_the_batch_least_squares_solution() -> None:
         power = transition @ power
         rows.append(observation @ power / np.sqrt(VARIANCE)[:, None])
         sides.append(sample / np.sqrt(VARIANCE))
-    whole = np.vstack(rows)
-    first = np.linalg.lstsq(whole, np.concatenate(sides), rcond=None)[0]
+    weighted = np.vstack(rows)
+    first = np.linalg.lstsq(weighted, np.concatenate(sides), rcond=None)[0]
     np.testing.assert_allclose(states[-1], power @ first, rtol=1e-8, atol=1e-11)
-    spread = power @ np.linalg.inv(whole.T @ whole) @ power.T
+    spread = power @ np.linalg.inv(weighted.T @ weighted) @ power.T
     np.testing.assert_allclose(covariances[-1], spread, rtol=1e-7, atol=1e-16)
 
 
@@ -174,8 +174,8 @@ def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
     runs, nees, settings = 60, [], SETTINGS._replace(laboratory=laboratory)
     for seed in range(runs):
         states, samples = record(steps=150, seed=seed, settings=settings, prior=True)
-        found, covariances = imbalance_history(begun(settings), samples=samples, variance=VARIANCE)
-        error = states[-1] - found[-1]
+        estimates, covariances = imbalance_history(begun(settings), samples=samples, variance=VARIANCE)
+        error = states[-1] - estimates[-1]
         nees.append(error @ np.linalg.solve(covariances[-1], error))
     # Chi-squared of 6 degrees of freedom: standard deviation sqrt(12/60) of the mean; 4 of them.
     assert np.mean(nees) == pytest.approx(6.0, abs=4 * math.sqrt(12 / runs))
@@ -200,24 +200,24 @@ def test_both_frames_know_the_imbalance() -> None:
     outside = np.column_stack([z.real, z.imag, seen.real, seen.imag])
     for laboratory, samples in ((False, states[:, :4] + noise), (True, outside + noise)):
         estimate = begun(SETTINGS._replace(laboratory=laboratory))
-        found, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
-        error = np.hypot(*(found[-1, 4:] - TRUE))
+        estimates, covariances = imbalance_history(estimate, samples=samples, variance=VARIANCE)
+        error = np.hypot(*(estimates[-1, 4:] - TRUE))
         assert error < 4 * imbalance_deviation(covariances[-1])
         assert error < 2e-3 * np.hypot(*TRUE)
 
 
 def test_masses_that_are_not_opposite_are_taken_out() -> None:
-    place, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
-    own, estimate = np.array([place.real, place.imag]), begun(QUIET)
-    state, samples = np.concatenate([np.zeros(4), TRUE + own]), []
+    vector, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
+    masses, estimate = np.array([vector.real, vector.imag]), begun(QUIET)
+    state, samples = np.concatenate([np.zeros(4), TRUE + masses]), []
     for _ in range(3000):
         state = matrix(estimate, "transition") @ state
         samples.append(state[:4].copy())
-    for given, expected in ((place, TRUE), (0.0j, TRUE + own)):
-        found, _ = imbalance_history(
-            estimate, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(given)
+    for assumed, expected in ((vector, TRUE), (0.0j, TRUE + masses)):
+        estimates, _ = imbalance_history(
+            estimate, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(assumed)
         )
-        np.testing.assert_allclose(found[-1, 4:], expected, rtol=1e-3)
+        np.testing.assert_allclose(estimates[-1, 4:], expected, rtol=1e-3)
 
 
 def test_moving_masses_are_taken_out() -> None:
@@ -225,14 +225,14 @@ def test_moving_masses_are_taken_out() -> None:
     moment, theta = 0.0414, complex(*TRUE)
 
     def angles(time: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        place = (0.3 + 0.2 * math.sin(3 * time), 3.0 - 0.4 * time)
-        return place, (0.6 * math.cos(3 * time), -0.4)
+        angle = (0.3 + 0.2 * math.sin(3 * time), 3.0 - 0.4 * time)
+        return angle, (0.6 * math.cos(3 * time), -0.4)
 
     def slope(time: float, q: np.ndarray) -> list[complex]:
-        place, rate = angles(time)
+        angle, rate = angles(time)
         force = SPEED**2 * theta * np.exp(1j * SPEED * time)
         for i, angular in enumerate((-1.8 * math.sin(3 * time), 0.0)):
-            force += moment * ((SPEED + rate[i]) ** 2 - 1j * angular) * np.exp(1j * (SPEED * time + place[i]))
+            force += moment * ((SPEED + rate[i]) ** 2 - 1j * angular) * np.exp(1j * (SPEED * time + angle[i]))
         return [q[1], (force - MODEL.damping * q[1] - MODEL.stiffness * q[0]) / MODEL.mass]
 
     time = STEP * np.arange(3001)
@@ -275,8 +275,8 @@ def test_the_printed_observation_lets_the_imbalance_into_the_velocity() -> None:
     right, printed = begun(), begun()
     printed["observation"][0, 3, 4:] = 1.0
     for estimate, good in ((right, True), (printed, False)):
-        found, _ = imbalance_history(estimate, samples=samples, variance=VARIANCE)
-        error = np.hypot(*(found[-1, 4:] - TRUE)) / np.hypot(*TRUE)
+        estimates, _ = imbalance_history(estimate, samples=samples, variance=VARIANCE)
+        error = np.hypot(*(estimates[-1, 4:] - TRUE)) / np.hypot(*TRUE)
         assert (error < 0.01) == good
 
 

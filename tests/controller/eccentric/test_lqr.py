@@ -33,8 +33,8 @@ def riccati_gain(track: TrackModel, weight: float, inputs: float) -> FloatArray:
 @pytest.mark.parametrize("track", TRACKS)
 @pytest.mark.parametrize("weight", [0.5, 3.5, 40.0])
 def test_gain_is_that_of_the_riccati_equation(track: TrackModel, weight: float) -> None:
-    found = lqr_gain(track, state_weight=weight, input_weight=2.0)
-    np.testing.assert_allclose(found, riccati_gain(track, weight, 2.0), rtol=1e-9)
+    gain = lqr_gain(track, state_weight=weight, input_weight=2.0)
+    np.testing.assert_allclose(gain, riccati_gain(track, weight, 2.0), rtol=1e-9)
 
 
 def test_the_back_emf_printed_without_its_sign_is_another_plant() -> None:
@@ -59,13 +59,13 @@ def held(scene: EccentricScene, position: float, rate: float, *, helped: bool) -
     The drive law adds the load of the rotor under the accelerations it wants when `helped`.
     """
     plant = PlantParameters.of(scene)
-    total, given = plant.inertia + plant.drive_inertia, plant.moment**2 / plant.mass
-    mass = np.array([[total - given, given], [given, total - given]])
-    whole = np.zeros((6, 6))
-    whole[:2, 2:4] = np.eye(2)
-    whole[2:4, 2:4] = -plant.drive_damping * np.linalg.inv(mass)
-    whole[2:4, 4:] = np.linalg.inv(mass)
-    power = expm(whole * scene.lqr.step)
+    total, lever = plant.inertia + plant.drive_inertia, plant.moment**2 / plant.mass
+    mass = np.array([[total - lever, lever], [lever, total - lever]])
+    system = np.zeros((6, 6))
+    system[:2, 2:4] = np.eye(2)
+    system[2:4, 2:4] = -plant.drive_damping * np.linalg.inv(mass)
+    system[2:4, 4:] = np.linalg.inv(mass)
+    power = expm(system * scene.lqr.step)
     apart = np.array([[0.5, -0.5], [-0.5, 0.5]]) if helped else np.eye(2)
     law = np.hstack([position * apart, rate * np.eye(2)])
     if helped:
@@ -81,8 +81,8 @@ def test_sampled_poles_are_those_of_both_masses_on_their_rotor(scene: EccentricS
     both = held(scene, position, rate, helped=False)
     for pole in gains.regulator.poles:
         assert np.min(np.abs(both - pole)) < 1e-9
-    told = scene.friction_filter
-    pair, speed = 2 * plant.drive_gain * told.pair_gain, plant.drive_gain * told.speed_gain
+    keys = scene.friction_filter
+    pair, speed = 2 * plant.drive_gain * keys.pair_gain, plant.drive_gain * keys.speed_gain
     both = held(scene, pair, speed, helped=True)
     for pole in gains.pair.poles:
         assert np.min(np.abs(both - pole)) < 1e-9

@@ -20,17 +20,17 @@ from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 def test_a_run_that_ends_too_early_advises_more_time() -> None:
     short = bundled("driven_masses_small").with_values({"run.time_limit": "3 s"})
-    found = balancer_of(short).remedies()
-    assert "run.time_limit" in found[0].changes
-    short.with_values(found[0].changes)
+    remedies = balancer_of(short).remedies()
+    assert "run.time_limit" in remedies[0].changes
+    short.with_values(remedies[0].changes)
 
 
 def test_masses_too_light_are_made_heavy_enough() -> None:
     """7 g cancel 700 of 926 g mm; the remedy, applied and run on devices that did not size it, settles."""
     light = bundled("driven_masses_small").with_values({"masses.mass": "7 g", "run.time_limit": "12 s"})
-    found = balancer_of(light).remedies()
-    assert {"mass", "guide_radius"} <= {each.code for each in found}
-    mended = balancer_of(light.with_values(found[0].changes))
+    remedies = balancer_of(light).remedies()
+    assert {"mass", "guide_radius"} <= {each.code for each in remedies}
+    mended = balancer_of(light.with_values(remedies[0].changes))
     assert mended.run({}, Draws.block(1 << 22, 3)).settled.all()
 
 
@@ -54,24 +54,24 @@ def settling(scene: EccentricScene, count: int, *, within: float = 1e9) -> int:
 def test_encoders_that_are_too_noisy_are_offered_with_a_twentieth(paper: EccentricScene) -> None:
     """Half and a quarter of the noise serve none; a limit above the 10.7 mm before balancing is no remedy."""
     noisy = changed(paper, {"sensor.encoder_noise": math.radians(3), "sensor.encoder_rate_noise": 0.5})
-    found = balancer_of(noisy).remedies()
+    remedies = balancer_of(noisy).remedies()
     factors = [
-        each.changes["sensor.encoder_noise"] / math.radians(3) for each in found if "encoder" in each.code
+        each.changes["sensor.encoder_noise"] / math.radians(3) for each in remedies if "encoder" in each.code
     ]
     assert factors == pytest.approx([0.5, 0.25, 0.05])
-    served = [settling(changed(noisy, each.changes), 4) for each in found if each.code.endswith("encoder")]
+    served = [settling(changed(noisy, each.changes), 4) for each in remedies if each.code.endswith("encoder")]
     assert served == [0, 0, 4]
-    assert "limit" not in {each.code for each in found}
+    assert "limit" not in {each.code for each in remedies}
 
 
 def test_the_wait_is_shortened_where_devices_settle_too_late(paper: EccentricScene) -> None:
     late = changed(paper, {"requirement.settling_time": 10.0})
-    found = [each.changes for each in balancer_of(late).remedies()]
-    assert [each["fine_tuning.wait"] for each in found] == pytest.approx(
+    remedies = [each.changes for each in balancer_of(late).remedies()]
+    assert [each["fine_tuning.wait"] for each in remedies] == pytest.approx(
         [factor * paper.fine_tuning.wait for factor in (0.5, 0.25, 0.125)]
     )
     before = settling(late, 16, within=10.0)
-    after = settling(with_values_at(late, found[2]), 16, within=10.0)
+    after = settling(with_values_at(late, remedies[2]), 16, within=10.0)
     assert before <= 6
     assert after >= 12
     assert balancer_of(paper).remedies() == ()
@@ -99,7 +99,7 @@ def weak(scene: EccentricScene) -> EccentricScene:
 
 
 def test_more_time_is_not_advised_to_an_unstable_loop(paper: EccentricScene) -> None:
-    """What is said instead, applied, settles."""
+    """Runs with the stated change settle."""
     gain = 3 * RecommendedGains.of(paper).speed.recommended
     shaking = changed(paper, {"friction_filter.speed_gain": gain, "motor.maximum_voltage": 24.0})
     run = simulate_eccentric(shaking)
@@ -126,12 +126,12 @@ def test_what_is_advised_to_masses_that_turn_settles(paper: EccentricScene) -> N
 
 
 def test_a_residue_that_the_speed_magnifies_is_named_as_that() -> None:
-    """Of a rotor that the filter knows exactly; what is advised settles."""
-    whole = bundled("eccentric_mass_paper")
-    slow, *_ = whole.rotor.speed_profile
+    """The filter knows the rotor exactly; the advised change settles."""
+    paper = bundled("eccentric_mass_paper")
+    slow, *_ = paper.rotor.speed_profile
     slow = replace(slow, speed=34.6 * RPM)
     up = SpeedPoint(time=250.0, speed=230 * RPM)
-    low = changed(whole, {"rotor.speed_profile": (slow, replace(slow, time=120.0), up)})
+    low = changed(paper, {"rotor.speed_profile": (slow, replace(slow, time=120.0), up)})
     run = simulate_eccentric(low)
     assert (run.outcome, run.ended.code) == ("rises_again", "masses_rises_by_speed")
     nearer = (replace(slow, speed=100 * RPM), SpeedPoint(time=120.0, speed=100 * RPM), up)
@@ -142,8 +142,8 @@ def test_a_residue_that_the_speed_magnifies_is_named_as_that() -> None:
     }
     for advised in ({"rotor.speed_profile": nearer}, quieter):
         assert simulate_eccentric(changed(low, advised)).settled
-    loose = {"imbalance_filter.assumed_stiffness": 1.02 * whole.rotor.stiffness, "supervisor.limit": 1e-3}
-    trials = changed(whole, {**loose, "supervisor.correction": "trials"})
+    loose = {"imbalance_filter.assumed_stiffness": 1.02 * paper.rotor.stiffness, "supervisor.limit": 1e-3}
+    trials = changed(paper, {**loose, "supervisor.correction": "trials"})
     run = simulate_eccentric(trials)
     assert (run.outcome, run.ended.code) == ("rises_again", "masses_rises_by_trials")
     advice = sentences()[run.ended.code].change

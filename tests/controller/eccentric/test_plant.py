@@ -43,23 +43,23 @@ def fixed_frame_rates(
     J being its Jacobian with respect to (X, Y, phi_1, phi_2).  Friction acts as on masses that move forwards.
     """
     body, mass = scene.rotor, scene.masses
-    whole = np.diag([body.mass - scene.imbalance.mass] * 2 + [0.0, 0.0])
+    masses = np.diag([body.mass - scene.imbalance.mass] * 2 + [0.0, 0.0])
     motor = scene.motor
     ratio, drag = 40.0, motor.torque_constant * motor.back_emf_constant / motor.resistance
     reflected = (motor.motor_inertia + motor.gear_inertia / 16) * ratio**2
 
     def point(
-        matrix: FloatArray, force: FloatArray, m: float, r: float, angle: float, own: int, w: float
+        matrix: FloatArray, force: FloatArray, m: float, r: float, angle: float, column: int, w: float
     ) -> None:
         turning = start_speed(w)
         out = np.array([math.cos(angle), math.sin(angle)])
-        along = np.array([-out[1], out[0]])
+        tangent = np.array([-out[1], out[0]])
         jacobian = np.zeros((2, 4))
         jacobian[0, 0] = jacobian[1, 1] = 1.0
-        if own:
-            jacobian[:, own] = r * along
+        if column:
+            jacobian[:, column] = r * tangent
         matrix += m * jacobian.T @ jacobian
-        force -= m * jacobian.T @ (r * along * rate - r * out * turning**2)
+        force -= m * jacobian.T @ (r * tangent * rate - r * out * turning**2)
 
     speed = [start]
 
@@ -69,7 +69,7 @@ def fixed_frame_rates(
     def rates(time: float, q: FloatArray, voltage: FloatArray) -> FloatArray:
         speed[0] = start + rate * time
         theta = start * time + rate * time**2 / 2
-        matrix, force = whole.copy(), np.zeros(4)
+        matrix, force = masses.copy(), np.zeros(4)
         imbalance = scene.imbalance
         point(matrix, force, imbalance.mass, imbalance.radius, theta + imbalance.phase, 0, 0.0)
         for i in range(2):
@@ -96,24 +96,24 @@ def test_against_the_fixed_frame(
     """Moving masses under a speed ramp, from rest: 1e-9 m after 5 s, where gyroscopic faults would show."""
     step, pieces = 1e-3, 5
     voltages = np.array([[4.0, 3.0], [5.0, 2.5], [2.5, 4.5], [4.0, 4.0], [3.0, 5.0]])
-    given = parameters._replace(friction_arm=(arms[0], arms[1]))
+    plant = parameters._replace(friction_arm=(arms[0], arms[1]))
     times, speeds = np.array([0.0, 10.0]), np.array([start, start + 10 * rate])
     commands = np.repeat(voltages, 1000, axis=0)
-    states, _ = run_steps(given, times, speeds, rest_state(ANGLES), stuck_flags(SLIDING), commands, step)
+    states, _ = run_steps(plant, times, speeds, rest_state(ANGLES), stuck_flags(SLIDING), commands, step)
     rates = fixed_frame_rates(paper, start, rate, arms)
     q = np.array([0.0, 0.0, *ANGLES, 0.0, 0.0, 0.0, 0.0])
     largest = 0.0
     for piece in range(pieces):
-        found = solve_ivp(
+        solution = solve_ivp(
             rates, (piece, piece + 1), q, method="DOP853", rtol=3e-13, atol=1e-14, args=(voltages[piece],)
         )
-        assert np.all(found.y[6:] >= 0), "the reference's friction is that of masses that move forwards"
-        q = found.y[:, -1]
+        assert np.all(solution.y[6:] >= 0), "the reference's friction is that of masses that move forwards"
+        q = solution.y[:, -1]
         theta = start * (piece + 1) + rate * (piece + 1) ** 2 / 2
-        here = states[1000 * (piece + 1)]
-        seen = complex(here[0], here[1]) * cmath.exp(1j * theta)
+        state = states[1000 * (piece + 1)]
+        seen = complex(state[0], state[1]) * cmath.exp(1j * theta)
         assert abs(seen - complex(q[0], q[1])) < 1e-9
-        assert np.abs(here[4:6] - q[2:4]).max() < 1e-9
+        assert np.abs(state[4:6] - q[2:4]).max() < 1e-9
         largest = max(largest, abs(seen))
     assert largest > 1e-3
 
@@ -132,8 +132,8 @@ def test_steady_whirl(rpm: float, parameters: PlantParameters) -> None:
         1e-2,
     )
     expected = parameters.steady_whirl(speed, ANGLES)
-    found = complex(states[-1, 0], states[-1, 1])
-    assert abs(found - expected) < 1e-9 * abs(expected)
+    whirl = complex(states[-1, 0], states[-1, 1])
+    assert abs(whirl - expected) < 1e-9 * abs(expected)
 
 
 def test_influence_is_the_textbook_response(parameters: PlantParameters) -> None:
@@ -157,11 +157,9 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
         state[6:] = [1.0, -0.5]
         work, trial = np.empty((7, 8)), np.empty(8)
         from_plant = drive_of(smooth, np.array([1.0, -2.0]), 3.0)
-        for place in range(count):
+        for i in range(count):
             stuck = stuck_flags(SLIDING)
-            integration._advance(
-                smooth, state, stuck, 12.0 + 3.0 * place * step, from_plant, step, work, trial
-            )
+            integration._advance(smooth, state, stuck, 12.0 + 3.0 * i * step, from_plant, step, work, trial)
         return state
 
     steps = np.array([1 / 80, 1 / 160, 1 / 320])

@@ -1,4 +1,4 @@
-"""What following the paper's printed equations of the plant would do, one test for each doubt in the docs."""
+"""Consequences of the paper's printed equations of the plant, one test for each doubt in the docs."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_diagonal_c11_takes_the_free_whirl_away(parameters: PlantParameters) -
 
 
 def balanced_angles(parameters: PlantParameters, error: float) -> tuple[float, float]:
-    """Where both masses undo the imbalance, each moved by an error in the opposite sense."""
+    """Angles of both masses that undo the imbalance, each moved by an error in the opposite sense."""
     half = math.acos(-parameters.unbalance / (2 * parameters.moment)) + error
     return parameters.phase + half, parameters.phase - half
 

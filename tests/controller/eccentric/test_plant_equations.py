@@ -24,8 +24,8 @@ def fixed(vector: sp.Matrix) -> sp.Matrix:
     return sp.Matrix([[sp.cos(THETA), -sp.sin(THETA)], [sp.sin(THETA), sp.cos(THETA)]]) * vector
 
 
-def kinetic(mass: sp.Expr, place: sp.Matrix) -> sp.Expr:
-    velocity = fixed(place).diff(T)
+def kinetic(mass: sp.Expr, position: sp.Matrix) -> sp.Expr:
+    velocity = fixed(position).diff(T)
     return mass * velocity.dot(velocity) / 2
 
 

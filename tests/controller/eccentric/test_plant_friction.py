@@ -70,12 +70,12 @@ def test_a_sliding_mass_decays_as_the_exact_solution(fixed_rotor: PlantParameter
     stop = (speed + start - speed) / (gain * (speed + start) * speed)
     states, stuck = steps(fixed_rotor, state, speed, np.zeros((4000, 2)))
     time = np.arange(4001) * 1e-3
-    whole = speed + start
+    first = speed + start
     moving = time < stop
     assert 0.5 < stop < 3.9
-    expected = whole / (1 + gain * whole * time[moving]) - speed
+    expected = first / (1 + gain * first * time[moving]) - speed
     np.testing.assert_allclose(states[moving, 6], expected, rtol=1e-9, atol=1e-10)
-    angle = np.log1p(gain * whole * stop) / gain - speed * stop
+    angle = np.log1p(gain * first * stop) / gain - speed * stop
     np.testing.assert_allclose(states[-1, 4], angle, rtol=1e-10)
     assert np.all(states[~moving, 6:] == 0.0)
     assert np.all(stuck[np.flatnonzero(~moving)[1:]] == STUCK)
@@ -107,11 +107,11 @@ def test_the_run_up_itself_breaks_a_mass_loose(fixed_rotor: PlantParameters) -> 
     state, stuck = rest_state((0.0, 2.0)), stuck_flags(STUCK)
     threshold = math.sqrt(fixed_rotor.inertia * rate / (arm * fixed_rotor.moment))
     below, held = plant_step(fixed_rotor, state, stuck, OFF, 0.9 * threshold, rate, 1e-3)
-    above, kept = plant_step(fixed_rotor, state, stuck, OFF, 1.001 * threshold, rate, 1e-3)
+    above, stays = plant_step(fixed_rotor, state, stuck, OFF, 1.001 * threshold, rate, 1e-3)
     assert below[6] < 0
     assert held[0] == SLIDING
     assert above[6] == 0
-    assert kept[0] == STUCK
+    assert stays[0] == STUCK
     # Break-away within a step, when the rotor slows down: the time is that of |W'| J = mu b W^2.
     slowing, _ = plant_step(fixed_rotor, state, stuck, OFF, threshold * 1.01, -rate, 0.02 * threshold / rate)
     left = 0.01 * threshold / rate
@@ -153,10 +153,10 @@ def test_a_locked_mass_is_held_by_more_than_friction(parameters: PlantParameters
     state = rest_state((0.0, 2.0))
     state[6] = 1.0
     flags = np.array([LOCKED, SLIDING])
-    after, kept = plant_step(parameters, state, flags, np.array([1e3, 0.0]), 10.0, 5.0, 1e-3)
+    after, flags_after = plant_step(parameters, state, flags, np.array([1e3, 0.0]), 10.0, 5.0, 1e-3)
     assert after[6] == 0.0
     assert after[4] == 0.0
-    assert kept[0] == LOCKED
+    assert flags_after[0] == LOCKED
     assert np.array_equal(flags, [LOCKED, SLIDING])
 
 
@@ -196,8 +196,8 @@ def energy_of(parameters: PlantParameters, state: FloatArray, speed: float) -> f
     kinetic = (parameters.mass - 2 * parameters.moment**2 / parameters.inertia) * abs(hub) ** 2 / 2
     for mass in range(2):
         radius = parameters.inertia / parameters.moment
-        along = 1j * radius * (speed + state[6 + mass]) * cmath.exp(1j * state[4 + mass])
-        kinetic += parameters.moment**2 / parameters.inertia * abs(hub + along) ** 2 / 2
+        tangential = 1j * radius * (speed + state[6 + mass]) * cmath.exp(1j * state[4 + mass])
+        kinetic += parameters.moment**2 / parameters.inertia * abs(hub + tangential) ** 2 / 2
         kinetic += parameters.drive_inertia * state[6 + mass] ** 2 / 2
     return kinetic + parameters.stiffness * abs(z) ** 2 / 2
 
@@ -239,8 +239,8 @@ def test_the_motion_from_rest_is_the_one_that_the_law_allows(
     driving: tuple[float, float], friction: tuple[float, float], cross: float
 ) -> None:
     torques = _Torques(1.0, cross, driving, friction)
-    found = motions(torques, rest_state((0.0, 1.0)), stuck_flags(STUCK))
-    accelerations = angular_accelerations(torques, found)
+    motion = motions(torques, rest_state((0.0, 1.0)), stuck_flags(STUCK))
+    accelerations = angular_accelerations(torques, motion)
     # At the bound of the torque two motions are the same: what counts is the acceleration.
     for allowed in consistent_motions(torques):
         assert angular_accelerations(torques, allowed) == pytest.approx(accelerations, abs=1e-9)
@@ -256,8 +256,8 @@ def carried(
         write_derivative(parameters, now, speed, drive, (HELD, HELD), out)
         return out
 
-    found = solve_ivp(rates, (0.0, time), state, method="DOP853", rtol=1e-12, atol=1e-16)
-    return np.asarray(found.y[:, -1])
+    solution = solve_ivp(rates, (0.0, time), state, method="DOP853", rtol=1e-12, atol=1e-16)
+    return np.asarray(solution.y[:, -1])
 
 
 @pytest.mark.parametrize("damping", [0.0, 20.0, 3000.0])

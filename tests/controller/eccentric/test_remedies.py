@@ -1,4 +1,4 @@
-"""What a run's filters claim, and whether remedies of a failed run mend it."""
+"""Claims of a run's filters, and remedies that mend a failed run."""
 
 from __future__ import annotations
 
@@ -148,10 +148,10 @@ def failing(scene: EccentricScene) -> dict[str, EccentricScene]:
 )
 def test_a_remedy_by_how_a_run_ends_mends_it(scene: EccentricScene, outcome: str) -> None:
     broken = failing(scene)[outcome]
-    own = balancer_of(broken).run({}, AS_GIVEN)
-    assert own.ended == (outcome,)
+    outcomes = balancer_of(broken).run({}, AS_GIVEN)
+    assert outcomes.ended == (outcome,)
     imbalance = broken.imbalance.mass * broken.imbalance.radius / reach_of(broken)
-    remedies = remedies_of(broken, own, own, [imbalance])
+    remedies = remedies_of(broken, outcomes, outcomes, [imbalance])
     ends = {simulate_eccentric(with_values_at(broken, each.changes)).outcome for each in remedies}
     assert ends - {outcome}
 

@@ -49,13 +49,13 @@ def ellipse(scene: EccentricScene, number: int) -> tuple[float, float]:
     """Squared error of a drawn plant's imbalance over the stated covariance, with the rotor and without."""
     plant = device(changed(scene, {"requirement.phase_range": 0.0}), number).scene
     run = simulate_eccentric(plant, seed=number, settings=StrategySettings.of(scene))
-    told = simulate_eccentric(scene).to_dict()["estimates"]
-    noise = np.asarray(told["imbalance_covariance"][-1])
+    estimates = simulate_eccentric(scene).to_dict()["estimates"]
+    noise = np.asarray(estimates["imbalance_covariance"][-1])
     error = run.history["imbalance"][-1] - true_imbalance(plant)
     # The scene's own imbalance is drawn as well; what is not known of the rotor is a share of it.
     share = PlantParameters.of(plant).unbalance / PlantParameters.of(scene).unbalance
-    whole = noise + share**2 * np.asarray(told["imbalance_rotor_covariance"])
-    return float(error @ np.linalg.solve(whole, error)), float(error @ np.linalg.solve(noise, error))
+    covariance = noise + share**2 * np.asarray(estimates["imbalance_rotor_covariance"])
+    return float(error @ np.linalg.solve(covariance, error)), float(error @ np.linalg.solve(noise, error))
 
 
 def estimating(name: str) -> EccentricScene:
@@ -65,10 +65,10 @@ def estimating(name: str) -> EccentricScene:
 @pytest.mark.parametrize("name", ["washing_machine", "eccentric_mass_paper"])
 def test_the_imbalances_interval_holds_what_is_not_known_of_the_rotor(name: str) -> None:
     """Stated for 95 %; the ellipses of the noise alone hold next to none."""
-    found = [ellipse(estimating(name), number) for number in range(6)]
+    errors = [ellipse(estimating(name), number) for number in range(6)]
     bound = chi2.ppf(0.95, 2)
-    assert sum(whole < bound for whole, _ in found) >= 4
-    assert sum(noise < bound for _, noise in found) <= 2
+    assert sum(both < bound for both, _ in errors) >= 4
+    assert sum(noise < bound for _, noise in errors) <= 2
 
 
 @pytest.mark.heavy
@@ -81,12 +81,16 @@ def test_95_per_cent_of_built_machines_lie_in_the_ellipse(name: str) -> None:
 
 def test_half_widths_are_in_the_document() -> None:
     scene = estimating("washing_machine")
-    told = simulate_eccentric(scene).to_dict()["estimates"]
-    whole = np.asarray(told["imbalance_covariance"][-1]) + np.asarray(told["imbalance_rotor_covariance"])
-    np.testing.assert_allclose(told["imbalance_half_width_kg_m"], 1.96 * np.sqrt(np.diag(whole)), rtol=1e-4)
+    estimates = simulate_eccentric(scene).to_dict()["estimates"]
+    covariance = np.asarray(estimates["imbalance_covariance"][-1]) + np.asarray(
+        estimates["imbalance_rotor_covariance"]
+    )
+    np.testing.assert_allclose(
+        estimates["imbalance_half_width_kg_m"], 1.96 * np.sqrt(np.diag(covariance)), rtol=1e-4
+    )
     # Stiffness known to 3 %, mass to 2 %, damping to 20 %: one to six per cent of the imbalance.
     size = PlantParameters.of(scene).unbalance
-    assert 0.01 * size < np.max(told["imbalance_half_width_kg_m"]) < 0.06 * size
+    assert 0.01 * size < np.max(estimates["imbalance_half_width_kg_m"]) < 0.06 * size
     certain = simulate_eccentric(replace(scene, uncertainty=())).to_dict()["estimates"]
     assert np.all(np.asarray(certain["imbalance_rotor_covariance"]) == 0)
 
@@ -104,7 +108,7 @@ def test_a_held_regulator_is_stable_for_a_step_that_goes_with_its_fastest_pole(w
 
 @pytest.mark.parametrize("gain", [200.0, 2e4, 5e5])
 def test_the_longest_hold_is_that_of_the_fastest_pole(gain: float) -> None:
-    """With B_add gamma in place of C_add the rate's pole is -(C_add + B_add gamma)/J: twice the gain is
+    """The rate's pole, with B_add gamma in place of C_add, is -(C_add + B_add gamma)/J: twice the gain is
     stable for holds up to 2/|pole|, less what the rotor gives way."""
     scene = changed(
         bundled("eccentric_mass_paper"),

@@ -55,7 +55,7 @@ def test_a_table_of_samples_divides_the_run_into_stages_once(
 
 
 def unbalance_left(run: EccentricRun, plant: PlantParameters) -> float:
-    """That of rotor and masses together at the end, kg m."""
+    """Unbalance of rotor and masses together at the end, kg m."""
     speed = float(run.speed[-1])
     return abs(plant.steady_whirl(speed, run.mass_angle[:, -1].tolist()) / plant.influence(speed))
 
@@ -74,10 +74,10 @@ def test_a_seed_gives_the_same_bits(run: EccentricRun, scene: EccentricScene) ->
 
 
 def test_progress_is_reported(scene: EccentricScene) -> None:
-    told: list[tuple[float, float]] = []
-    simulate_eccentric(changed(scene, {"run.time_limit": 12.0}), progress=lambda *a: told.append(a))
-    times = [time for time, _ in told]
-    assert {limit for _, limit in told} == {12.0}
+    reports: list[tuple[float, float]] = []
+    simulate_eccentric(changed(scene, {"run.time_limit": 12.0}), progress=lambda *a: reports.append(a))
+    times = [time for time, _ in reports]
+    assert {limit for _, limit in reports} == {12.0}
     assert times == sorted(times)
     assert times[-1] == pytest.approx(12.0, abs=2e-3)
 
@@ -102,33 +102,33 @@ def test_a_step_is_repeatable_and_a_sample_that_is_not_a_number_is_passed_over(
 
 @pytest.mark.parametrize("arms", [(0.0, 0.0), (0.004, 0.012), (0.0, 0.01)])
 def test_any_friction_is_mastered(scene: EccentricScene, arms: tuple[float, float]) -> None:
-    found = simulate_eccentric(changed(scene, {"masses.friction_arm": arms}))
-    assert found.settled
+    result = simulate_eccentric(changed(scene, {"masses.friction_arm": arms}))
+    assert result.settled
     slippery = min(arms) == 0
-    assert ("drives_stay_on" in {each.code for each in found.warned}) == slippery
+    assert ("drives_stay_on" in {each.code for each in result.warned}) == slippery
     # The pair stays opposite although its frictions differ: the rotor does not feel them go round.
-    friction = stage_of(found, "friction estimation")
-    during = (found.time >= friction.start + 0.2) & (found.time <= friction.end)
-    apart = found.mass_angle[1] - found.mass_angle[0] - math.pi
+    friction = stage_of(result, "friction estimation")
+    during = (result.time >= friction.start + 0.2) & (result.time <= friction.end)
+    apart = result.mass_angle[1] - result.mass_angle[0] - math.pi
     assert np.max(np.abs(apart[during])) < math.radians(1.5)
 
 
 def test_without_the_pair_loop_unequal_masses_part(scene: EccentricScene) -> None:
     slow = changed(scene, {"masses.friction_arm": (0.004, 0.012), "friction_filter.pair_gain": 0.0})
-    found = simulate_eccentric(slow)
-    friction = stage_of(found, "friction estimation")
-    during = (found.time >= friction.start) & (found.time <= friction.end)
-    apart = found.mass_angle[1] - found.mass_angle[0] - math.pi
+    result = simulate_eccentric(slow)
+    friction = stage_of(result, "friction estimation")
+    during = (result.time >= friction.start) & (result.time <= friction.end)
+    apart = result.mass_angle[1] - result.mass_angle[0] - math.pi
     assert np.max(np.abs(apart[during])) > math.radians(2)
 
 
 def test_a_saturated_rotor_keeps_what_two_masses_cannot_undo(scene: EccentricScene) -> None:
-    found = simulate_eccentric(changed(scene, {"imbalance.mass": 0.5}))
-    assert found.targets is not None
-    assert found.targets.saturated
+    result = simulate_eccentric(changed(scene, {"imbalance.mass": 0.5}))
+    assert result.targets is not None
+    assert result.targets.saturated
     parameters = PlantParameters.of(changed(scene, {"imbalance.mass": 0.5}))
-    left = unbalance_left(found, parameters)
-    assert left == pytest.approx(found.targets.residual, rel=0.01)
+    left = unbalance_left(result, parameters)
+    assert left == pytest.approx(result.targets.residual, rel=0.01)
 
 
 def test_a_drive_that_nearly_stalls_is_warned_of(scene: EccentricScene) -> None:
@@ -140,9 +140,9 @@ def test_a_drive_that_nearly_stalls_is_warned_of(scene: EccentricScene) -> None:
 
 
 def test_no_imbalance_is_no_trouble(scene: EccentricScene) -> None:
-    found = simulate_eccentric(changed(scene, {"imbalance.mass": 0.0}))
-    assert found.settled
-    assert found.residual_ratio is None
+    result = simulate_eccentric(changed(scene, {"imbalance.mass": 0.0}))
+    assert result.settled
+    assert result.residual_ratio is None
 
 
 @pytest.mark.parametrize("speed", [-100.0, 60.0, 130.0, 300.0])
@@ -156,17 +156,17 @@ def test_any_sensor_and_any_start_will_do(scene: EccentricScene) -> None:
 
 
 def test_the_washing_machine_settles() -> None:
-    found = settles(bundled("washing_machine"), 5e-3)
-    np.testing.assert_allclose(found.history["friction_arm"][-1], [0.004, 0.006], rtol=0.05)
+    result = settles(bundled("washing_machine"), 5e-3)
+    np.testing.assert_allclose(result.history["friction_arm"][-1], [0.004, 0.006], rtol=0.05)
 
 
 def settles(scene: EccentricScene, share: float) -> EccentricRun:
     """A run that leaves at most a share of the vibration without balancing."""
-    found = simulate_eccentric(scene)
-    assert found.settled
-    assert found.residual_ratio is not None
-    assert found.residual_ratio < share
-    return found
+    result = simulate_eccentric(scene)
+    assert result.settled
+    assert result.residual_ratio is not None
+    assert result.residual_ratio < share
+    return result
 
 
 def test_a_run_that_ends_early_tells_why_it_would_have_failed(scene: EccentricScene) -> None:

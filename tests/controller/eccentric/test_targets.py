@@ -29,25 +29,25 @@ ANGLES = st.floats(-10, 10)
 
 
 def residual(imbalance: float, phase: float, first: float, second: float) -> float:
-    own = MOMENT * (cmath.exp(1j * first) + cmath.exp(1j * second))
-    return abs(imbalance * cmath.exp(1j * phase) + own)
+    masses = MOMENT * (cmath.exp(1j * first) + cmath.exp(1j * second))
+    return abs(imbalance * cmath.exp(1j * phase) + masses)
 
 
 @given(st.floats(0, 0.0823), ANGLES)
 def test_within_reach_nothing_is_left(imbalance: float, phase: float) -> None:
-    found = target_angles(imbalance, phase, MOMENT, GAP)
-    assert not found.saturated
-    assert residual(imbalance, phase, found.first, found.second) < 1e-15
-    assert found.residual == 0
+    result = target_angles(imbalance, phase, MOMENT, GAP)
+    assert not result.saturated
+    assert residual(imbalance, phase, result.first, result.second) < 1e-15
+    assert result.residual == 0
 
 
 @given(st.floats(0.083, 0.3), ANGLES)
 def test_beyond_reach_the_masses_lie_side_by_side(imbalance: float, phase: float) -> None:
-    found = target_angles(imbalance, phase, MOMENT, GAP)
-    assert found.saturated
-    apart = abs(wrapped(found.first - found.second))
+    result = target_angles(imbalance, phase, MOMENT, GAP)
+    assert result.saturated
+    apart = abs(wrapped(result.first - result.second))
     assert apart == pytest.approx(GAP, abs=1e-12)
-    assert found.residual == pytest.approx(residual(imbalance, phase, found.first, found.second), rel=1e-9)
+    assert result.residual == pytest.approx(residual(imbalance, phase, result.first, result.second), rel=1e-9)
 
 
 @pytest.mark.parametrize("imbalance", [0.01, 0.05, 0.0825, 0.12])
@@ -66,27 +66,29 @@ def test_travel_is_the_shortest_without_a_collision(
     first: float, lead: float, target: float, target_lead: float
 ) -> None:
     second, other = first + lead, target + target_lead
-    found = assign(first, second, target, other)
+    result = assign(first, second, target, other)
     least = math.inf
-    for goals, one, two in product(((target, other), (other, target)), range(-4, 5), range(-4, 5)):
-        travels = goals[0] - first + 2 * np.pi * one, goals[1] - second + 2 * np.pi * two
+    for goals, m, n in product(((target, other), (other, target)), range(-4, 5), range(-4, 5)):
+        travels = goals[0] - first + 2 * np.pi * m, goals[1] - second + 2 * np.pi * n
         after = lead + travels[1] - travels[0]
         if 0 < after < 2 * np.pi:
             least = min(least, travels[0] ** 2 + travels[1] ** 2)
-    assert found[0] ** 2 + found[1] ** 2 <= least + 1e-9
-    ends = np.exp(1j * np.array([first + found[0], second + found[1]]))
+    assert result[0] ** 2 + result[1] ** 2 <= least + 1e-9
+    ends = np.exp(1j * np.array([first + result[0], second + result[1]]))
     targets = np.exp(1j * np.array([target, other]))
     assert min(np.abs(ends - targets).max(), np.abs(ends - targets[::-1]).max()) < 1e-9
-    assert 0 < lead + found[1] - found[0] < 2 * np.pi
+    assert 0 < lead + result[1] - result[0] < 2 * np.pi
 
 
 def test_unwrapped_distances_send_the_masses_the_long_way() -> None:
     """Eq. 27 as printed: angles of 3.0 and -3.0 rad look six apart, though they are 0.28."""
-    first, second, one, two = 3.0, 0.0, -3.0, 0.1
-    printed = min((first - one) ** 2 + (second - two) ** 2, (second - one) ** 2 + (first - two) ** 2)
-    found = assign(first, second, one, two)
-    assert found[0] == pytest.approx(2 * math.pi - 6.0)
-    assert found[0] ** 2 + found[1] ** 2 < 0.02 * printed
+    first, second, target, other = 3.0, 0.0, -3.0, 0.1
+    printed = min(
+        (first - target) ** 2 + (second - other) ** 2, (second - target) ** 2 + (first - other) ** 2
+    )
+    result = assign(first, second, target, other)
+    assert result[0] == pytest.approx(2 * math.pi - 6.0)
+    assert result[0] ** 2 + result[1] ** 2 < 0.02 * printed
 
 
 def test_the_printed_arccos_adds_to_the_imbalance() -> None:
@@ -110,9 +112,9 @@ def vibration(first: float, second: float) -> float:
     return abs(cmath.exp(1j * first) + cmath.exp(1j * second) - wanted)
 
 
-def begun(place: tuple[float, float], objective: float, step: float) -> np.void:
+def begun(goal: tuple[float, float], objective: float, step: float) -> np.void:
     memory: np.void = np.zeros(1, dtype=MEMORY)[0]
-    memory["goal"], memory["objective"] = place, objective
+    memory["goal"], memory["objective"] = goal, objective
     begin_tuning(memory, step)
     return memory
 
@@ -130,26 +132,26 @@ def search(start: tuple[float, float], step: float, stop: float) -> tuple[np.voi
 @pytest.mark.parametrize("error", [(0.17, 0.17), (-0.17, 0.17), (0.1, 0.0), (-0.05, -0.12)])
 def test_it_ends_at_the_best_place(error: tuple[float, float]) -> None:
     stop = math.radians(0.1)
-    found, _ = search((BEST[0] + error[0], BEST[1] + error[1]), math.radians(4), stop)
-    assert math.dist(found["base"], BEST) < 2 * stop
-    assert found["least"] == vibration(*found["base"])
-    assert tuning_place(found) == tuple(found["base"])
+    result, _ = search((BEST[0] + error[0], BEST[1] + error[1]), math.radians(4), stop)
+    assert math.dist(result["base"], BEST) < 2 * stop
+    assert result["least"] == vibration(*result["base"])
+    assert tuning_place(result) == tuple(result["base"])
 
 
 def test_staying_is_kept_when_nothing_helps() -> None:
-    found, trials = search(BEST, 0.05, 0.01)
-    assert tuple(found["base"]) == BEST
+    result, trials = search(BEST, 0.05, 0.01)
+    assert tuple(result["base"]) == BEST
     assert trials == 12
 
 
 def test_the_printed_rule_never_comes_to_rest() -> None:
     """The best of four moves, even when all are worse than staying: it circles at the width of the move."""
-    place, step = (BEST[0] + 0.01, BEST[1] + 0.01), math.radians(4)
+    angles, step = (BEST[0] + 0.01, BEST[1] + 0.01), math.radians(4)
     levels = []
     for _ in range(40):
-        tried = [(place[0] + step * a, place[1] + step * b) for a, b in MOVES]
-        place = min(tried, key=lambda at: vibration(*at))
-        levels.append(vibration(*place))
+        tried = [(angles[0] + step * a, angles[1] + step * b) for a, b in MOVES]
+        angles = min(tried, key=lambda each: vibration(*each))
+        levels.append(vibration(*angles))
     assert min(levels[-2:]) < max(levels[-2:])
     assert max(levels[-10:]) > 5 * search((BEST[0] + 0.01, BEST[1] + 0.01), step, 0.002)[0]["least"]
 

@@ -144,20 +144,20 @@ def _by_ends(scene: EccentricScene, ended: Counter[str], *, stable: bool) -> Ite
         if end == EccentricOutcome.TIME_LIMIT and not stable:
             continue
         for sizes in _BY_END.get(EccentricOutcome(end), ()):
-            code, several = "_and_".join(path.partition(".")[2] for path in sizes[0]), []
+            code = "_and_".join(path.partition(".")[2] for path in sizes[0])
+            several: list[Settings] = []
             for factors in sizes:
-                changes: dict[str, float | str] = {}
-                for path, factor in factors.items():
-                    before = raw_value_at(scene, path)
-                    if isinstance(factor, str):
-                        changes |= {path: factor} if before != factor else {}
-                    elif before:
-                        changes[path] = factor * before
+                before = {path: raw_value_at(scene, path) for path in factors}
+                changes = {
+                    path: factor if isinstance(factor, str) else factor * before[path]
+                    for path, factor in factors.items()
+                    if (before[path] != factor if isinstance(factor, str) else before[path])
+                }
                 if changes:
                     several.append(changes)
             kinds.setdefault(code, several)
-    for code, several in list(kinds.items())[:_MAX_KINDS]:
-        yield from (Remedy(code=code, changes=each) for each in several)
+    for code, sized in list(kinds.items())[:_MAX_KINDS]:
+        yield from (Remedy(code=code, changes=each) for each in sized)
 
 
 def _rounded_up(value: float) -> float:

@@ -71,15 +71,6 @@ def test_too_little_pressure_is_told_from_capacity() -> None:
     assert set(outcomes.outcomes.ended) == {"stalled"}
 
 
-def test_six_chambers_work_with_settings_of_their_own() -> None:
-    found = rb.tune(bundled("six_chamber"))
-    assert found.own is not None
-    assert found.own.verdict == MET
-    assert found.recommended.fraction.value >= 0.99
-    assert found.along == ()
-    assert found.recommended.settings["controller.gas_time_offset"]
-
-
 def test_no_pressure_above_the_one_that_is_available_is_searched() -> None:
     """[design] states it; the highest one itself is a level, and settings start at the scene's own."""
     free = LiquidRingBalancer(bundled("liquid_ring_paper")).trials()[0].along
@@ -136,14 +127,20 @@ def test_the_search_finds_the_settings_of_another_balancer() -> None:
     assert searched(balancer) == found[0].candidate.settings
 
 
-def test_the_command_saves_a_scene_that_is_met(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_six_chambers_work_with_settings_of_their_own_and_with_those_that_the_command_saves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     target = tmp_path / "tuned.toml"
     words = ["tune", str(rb.bundled_scene("six_chamber")), "--save", str(target), "--json"]
     assert main(words) == 0
     document: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert document["own"]["verdict"] == MET
+    assert document["fraction"]["value"] >= 0.99
+    assert document["along"]["levels"] == []
     scene = liquid_ring_scene(rb.load_scene(target))
     settings = document["settings"]
     assert scene.controller.kind == settings["controller.kind"] == "law_based"
+    assert settings["controller.gas_time_offset"]
     assert scene.controller.offsets(6) == pytest.approx(6 * settings["controller.gas_time_offset"])
     assert judged(balancer_of(scene), {}).verdict == MET
     assert math.isfinite(document["settling_time_s"]["p90"])

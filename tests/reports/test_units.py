@@ -42,9 +42,7 @@ def test_a_half_width_goes_into_brackets_with_the_unit() -> None:
     assert shown(3.5, "1", 0.4) == "3.50\u00a0±\u00a00.40"
 
 
-@given(
-    value=st.floats(min_value=1e-9, max_value=1e9), unit=st.sampled_from(["m", "Pa", "s", "kg", "m^3"])
-)
+@given(value=st.floats(min_value=1e-9, max_value=1e9), unit=st.sampled_from(["m", "Pa", "s", "kg", "m^3"]))
 def test_the_unit_does_not_hang_on_the_last_bits(value: float, unit: str) -> None:
     near = [
         display_unit(unit, v).symbol

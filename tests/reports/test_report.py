@@ -172,7 +172,7 @@ def test_what_looks_at_no_scene_is_run_once(first: Report, second: Report) -> No
     # The check of the grid convergence index takes the report's own scene; the other is heavy.
     assert second.evidence["times"]["kept_cases"] == {"claim_01_volume": today}
     page = (second.page.parent / "report.html").read_text()
-    assert f"1 that look at no scene, run by the same program on {today}" in page
+    assert f"1 independent of the scene, run by the same program on {today}" in page
 
 
 def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Record) -> None:

@@ -44,7 +44,7 @@ from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 
 GAIN = 0.3
-"""Of the paper's, which suits the paper's own law; the calibrated law moves more liquid."""
+"""Fraction of the paper's gain, which suits the paper's own law; the calibrated law moves more liquid."""
 TIME_LIMIT = 20.0
 """s, of a run: some 40 samples."""
 JUDGED = 20
@@ -73,11 +73,11 @@ class Carried:
     total: float
     method: str = "LSODA"
     tolerance: float = 1e-8
-    asked: list[tuple[float, float]] = field(default_factory=list)
+    targets: list[tuple[float, float]] = field(default_factory=list)
 
     def operate(self, fill: float, duration: float) -> float:
         """Fill of the driven chamber at the next sample."""
-        self.asked.append((fill, duration))
+        self.targets.append((fill, duration))
         return self.rival.inject(duration, method=self.method, tolerance=self.tolerance, fill=fill)
 
 
@@ -157,18 +157,18 @@ def _gas(
     return longest
 
 
-def fastest(rival: Rival, dynamics: Dynamics, asked: list[tuple[float, float]]) -> tuple[str, float, float]:
+def fastest(rival: Rival, dynamics: Dynamics, targets: list[tuple[float, float]]) -> tuple[str, float, float]:
     """Method and tolerance that keep each fill within `FILL_ERROR` in the least time; our largest error."""
-    exact = [ours(dynamics, t, error=1e-10, count=1, fill=x) for x, t in asked]
-    near = [ours(dynamics, t, error=RELATIVE_ERROR, count=1, fill=x) for x, t in asked]
+    exact = [ours(dynamics, t, error=1e-10, count=1, fill=x) for x, t in targets]
+    near = [ours(dynamics, t, error=RELATIVE_ERROR, count=1, fill=x) for x, t in targets]
     best = (math.inf, "", 0.0)
     for method in METHODS:
         for tolerance in TOLERANCES:
             inject = partial(rival.inject, method=method, tolerance=tolerance)
             if all(
-                abs(inject(t, fill=x) - end) <= FILL_ERROR for (x, t), end in zip(asked, exact, strict=True)
+                abs(inject(t, fill=x) - end) <= FILL_ERROR for (x, t), end in zip(targets, exact, strict=True)
             ):
-                spent = least(lambda f=inject: [f(t, fill=x) for x, t in asked], 2)  # type: ignore[misc]
+                spent = least(lambda f=inject: [f(t, fill=x) for x, t in targets], 2)  # type: ignore[misc]
                 best = min(best, (spent, method, tolerance))
                 break
     if not best[1]:
@@ -180,8 +180,8 @@ def check_same(scene: Scene, model: BalancerModel, carried: Carried) -> None:
     """Make sure that both sides do the same work. Raises: RuntimeError: they do not end alike."""
     still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
     end, _ = plain_run(still, model, carried, 0)
-    (own,) = LiquidRingBalancer(still).run({}, AS_GIVEN).final_amplitude
-    error = abs(abs(end) - float(own))
+    (single,) = LiquidRingBalancer(still).run({}, AS_GIVEN).final_amplitude
+    error = abs(abs(end) - float(single))
     if error > END_ERROR:
         raise RuntimeError(f"{error:.1e} m apart at the end")
 
@@ -194,21 +194,21 @@ def rival_run(scene: Scene, model: BalancerModel, carried: Carried) -> None:
 
 def growth(ensemble: Callable[[int], object], *, first: int, largest: int) -> list[dict[str, float]]:
     """Ensembles that double up to the largest. Args: `ensemble`: runs so many members."""
-    found, size = [], first
+    results, size = [], first
     while size <= largest:
         used = time.process_time()
         ensemble(size)
         spent, peak = time.process_time() - used, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        found.append({"members": size, "processor_s": spent, "peak_memory_MiB": peak / 1024})
+        results.append({"members": size, "processor_s": spent, "peak_memory_MiB": peak / 1024})
         size *= 2
-    return found
+    return results
 
 
 def compile_seconds() -> list[float]:
     """Processor time, s, of a machine's first run, compiling, and of the first of a later process."""
     with tempfile.TemporaryDirectory() as folder:
-        kept = os.environ | {"NUMBA_CACHE_DIR": folder}
-        call = partial(subprocess.run, env=kept, capture_output=True, text=True, check=True)
+        environment = os.environ | {"NUMBA_CACHE_DIR": folder}
+        call = partial(subprocess.run, env=environment, capture_output=True, text=True, check=True)
         return [float(call([sys.executable, "-c", FIRST_CALL]).stdout) for _ in range(2)]
 
 
@@ -225,32 +225,32 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
     carried = Carried(rival=Rival(scene, model), total=2 * scene.disc.initial_fill)
     check_same(scene, model, carried)
-    carried.asked.clear()
+    carried.targets.clear()
     plain_run(scene, model, carried, 0)
-    by_time = sorted(carried.asked, key=lambda one: one[1])
+    by_time = sorted(carried.targets, key=lambda entry: entry[1])
     judged = [by_time[round(i)] for i in np.linspace(0, len(by_time) - 1, JUDGED)]
     carried.method, carried.tolerance, error = fastest(carried.rival, dynamics, judged)
     if error > FILL_ERROR:
         raise RuntimeError(f"an ensemble's fills are off by {error:.1e}")
-    carried.asked.clear()
+    carried.targets.clear()
     theirs = least(partial(rival_run, scene, model, carried), repeats) / RIVAL_RUNS
-    injections = len(carried.asked) / (repeats * RIVAL_RUNS)
+    injections = len(carried.targets) / (repeats * RIVAL_RUNS)
 
-    def one(size: int) -> object:
+    def run_devices(size: int) -> object:
         return LiquidRingBalancer(scene).run({}, Draws.first(size))
 
-    one(1)
-    own = least(lambda: one(members), repeats) / members
+    run_devices(1)
+    single = least(lambda: run_devices(members), repeats) / members
     return {
         "solve_ivp_s": theirs,
         "method": carried.method,
         "rtol": carried.tolerance,
         "injections": injections,
-        "ours_s": own,
+        "ours_s": single,
         "fill_error": error,
-        "ratio": theirs / own,
+        "ratio": theirs / single,
         "wanted": WANTED,
-        "growth": growth(one, first=largest // 8, largest=largest),
+        "growth": growth(run_devices, first=largest // 8, largest=largest),
         "first_run_s": compile_seconds(),
     }
 
@@ -262,12 +262,12 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--members", type=int, default=1000)
     parser.add_argument("--largest", type=int, default=8000)
-    asked = parser.parse_args()
-    found = compare(asked.repeats, asked.members, asked.largest)
-    if asked.json:
-        print(json.dumps(found, indent=2))
+    targets = parser.parse_args()
+    results = compare(targets.repeats, targets.members, targets.largest)
+    if targets.json:
+        print(json.dumps(results, indent=2))
         return
-    for name, value in found.items():
+    for name, value in results.items():
         for row in value if isinstance(value, list) else (value,):
             print(f"{name}: {row}")
 

@@ -41,7 +41,7 @@ class Problem:
     vary: tuple[str, ...]
     changes: Mapping[str, Any] = field(default_factory=dict)
     stands: str = ""
-    """How the code of the finding begins that says what stands against every design; empty: there is one."""
+    """Beginning of the code of the finding that rules out every design; empty: there is one."""
 
     @property
     def scene(self) -> Scene:
@@ -100,10 +100,16 @@ PROBLEMS: Final = {
 
 def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
     """Points of a grid that meet what is required, with the median of their gas, J."""
-    asked = balancer_of(space.scene).asked_fraction()
+    required_fraction = balancer_of(space.scene).asked_fraction()
     for point in points:
-        first = race(space.hasty, point, grid_points=None, required_fraction=threshold(asked), settings=True)
-        if first is None or first.fraction < asked - NEAR:
+        first = race(
+            space.hasty,
+            point,
+            grid_points=None,
+            required_fraction=threshold(required_fraction),
+            settings=True,
+        )
+        if first is None or first.fraction < required_fraction - NEAR:
             continue
         judgement = judged_design(space.hasty, point, settings=first.settings, search=True)
         if judgement is not None and judgement.verdict == MET:
@@ -131,9 +137,9 @@ class Compared:
     value: float | None
     """Size, m^3, or gas, J; None: no design meets what is required."""
     grid: float | None
-    """The same of the grid's best."""
+    """Value of the grid's best design."""
     codes: tuple[str, ...]
-    """Of the findings."""
+    """Codes of the findings."""
     seconds: float
     """Processor time of the search."""
     grid_seconds: float

@@ -1,4 +1,4 @@
-"""How sharp the answer of `ringbalance design` is: the bundled spindle, with six things open, from several
+"""Spread of the answers of `ringbalance design`: the bundled spindle, with six things open, from several
 starts of the search, and with other drawn devices.
 
 python benchmarks/design_spread.py [STARTS [SEEDS]]
@@ -27,13 +27,13 @@ CHECKED: Final = 4096
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """Of one search."""
+    """Result of one search."""
 
     start: int
     seed: int
     design: rb.Design
     fraction: float
-    """Of the further devices."""
+    """Fraction of the further devices."""
     seconds: float
     """Processor time of the search."""
 
@@ -69,9 +69,9 @@ def main(starts: int = 4, seeds: int = 4) -> None:
     for pairs in ([(start, 0) for start in range(starts)], [(0, seed) for seed in range(1, seeds)]):
         sizes = []
         for start, seed in pairs:
-            found = answer(start, seed)
-            print(found.text, flush=True)
-            sizes.append(found.design.size)
+            result = answer(start, seed)
+            print(result.text, flush=True)
+            sizes.append(result.design.size)
         if sizes:
             print(f"largest over smallest: {max(sizes) / min(sizes) - 1:+.1%}")
 

@@ -32,7 +32,7 @@ SIDED = 500
 
 @dataclass(frozen=True, kw_only=True)
 class Rate:
-    """Of one batch."""
+    """Number of designs in one batch."""
 
     designs: int
     processor_seconds: float
@@ -72,21 +72,21 @@ def drawn(scene: Scene, count: int, *, seed: int = 0) -> Designs:
 
 def seconds(function: Callable[[], object]) -> float:
     """Processor time of the faster of two calls."""
-    found = []
+    results = []
     for _ in range(2):
         start = time.process_time()
         function()
-        found.append(time.process_time() - start)
-    return min(found)
+        results.append(time.process_time() - start)
+    return min(results)
 
 
 def with_sides(designs: Designs, step: float = 0.01) -> Designs:
     """Each design and both sides of each of its numbers that differ between them: 2 m + 1 rows a design."""
     keys = [(table, key) for table, names in designs.varied.items() for key in names]
     values = {}
-    for place, (table, key) in enumerate(keys):
+    for index, (table, key) in enumerate(keys):
         factors = np.ones((2 * len(keys) + 1, 1))
-        factors[2 * place + 1 : 2 * place + 3] += np.array([[-step], [step]])
+        factors[2 * index + 1 : 2 * index + 3] += np.array([[-step], [step]])
         values[f"{table}.{key}"] = (factors * getattr(getattr(designs.scene, table), key)).ravel()
     return Designs.of(designs.scene, values)
 
@@ -115,23 +115,23 @@ def main() -> int:
     """Measure on the liquid-ring paper's disc and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="print a document")
-    found = measured(cast("Scene", load_scene(bundled_scene("liquid_ring_paper"))))
+    results = measured(cast("Scene", load_scene(bundled_scene("liquid_ring_paper"))))
     if parser.parse_args().json:
-        sys.stdout.write(json.dumps(found, indent=1) + "\n")
+        sys.stdout.write(json.dumps(results, indent=1) + "\n")
         return 0
     table = Table("designs", "processor time, s", "designs a second")
-    for rate in found["growth"]:
+    for rate in results["growth"]:
         numbers = rate["designs"], rate["processor_seconds"], rate["designs_per_second"]
         table.add_row(f"{numbers[0]}", f"{numbers[1]:.3g}", f"{numbers[2]:.3g}")
     console = Console()
     console.print(table)
     console.print(
-        f"one row at a time {found['one_row_at_a_time_per_second']:.3g} a second: the batch does "
-        f"{found['ratio']:.3g} times as many"
+        f"one row at a time {results['one_row_at_a_time_per_second']:.3g} a second: the batch does "
+        f"{results['ratio']:.3g} times as many"
     )
     console.print(
-        f"with both sides of all inputs, {found['rows_with_sides']} rows a design: "
-        f"{found['with_sides_per_second']:.3g} designs a second"
+        f"with both sides of all inputs, {results['rows_with_sides']} rows a design: "
+        f"{results['with_sides_per_second']:.3g} designs a second"
     )
     return 0
 

@@ -30,7 +30,7 @@ from ringbalance.scene import bundled_scene, load_scene
 LONGEST = 1.0
 """Time that the whole run may take, s."""
 LEAST_RATIO = 50.0
-"""Of plain to compiled time per step."""
+"""Ratio of plain to compiled time per step."""
 
 
 def paper_run_up(time_limit: float | None = None) -> EccentricScene:
@@ -50,7 +50,7 @@ def best(scene: EccentricScene, repeats: int) -> tuple[float, EccentricRun]:
 
 
 def plain(stretch: float) -> dict[str, float]:
-    """The same stretch with numba switched off, in a process of its own.
+    """Time a stretch with numba switched off, in a process of its own.
 
     Args: `stretch`: simulated time, s.
     Returns: Its time and what the rotor does at the end.
@@ -58,12 +58,12 @@ def plain(stretch: float) -> dict[str, float]:
     command = [sys.executable, __file__, "--child", "--stretch", str(stretch)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     child = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    found: dict[str, float] = json.loads(child.stdout)
-    return found
+    measured: dict[str, float] = json.loads(child.stdout)
+    return measured
 
 
 def import_loads_the_compiler() -> bool:
-    """Whether `import ringbalance` brings numba in. Returns: True when it does."""
+    """True if `import ringbalance` loads numba."""
     code = "import ringbalance, sys; sys.exit('numba' in sys.modules)"
     return subprocess.run([sys.executable, "-c", code], check=False).returncode != 0
 
@@ -90,15 +90,15 @@ def measure(stretch: float) -> dict[str, float | bool | str]:
     begin = time.process_time()
     simulate_eccentric(paper_run_up(0.01))
     first_call = time.process_time() - begin
-    whole, run = best(paper_run_up(), 3)
+    total, run = best(paper_run_up(), 3)
     fast, slow = stretch_times(stretch, 7), plain(stretch)
     ratio = slow["step_s"] / fast["step_s"]
     return {
         "version": ringbalance.__version__,
         "steps": float(len(run.time) - 1),
         "first_call_s": first_call,
-        "whole_run_s": whole,
-        "under_a_second": whole < LONGEST,
+        "whole_run_s": total,
+        "under_a_second": total < LONGEST,
         "compiled_step_s": fast["step_s"],
         "plain_step_s": slow["step_s"],
         "ratio": ratio,
@@ -115,17 +115,19 @@ def main() -> int:
     parser.add_argument("--stretch", type=float, default=4.0)
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.child:
-        print(json.dumps(stretch_times(given.stretch, 1)))
+    options = parser.parse_args()
+    if options.child:
+        print(json.dumps(stretch_times(options.stretch, 1)))
         return 0
-    found = measure(given.stretch)
-    if given.json:
-        print(json.dumps(found))
+    measured = measure(options.stretch)
+    if options.json:
+        print(json.dumps(measured))
     else:
-        for name, value in found.items():
+        for name, value in measured.items():
             print(f"{name:28} {value:.6g}" if isinstance(value, float) else f"{name:28} {value}")
-    reached = found["under_a_second"] and found["ratio_reached"] and not found["import_loads_the_compiler"]
+    reached = (
+        measured["under_a_second"] and measured["ratio_reached"] and not measured["import_loads_the_compiler"]
+    )
     return 0 if reached else 1
 
 

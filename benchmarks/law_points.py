@@ -24,15 +24,15 @@ MANY = 100_000
 
 
 def seconds(call: Callable[[], object], *, times: int) -> float:
-    """Of processor time of one call, the smallest of five rounds."""
+    """Seconds of processor time of one call, the smallest of five rounds."""
     call()
-    found = []
+    durations = []
     for _ in range(5):
         start = time.process_time()
         for _ in range(times):
             call()
-        found.append((time.process_time() - start) / times)
-    return min(found)
+        durations.append((time.process_time() - start) / times)
+    return min(durations)
 
 
 def main() -> None:
@@ -51,9 +51,9 @@ def main() -> None:
     }
     shown = Table("", "one point, us", "in an array, us")
     for name, call in ways.items():
-        one = seconds(lambda call=call: call(0.25, 2.0), times=2000)  # type: ignore[misc]
+        single = seconds(lambda call=call: call(0.25, 2.0), times=2000)  # type: ignore[misc]
         many = seconds(lambda call=call: call(x, root), times=5)  # type: ignore[misc]
-        shown.add_row(name, f"{1e6 * one:.1f}", f"{1e6 * many / MANY:.3f}")
+        shown.add_row(name, f"{1e6 * single:.1f}", f"{1e6 * many / MANY:.3f}")
     Console().print(shown)
 
 

@@ -98,20 +98,20 @@ class Rival:
         if not primed:
             margin = gas_margin + (self.cleared(y) * (full_margin - gas_margin) if gas_margin > 0 else 0.0)
         rho, speed = self.law.density, max(speed, 1e-12)
-        own, other = (float(self.law.hydrostatic_pressure(x)) for x in (y[0], 0.5 - y[0]))
-        whole = rho * float(roots_of(self.law.heads.siphon, speed)) ** 8
+        driven, other = (float(self.law.hydrostatic_pressure(x)) for x in (y[0], 0.5 - y[0]))
+        head = rho * float(roots_of(self.law.heads.siphon, speed)) ** 8
         upper = rho * float(roots_of(self.hump, speed)) ** 8
-        full = (y[2] - y[3] + own - other - whole) / (rho * self.scene.tube.length)
+        full = (y[2] - y[3] + driven - other - head) / (rho * self.scene.tube.length)
         return min(float(full), (margin - upper) / (rho * self.upstream))
 
     def lift(self, y: Y, begun: float) -> float:
         """Acceleration of liquid that the gas has to lift to the crest's end first."""
-        place = self.place(y, begun)
+        front = self.place(y, begun)
         loss = self.law.density * float(roots_of(self.hump, max(y[1], 1e-12))) ** 8
-        loss *= self.entrance + (1 - self.entrance) * place / self.span[1]
-        out = max(1 - place / self.span[0], 0.0)
+        loss *= self.entrance + (1 - self.entrance) * front / self.span[1]
+        out = max(1 - front / self.span[0], 0.0)
         height = (float(self.crest.column_pressure) - self.law.path.port_pressure) * out**2
-        return (self.margins(y)[1] + height - loss) / (self.law.density * place * self.scene.tube.length)
+        return (self.margins(y)[1] + height - loss) / (self.law.density * front * self.scene.tube.length)
 
     def place(self, y: Y, begun: float) -> float:
         """Fraction of the path that liquid has filled since the chamber's fill was `begun`."""
@@ -171,7 +171,7 @@ class Rival:
 
         change.terminal = next_stage.terminal = True  # type: ignore[attr-defined]
         change.direction, next_stage.direction = (-1.0 if stage else 1.0), 1.0  # type: ignore[attr-defined]
-        found = solve_ivp(
+        results = solve_ivp(
             lambda _, state: self.rates(state, is_open=is_open, stage=stage, primed=primed, begun=begun),
             (0.0, left),
             y,
@@ -180,18 +180,18 @@ class Rival:
             atol=[1e-2 * tolerance, 1e-1 * tolerance, 1e5 * tolerance, 1e5 * tolerance],
             events=(change, next_stage) if stage and not primed else (change,),
         )
-        end, ended = found.y[:, -1], found.t_events[0].size > 0
-        further = len(found.t_events) > 1 and found.t_events[1].size > 0
+        end, ended = results.y[:, -1], results.t_events[0].size > 0
+        further = len(results.t_events) > 1 and results.t_events[1].size > 0
         if stage == LIFTS and (ended or further):
             # What lies before the middle of the crest falls back.
             end[0] = begun - max(self.place(end, begun) - sum(self.span) / 2, 0.0) * self.hold_up
         if ended:
             end[1] = 0.0
             # A column that has stopped with the gas venting is gone.
-            return end, float(found.t[-1]), RESTS if stage else LIFTS, False
+            return end, float(results.t[-1]), RESTS if stage else LIFTS, False
         if further and stage == LIFTS:
-            return end, float(found.t[-1]), FLOWS, self.cleared(end) > 0.5
-        return end, float(found.t[-1]), stage, primed or further
+            return end, float(results.t[-1]), FLOWS, self.cleared(end) > 0.5
+        return end, float(results.t[-1]), stage, primed or further
 
 
 @in_place
@@ -215,12 +215,12 @@ def ours(dynamics: Dynamics, duration: float, *, error: float, count: int, fill:
 
 def least(function: Callable[[], object], repeats: int) -> float:
     """Least processor time of several calls, s."""
-    found = []
+    results = []
     for _ in range(repeats):
         start = time.process_time()
         function()
-        found.append(time.process_time() - start)
-    return min(found)
+        results.append(time.process_time() - start)
+    return min(results)
 
 
 def rival_seconds(rival: Rival, duration: float, exact: float, repeats: int) -> tuple[float, str, float]:
@@ -251,28 +251,28 @@ def rows(repeats: int) -> list[dict[str, object]]:
     scene = piped_scene()
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
-    rival, found = Rival(scene, model), []
+    rival, results = Rival(scene, model), []
     for duration in DURATIONS:
         exact = ours(dynamics, duration, error=1e-10, count=1)
         error = abs(ours(dynamics, duration, error=RELATIVE_ERROR, count=1) - exact)
-        own = least(
+        driven = least(
             lambda d=duration: ours(dynamics, d, error=RELATIVE_ERROR, count=BATCH),  # type: ignore[misc]
             repeats,
         )
         theirs, method, tolerance = rival_seconds(rival, duration, exact, repeats)
-        found.append(
+        results.append(
             {
                 "valve_open_s": duration,
-                "ours_s": own / BATCH,
+                "ours_s": driven / BATCH,
                 "fill_error": error,
                 "solve_ivp_s": theirs,
                 "method": method,
                 "rtol": tolerance,
-                "ratio": theirs / (own / BATCH),
+                "ratio": theirs / (driven / BATCH),
                 "wanted": WANTED,
             }
         )
-    return found
+    return results
 
 
 def main() -> None:
@@ -280,12 +280,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON document")
     parser.add_argument("--repeats", type=int, default=5)
-    asked = parser.parse_args()
-    found = rows(asked.repeats)
-    if asked.json:
-        print(json.dumps(found, indent=2))
+    options = parser.parse_args()
+    results = rows(options.repeats)
+    if options.json:
+        print(json.dumps(results, indent=2))
         return
-    for row in found:
+    for row in results:
         print(
             f"{1e3 * float(str(row['valve_open_s'])):.3g} ms: ours {1e6 * float(str(row['ours_s'])):.3g} us, "
             f"error {row['fill_error']:.1e}; solve_ivp {1e3 * float(str(row['solve_ivp_s'])):.3g} ms "

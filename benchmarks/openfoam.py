@@ -71,7 +71,7 @@ STEPS, WRITES, RAMP, TURNS, PUSH = 150, 25, 9.0, 14.0, 0.4
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What the program says: a value with its half-width (95 %), and the processor time for it, s."""
+    """Answer of the program: a value with its half-width (95 %), and the processor time for it, s."""
 
     value: float
     half_width: float
@@ -101,7 +101,7 @@ class Row:
 
     @property
     def agrees(self) -> bool:
-        """Whether the difference lies within both uncertainties."""
+        """True if the difference lies within both uncertainties."""
         both = float(np.hypot(self.openfoam_half_width, self.ringbalance_half_width))
         return bool(abs(self.openfoam - self.ringbalance) <= both)
 
@@ -112,10 +112,10 @@ def row(
 ) -> Row:  # fmt: skip
     """From the values of three meshes, coarse to fine, with numbers of cells along one length."""
     sizes = [1 / count for count in cells[::-1]]
-    found = gci(values=list(values)[::-1], sizes=sizes, formal_order=FORMAL_ORDER, round_off=1e-6)
+    results = gci(values=list(values)[::-1], sizes=sizes, formal_order=FORMAL_ORDER, round_off=1e-6)
     return Row(
         quantity=quantity, openfoam=values[-1], on_meshes=tuple(values),
-        openfoam_half_width=float(found.uncertainty),
+        openfoam_half_width=float(results.uncertainty),
         ringbalance=ours.value, ringbalance_half_width=ours.half_width, seconds=seconds,
         ringbalance_seconds=ours.seconds,
         cells=tuple(cells),
@@ -167,7 +167,7 @@ def bend(scene: Scene, out: Path) -> Iterator[Row]:
     ]  # fmt: skip
     yield row(
         quantity=f"loss coefficient, {end - start:g} bores and two bends, Re {REYNOLDS:g}, R {rotation:.0f}",
-        values=[found.loss(start, end) for found in runs], cells=around,
+        values=[results.loss(start, end) for results in runs], cells=around,
         ours=_kept_loss(start, end, seconds=_time_of_a_solve(scene, rotation)), seconds=runs[-1].seconds,
     )  # fmt: skip
 
@@ -187,15 +187,15 @@ def _time_of_a_solve(scene: Scene, rotation: float) -> float:
 
 
 def _kept_loss(start: float, end: float, *, seconds: float) -> Answer:
-    """Of the heavy case bent_tube_3d: loss between two places, and its share of the whole's uncertainty."""
-    kept = json.loads((HERE.parent / "reports/data" / PACKAGED).read_text(encoding="utf-8"))
-    case = next(case for case in kept["verification"] if case["id"] == "bent_tube_3d")
+    """Heavy case bent_tube_3d: loss between two places, and its share of the whole's uncertainty."""
+    stored = json.loads((HERE.parent / "reports/data" / PACKAGED).read_text(encoding="utf-8"))
+    case = next(case for case in stored["verification"] if case["id"] == "bent_tube_3d")
     series = case["series"][0]
     at, beyond = np.array(series["x"]["values"]), np.array(series["y"][0]["values"])
-    whole = case["numbers"]["k"]
-    straight = (whole - beyond[-1]) / at[-1] * (end - start)
+    k_total = case["numbers"]["k"]
+    straight = (k_total - beyond[-1]) / at[-1] * (end - start)
     loss = straight + np.interp(end, at, beyond) - np.interp(start, at, beyond)
-    half = float(case["numbers"]["half_width"] * loss / whole)
+    half = float(case["numbers"]["half_width"] * loss / k_total)
     return Answer(value=float(loss), half_width=half, seconds=seconds)
 
 
@@ -238,11 +238,11 @@ def waves(scene: Scene, out: Path) -> Iterator[Row]:
             )
             for count in cells
         ]  # fmt: skip
-        found = [_answers(chamber, out / f"waves-{chamber.cells[0]}") for chamber in chambers]
+        results = [_answers(chamber, out / f"waves-{chamber.cells[0]}") for chamber in chambers]
         for name, ours in _theory(disc, fill).items():
             yield row(
-                quantity=f"{name}, fill {fill:g}", values=[values[name] for values in found],
-                cells=[around for _, around in cells], ours=ours, seconds=found[-1]["seconds"],
+                quantity=f"{name}, fill {fill:g}", values=[values[name] for values in results],
+                cells=[around for _, around in cells], ours=ours, seconds=results[-1]["seconds"],
             )  # fmt: skip
 
 
@@ -253,11 +253,11 @@ def _answers(chamber: Chamber, folder: Path) -> dict[str, float]:
     forced = follow(turning_gravity(ramp=RAMP), TURNS, WRITES)
     free = follow(push(duration=PUSH), TURNS, 1)
     moment, pressure = quasi_static(chamber)
-    along, across = (abs(swing(forced.moment_time, column, turns=3)) for column in forced.moment.T)
+    in_line, across = (abs(swing(forced.moment_time, column, turns=3)) for column in forced.moment.T)
     wall = abs(swing(forced.time, forced.wall, turns=3))
     first, second = frequencies(free.time, free.wall, after=PUSH, count=2)
     return {
-        "swing of the moment over quasi-static": float(np.hypot(along, across)) / moment,
+        "swing of the moment over quasi-static": float(np.hypot(in_line, across)) / moment,
         "swing of the wall pressure over quasi-static": wall / pressure,
         "first free frequency over the speed": float(first),
         "second free frequency over the speed": float(second),
@@ -282,12 +282,12 @@ def _theory(disc: Disc, fill: float) -> dict[str, Answer]:
         "first free frequency over the speed": (free, 0),
         "second free frequency over the speed": (free, 1),
     }
-    found = {}
+    results = {}
     for name, (estimate, i) in pairs.items():
         value, cells = float(np.ravel(estimate.value)[i]), float(np.ravel(estimate.uncertainty)[i])
         half = float(np.hypot(cells, second_order * value))
-        found[name] = Answer(value=value, half_width=half, seconds=seconds)
-    return found
+        results[name] = Answer(value=value, half_width=half, seconds=seconds)
+    return results
 
 
 STUDIES: dict[str, Callable[[Scene, Path], Iterator[Row]]] = {
@@ -298,12 +298,11 @@ STUDIES: dict[str, Callable[[Scene, Path], Iterator[Row]]] = {
 }
 
 
-def _said(found: Row) -> str:
-    theirs = f"{found.openfoam:.5g} +- {found.openfoam_half_width:.2g}"
-    ours = f"{found.ringbalance:.5g} +- {found.ringbalance_half_width:.2g}"
-    return (
-        f"{found.quantity}: {theirs}, here {ours}; {found.seconds:.3g} and {found.ringbalance_seconds:.3g} s"
-    )
+def _said(results: Row) -> str:
+    theirs = f"{results.openfoam:.5g} +- {results.openfoam_half_width:.2g}"
+    ours = f"{results.ringbalance:.5g} +- {results.ringbalance_half_width:.2g}"
+    times = f"{results.seconds:.3g} and {results.ringbalance_seconds:.3g} s"
+    return f"{results.quantity}: {theirs}, here {ours}; {times}"
 
 
 def main() -> int:
@@ -314,19 +313,19 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/openfoam"))
     parser.add_argument("--only", nargs="+", choices=list(STUDIES), default=list(STUDIES))
     parser.add_argument("--keep", action="store_true")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     if needed := missing():
         print(needed, file=sys.stderr)
         return 1
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     document = {"date": date.today().isoformat(), "openfoam": "1912", "machine": platform.machine()}
     rows = json.loads(KEPT.read_text(encoding="utf-8"))["rows"] if KEPT.exists() else {}
-    for name in asked.only:
+    for name in options.only:
         rows[name] = []
-        for found in STUDIES[name](scene, asked.out):
-            rows[name].append({**asdict(found), "agrees": found.agrees})
-            print(_said(found), flush=True)
-        if asked.keep:
+        for results in STUDIES[name](scene, options.out):
+            rows[name].append({**asdict(results), "agrees": results.agrees})
+            print(_said(results), flush=True)
+        if options.keep:
             write_whole(KEPT, json.dumps({**document, "rows": rows}, indent=1) + "\n")
             write_whole(PAGE, page({**document, "rows": rows}))
     return 0

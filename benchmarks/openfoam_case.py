@@ -22,7 +22,7 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 
 PROGRAMS = ("SRFSimpleFoam", "pimpleFoam", "makeFaMesh")
 _DEBIAN = "/usr/share/openfoam"
-"""Where Debian's package keeps what OpenFOAM's own shell setup would name."""
+"""Folder in which Debian's package has what OpenFOAM's own shell setup would name."""
 
 # Corners of a hexahedron's six faces, seen from outside counter-clockwise; corner order of VTK and OpenFOAM.
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -73,12 +73,12 @@ def write_mesh(*, folder: Path, mesh: HexMesh) -> None:
     numbers, entries, start = [order], [], len(order)
     index = {tuple(row): i for i, row in enumerate(key[first].tolist())}
     for name, (rows, entry) in mesh.patches.items():
-        found = np.array([index[tuple(row)] for row in np.sort(rows, axis=1).tolist()], dtype=np.int64)
-        if np.any(partner[found] >= 0):
+        matches = np.array([index[tuple(row)] for row in np.sort(rows, axis=1).tolist()], dtype=np.int64)
+        if np.any(partner[matches] >= 0):
             raise ValueError(f"patch {name} has a face between two cells")
-        numbers.append(found[np.argsort(cell[first[found]], kind="stable")])
-        entries.append((name, {**entry, "nFaces": len(found), "startFace": start}))
-        start += len(found)
+        numbers.append(matches[np.argsort(cell[first[matches]], kind="stable")])
+        entries.append((name, {**entry, "nFaces": len(matches), "startFace": start}))
+        start += len(matches)
     faces = first[np.concatenate(numbers)]
     if len(faces) != len(first):
         raise ValueError("a face of the boundary is in no patch")
@@ -152,7 +152,7 @@ def field(
 
 
 def missing() -> str:
-    """What to do where OpenFOAM is not on the path; empty where it is."""
+    """Advice where OpenFOAM is not on the path; empty: it is."""
     absent = [program for program in PROGRAMS if shutil.which(program) is None]
     if not absent:
         return ""
@@ -164,7 +164,7 @@ def missing() -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """What a program printed, and its processor time, s."""
+    """Output of a program, and its processor time, s."""
 
     text: str
     seconds: float
@@ -195,7 +195,7 @@ def last_number(text: str, pattern: str) -> float:
 
     Raises: ValueError: nothing matches.
     """
-    found = re.findall(pattern + r"\s*=?\s*([-+0-9.eE]+)", text)
-    if not found:
+    matches = re.findall(pattern + r"\s*=?\s*([-+0-9.eE]+)", text)
+    if not matches:
         raise ValueError(f"no {pattern!r} in what OpenFOAM printed")
-    return float(found[-1])
+    return float(matches[-1])

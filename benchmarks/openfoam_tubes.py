@@ -43,13 +43,13 @@ def swept_mesh(*, cells: tuple[int, int, float], stations: FloatArray, ends: Map
     """
     around, across, ratio = cells
     plane, quads, mesh = section(around=around, across=across, wall_ratio=ratio)
-    place, tangent = stations[:, :2], stations[:, 2:]
+    centre, tangent = stations[:, :2], stations[:, 2:]
     left = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    flat = place[:, None] + plane[None, :, :1] * left[:, None]
+    flat = centre[:, None] + plane[None, :, :1] * left[:, None]
     height = np.broadcast_to(plane[None, :, 1:], (len(stations), len(plane), 1))
     points, hexahedra = extruded(points=np.concatenate([flat, height], axis=2), quads=quads)
     count, slabs = len(plane), len(stations) - 1
-    edges = {name: np.asarray(mesh.facets[:, found]).T for name, found in mesh.boundaries.items()}
+    edges = {name: np.asarray(mesh.facets[:, boundary]).T for name, boundary in mesh.boundaries.items()}
     patches = {name: sides(edges=edges[name], count=count, slabs=slabs) for name in ("wall", "symmetry")}
     kinds = {"wall": {"type": "wall"}, "symmetry": {"type": "symmetryPlane"}}
     return HexMesh(
@@ -71,8 +71,8 @@ def _cyclic() -> dict[str, Any]:
 
 
 def _boundary(wall: Mapping[str, Any], ends: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    found = ends or {name: {"type": "cyclic"} for name in ("inlet", "outlet")}
-    return {"wall": wall, "symmetry": {"type": "symmetryPlane"}, **found}
+    boundary = ends or {name: {"type": "cyclic"} for name in ("inlet", "outlet")}
+    return {"wall": wall, "symmetry": {"type": "symmetryPlane"}, **boundary}
 
 
 _SOLVERS = {
@@ -276,9 +276,9 @@ def _heads(folder: Path, mesh: HexMesh, *, slabs: int, omega: float) -> FloatArr
     middle = corner.mean(axis=1)
     # The slabs' cells stand between two copies of one section: area by its diagonals, times thickness.
     diagonal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
-    along = corner[:, 4:].mean(axis=1) - corner[:, :4].mean(axis=1)
-    weight = np.abs(np.sum(diagonal * along, axis=1)).reshape(slabs, -1)
+    axial = corner[:, 4:].mean(axis=1) - corner[:, :4].mean(axis=1)
+    weight = np.abs(np.sum(diagonal * axial, axis=1)).reshape(slabs, -1)
     u = _values(folder, "Urel")
-    carried = np.abs(np.sum(u * along, axis=1)) / np.linalg.norm(along, axis=1) * np.sum(u**2, axis=1)
+    carried = np.abs(np.sum(u * axial, axis=1)) / np.linalg.norm(axial, axis=1) * np.sum(u**2, axis=1)
     reduced = 2 * _values(folder, "p")[:, 0] - omega**2 * np.sum(middle[:, :2] ** 2, axis=1)
     return np.asarray(np.average((reduced + carried).reshape(slabs, -1), axis=1, weights=weight))

@@ -39,7 +39,7 @@ Force = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, kw_only=True)
 class Chamber:
-    """What is solved: central angle, rad, surface radius over R2, and the cells across and around."""
+    """Case to solve: central angle, rad, surface radius over R2, and the cells across and around."""
 
     central_angle: float
     surface_radius: float
@@ -67,11 +67,11 @@ def _grid(chamber: Chamber) -> tuple[FloatArray, IntArray, dict[str, IntArray]]:
     number = np.arange(len(points)).reshape(across + 1, around + 1)
     quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1)
 
-    def along(line: IntArray) -> IntArray:
+    def edges_of(line: IntArray) -> IntArray:
         return np.stack([line[:-1], line[1:]], axis=1)
 
     lines = {"wall": number[-1], "surface": number[0], "left": number[:, 0], "right": number[:, -1]}
-    return points, quads.reshape(-1, 4), {name: along(line) for name, line in lines.items()}
+    return points, quads.reshape(-1, 4), {name: edges_of(line) for name, line in lines.items()}
 
 
 def _mesh(chamber: Chamber) -> tuple[HexMesh, IntArray]:
@@ -231,10 +231,10 @@ def _history(path: Path) -> tuple[FloatArray, FloatArray]:
 def _moments(folder: Path, quads: IntArray) -> tuple[FloatArray, FloatArray]:
     """From the meshes that were written: exact for straight-sided quadrilaterals."""
     folders = [path for path in folder.iterdir() if (path / "polyMesh/points").exists()]
-    found = sorted(
+    modes = sorted(
         (float(path.name), _points(path / "polyMesh/points")) for path in folders if path.name != "constant"
     )
-    return np.array([time for time, _ in found]), np.array([_moment(points[quads]) for _, points in found])
+    return np.array([time for time, _ in modes]), np.array([_moment(points[quads]) for _, points in modes])
 
 
 def _points(path: Path) -> FloatArray:
@@ -291,9 +291,9 @@ def quasi_static(chamber: Chamber) -> tuple[float, float]:
     mean = np.sin(half) / half
     square = 0.5 + np.sin(2 * half) / (4 * half)
     # Along the chamber's middle and across it; the liquid's moment loses eta a where the surface moves out.
-    along = a**2 * 2 * half * (square - mean**2)
+    axial = a**2 * 2 * half * (square - mean**2)
     across = a**2 * 2 * half * (1 - square)
-    return GRAVITY * float(np.hypot(along, across)), GRAVITY * mean * (1 - a)
+    return GRAVITY * float(np.hypot(axial, across)), GRAVITY * mean * (1 - a)
 
 
 def frequencies(time: FloatArray, values: FloatArray, *, after: float, count: int) -> FloatArray:
@@ -305,15 +305,15 @@ def frequencies(time: FloatArray, values: FloatArray, *, after: float, count: in
     free = free - free.mean()
     hankel = np.lib.stride_tricks.sliding_window_view(free, len(free) // 2)
     _, size, basis = np.linalg.svd(hankel, full_matrices=False)
-    kept = basis[: int(np.sum(size > _NOISE * size[0]))].T
-    poles = np.linalg.eigvals(np.linalg.lstsq(kept[:-1], kept[1:], rcond=None)[0])
+    reduced = basis[: int(np.sum(size > _NOISE * size[0]))].T
+    poles = np.linalg.eigvals(np.linalg.lstsq(reduced[:-1], reduced[1:], rcond=None)[0])
     powers = poles[None, :] ** np.arange(len(free))[:, None]
     strength = np.abs(np.linalg.lstsq(powers, free.astype(complex), rcond=None)[0])
     frequency = np.angle(poles) / (_EVERY * float(time[1] - time[0]))
-    found: list[float] = []
+    modes: list[float] = []
     # A wave of finite height shows beside its line a weaker one nearby: the stronger one counts.
     for i in np.argsort(-strength):
-        apart = all(abs(frequency[i] / other - 1) > 0.15 for other in found)
+        apart = all(abs(frequency[i] / other - 1) > 0.15 for other in modes)
         if frequency[i] > 0.1 and strength[i] > 0.03 * strength.max() and apart:
-            found.append(float(frequency[i]))
-    return np.sort(found)[:count]
+            modes.append(float(frequency[i]))
+    return np.sort(modes)[:count]

@@ -28,7 +28,7 @@ class FieldErrors:
 
     velocity_l2: float
     velocity_h1: float
-    """Of the gradient alone."""
+    """Error of the gradient alone."""
     pressure_l2: float
 
 
@@ -110,9 +110,9 @@ def kovasznay(*, reynolds: float) -> tuple[Field, Field, Field]:
 
     def gradient(x: FloatArray) -> FloatArray:
         decay, cosine, sine = np.exp(rate * x[0]), np.cos(turn * x[1]), np.sin(turn * x[1])
-        along = np.stack([-rate * decay * cosine, turn * decay * sine])
+        streamwise = np.stack([-rate * decay * cosine, turn * decay * sine])
         across = np.stack([rate**2 / turn * decay * sine, rate * decay * cosine])
-        return np.stack([along, across])
+        return np.stack([streamwise, across])
 
     def pressure(x: FloatArray) -> FloatArray:
         return np.asarray(-np.exp(2 * rate * x[0]) / 2, dtype=np.float64)
@@ -238,7 +238,7 @@ _CENTRE, _RADIUS, _HEIGHT, _LENGTH = (0.2, 0.2), 0.05, 0.41, 2.2
 _VISCOSITY = 1e-3
 
 
-def cylinder_mesh(*, around: int, across: int, along: int, growth: float = 8.0) -> Any:
+def cylinder_mesh(*, around: int, across: int, lengthwise: int, growth: float = 8.0) -> Any:
     """Curved mesh of benchmark 2D-1: a ring of four patches about the cylinder, then the channel.
 
     Args: `around`: cells on a quarter of the cylinder, and across the channel. `across`: cells from the
@@ -255,7 +255,7 @@ def cylinder_mesh(*, around: int, across: int, along: int, growth: float = 8.0) 
         angles = np.pi * (1.25 + 0.5 * (side + line[:, 0]))
         outer = (1 - line) * corners[side] + line * corners[side + 1]
         patches.append(ruled(inner=_arc(_RADIUS, angles, _CENTRE), outer=outer, blend=blend))
-    x = with_midpoints(vertices=geometric_vertices(cells=along, ratio=4.0))
+    x = with_midpoints(vertices=geometric_vertices(cells=lengthwise, ratio=4.0))
     patches.append(tensor(x=_HEIGHT + (_LENGTH - _HEIGHT) * x, y=_HEIGHT * line[:, 0]))
     return patch_mesh(
         patches,

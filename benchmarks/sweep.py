@@ -21,7 +21,7 @@ from ringbalance.scene import AnyScene
 
 KEPT: Final = Path(__file__).parent / "sweep.json"
 SHOWN: Final = ("wall_pressure", "velocity")
-"""Of the quantities whose models are compared."""
+"""Names of the quantities whose models are compared."""
 ON_PAPER: Final = (1000, 10_000, 100_000)
 """Designs of a sweep by many workers."""
 CALIBRATED, CHECKED = 20, 12

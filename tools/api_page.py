@@ -29,7 +29,7 @@ def _entry(name: str, value: Any) -> str:
 
 
 def _docstring(value: Any) -> str:
-    """Of an alias, which has none of its own, what it stands for."""
+    """Docstring of a name; a fixed text for an alias, which has none."""
     if inspect.isfunction(value) or inspect.isclass(value):
         return inspect.getdoc(value) or ""
     return "A function of the time, s, and of the vibration, m, complex; gives a `Measurement`, or None."

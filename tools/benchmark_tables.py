@@ -13,8 +13,8 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 KEPT: Final = ROOT / "benchmarks" / "sweep.json"
 
 
-def kept() -> dict[str, Any]:
-    """What `python benchmarks/sweep.py --keep` has measured."""
+def kept_rates() -> dict[str, Any]:
+    """Result of `python benchmarks/sweep.py --keep`."""
     record: dict[str, Any] = json.loads(KEPT.read_text(encoding="utf-8"))
     return record
 
@@ -41,14 +41,14 @@ def models_table(record: Mapping[str, Any]) -> str:
 
 def levels_table(record: Mapping[str, Any]) -> str:
     """Rate and error of each level of a sweep."""
-    rows_err, known = (
+    rows_err, uncertainty = (
         f"{record['velocity']['error']:.0e}" if record["velocity"]["error"] else "0",
         percent(record["velocity"]["uncertainty"], digits=1),
     )
     levels = (
-        ("static", "`sweep --no-intervals`: the array core", rows_err, known),
-        ("intervals", "`sweep`: the same with both sides of every uncertain input", rows_err, known),
-        ("calibrate", "`calibrate`: one by one, with every uncertainty", "–", known),
+        ("static", "`sweep --no-intervals`: the array core", rows_err, uncertainty),
+        ("intervals", "`sweep`: the same with both sides of every uncertain input", rows_err, uncertainty),
+        ("calibrate", "`calibrate`: one by one, with every uncertainty", "–", uncertainty),
         (
             "runs",
             f"`sweep --runs {record['runs']}`: drawn devices in closed loop",

@@ -50,15 +50,15 @@ def printed(text: str) -> tuple[float, float] | None:
 def _idle_zeros(text: str) -> int:
     """Zeros at the end of a whole number that its uncertainty leaves without a meaning: 1 in 920 ± 100."""
     parts = [part.split("\u202f×")[0] for part in text.split("±")]
-    found = [match[0] for part in parts if (match := re.search(r"\d+(?:\u202f\d{3})*(?:\.\d+)?", part))]
-    if any("." in part for part in found):
+    numbers = [match[0] for part in parts if (match := re.search(r"\d+(?:\u202f\d{3})*(?:\.\d+)?", part))]
+    if any("." in part for part in numbers):
         return 0
-    bare = [part.replace("\u202f", "") for part in found]
+    bare = [part.replace("\u202f", "") for part in numbers]
     return min(len(part) - len(part.rstrip("0")) for part in bare)
 
 
 def agrees(text: str, value: float | str) -> bool:
-    """Whether a printed text is a value in one of the units that values are printed in."""
+    """True if a printed text is a value in one of the units that values are printed in."""
     number = printed(text)
     if number is None or isinstance(value, str):
         return text == value
@@ -78,10 +78,10 @@ def apart(evidence: Any) -> list[dict[str, float]]:
 
 def _held(evidence: Any, path: str) -> float | None:
     try:
-        found: float | None = evidence_at(evidence, path)
+        numbers: float | None = evidence_at(evidence, path)
     except (KeyError, IndexError):
         return None
-    return found
+    return numbers
 
 
 def main(folder: Path) -> int:

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import scene_reference
 from api_page import name_reference
-from benchmark_tables import kept, levels_table, markdown, models_table, workers_table
+from benchmark_tables import kept_rates, levels_table, markdown, models_table, workers_table
 from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
@@ -66,9 +66,9 @@ def _explained(kind: Kind, *, measured: bool) -> list[str]:
 
 
 def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
-    """What stands behind each quantity, by the documents of the cases; heavy ones count as kept."""
-    kept = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
-    return markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
+    """Evidence behind each quantity, by the documents of the cases; heavy ones are the stored ones."""
+    heavy = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
+    return markdown(HEADS, standing_rows([{**case, **heavy.get(case["id"], {})} for case in cases]))
 
 
 def finding_table() -> str:
@@ -126,8 +126,11 @@ PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
         "docs/findings.md": lambda: {"findings": finding_table()},
         "docs/export.md": lambda: {"block_variables": block_table()},
         "docs/is-k-50-right.md": document_tables,
-        "docs/how-to-choose.md": lambda: {"models": models_table(kept()), "levels": levels_table(kept())},
-        "docs/clusters.md": lambda: {"workers": workers_table(kept())},
+        "docs/how-to-choose.md": lambda: {
+            "models": models_table(kept_rates()),
+            "levels": levels_table(kept_rates()),
+        },
+        "docs/clusters.md": lambda: {"workers": workers_table(kept_rates())},
         "docs/standing.md": lambda: {"standing": standing_table(_documents())},
     }
 )

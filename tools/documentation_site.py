@@ -1,4 +1,4 @@
-"""What the site needs beside Sphinx: order of pages, equations, first page. An extension of docs/conf.py."""
+"""Additions to Sphinx for the site: order of pages, equations, first page. An extension of docs/conf.py."""
 
 from __future__ import annotations
 

@@ -26,14 +26,14 @@ def document_tables() -> dict[str, str]:
     """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube."""
     scene = paper_scene()
     calibration = calibrate(scene)
-    found = SECTION.collect(Work(scene=scene, level="light"))
-    assert found is not None
+    section = SECTION.collect(Work(scene=scene, level="light"))
+    assert section is not None
     return {
-        "liquids": _liquids_table(found["liquids"]),
+        "liquids": _liquids_table(section["liquids"]),
         "bores": _bores_table(calibration),
         "rule": rule(calibration),
         "library": _library_table(),
-        "hidden": _hidden_table(found["separated"]["velocity_of_50_m_s"], calibration),
+        "hidden": _hidden_table(section["separated"]["velocity_of_50_m_s"], calibration),
     }
 
 
@@ -81,7 +81,7 @@ def _bores_table(calibration: Calibration) -> str:
 
 
 def rule(calibration: Calibration) -> str:
-    """Where k = 50 lies, as one number for laminar flow in this tube."""
+    """Velocity and Reynolds number of k = 50 in laminar flow, as one number for this tube."""
     laminar = [nu for nu in _VISCOSITIES if 5e-6 <= nu <= 1e-4]
     drag = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar)
     bores = drag.bores_for(drag.point.k)
@@ -128,19 +128,19 @@ def _bore(value: float | None) -> str:
 
 
 def _hidden_table(velocity_of_50: float, calibration: Calibration) -> str:
-    """What Eq. 18 reads off a column separated at the crest, over the velocity."""
+    """Apparent k by Eq. 18 of a column separated at the crest, over the velocity."""
     law = calibration.flow_law
     density, opposite = law.density, law.max_fill_ratio / 2
     rows = []
     for wanted in (2.0, velocity_of_50, 5.0, 10.0):
-        own, read = (float(k) for k in read_by_eq_18(law, wanted, opposite_fill_ratio=opposite))
+        k_siphon, read = (float(k) for k in read_by_eq_18(law, wanted, opposite_fill_ratio=opposite))
         pressure = (read + 1) * density * wanted**2 / 2
         error = np.sqrt((read + 1) / (paper.PAPER_DRAG_COEFFICIENT + 1)) - 1
         rows.append(
             (
                 shown(wanted, "m/s", digits=2),
                 shown(pressure, "Pa", digits=2),
-                number(own, digits=2),
+                number(k_siphon, digits=2),
                 number(read, digits=2),
                 percent(float(error), signed=True, digits=2),
             )

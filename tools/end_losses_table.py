@@ -72,9 +72,9 @@ class EndSettings:
     def points(self) -> list[tuple[str, float]]:
         """Kind, "node" or "check", and ln(1 + Re/5) of all points, in rising order."""
         nodes = np.round(np.linspace(0.0, np.log1p(REYNOLDS_LIMIT / REYNOLDS_SCALE), self.nodes), 12)
-        found = [("node", float(a)) for a in nodes]
-        found += [("check", float((nodes[i] + nodes[i + 1]) / 2)) for i in self.checks]
-        return sorted(found, key=lambda point: point[1])
+        listed = [("node", float(a)) for a in nodes]
+        listed += [("check", float((nodes[i] + nodes[i + 1]) / 2)) for i in self.checks]
+        return sorted(listed, key=lambda point: point[1])
 
     def mesh(self, end: End, level: int) -> EndMesh:
         """Mesh of an end.
@@ -135,10 +135,12 @@ def table_text(*, folder: Path, settings: EndSettings) -> str:
     for end in ENDS:
         runs = [json.loads((folder / f"{end}_{level}.json").read_text(encoding="utf-8")) for level in levels]
         for (kind, a), values in zip(settings.points(), zip(*runs, strict=True), strict=True):
-            found = gci(
+            convergence = gci(
                 values=list(values)[::-1], sizes=sizes, formal_order=settings.formal_order, round_off=1e-6
             )
-            rows.append(f"{end},{kind},{a!r},{','.join(f'{v:.7f}' for v in values)},{found.uncertainty:.3e}")
+            rows.append(
+                f"{end},{kind},{a!r},{','.join(f'{v:.7f}' for v in values)},{convergence.uncertainty:.3e}"
+            )
     body = "\n".join(rows) + "\n"
     plain = json.dumps(asdict(settings), sort_keys=True)
     head = [

@@ -64,11 +64,13 @@ def with_gas_tube(volume: list[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def name_of(face: int) -> str:
-    """Of a boundary, by where it lies."""
+    """Name of a boundary by its position."""
     low, high = gmsh.model.getParametrizationBounds(2, face)
     inside = [[a + part * (b - a) for a, b in zip(low, high, strict=True)] for part in (0.2, 0.5, 0.8)]
     corners = gmsh.model.getBoundingBox(2, face)
-    if all(abs(math.hypot(*gmsh.model.getValue(2, face, place)[:2]) - OUTER) < 1e-6 for place in inside):
+    if all(
+        abs(math.hypot(*gmsh.model.getValue(2, face, point_uv)[:2]) - OUTER) < 1e-6 for point_uv in inside
+    ):
         return "outer_wall"
     if max(map(abs, (corners[1], corners[2], corners[4], corners[5]))) < 1.01 * TUBE_RADIUS:
         return "gas_hole" if abs(corners[0] - TUBE_TIP) < 1e-3 else "gas_tube"

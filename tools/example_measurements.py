@@ -88,16 +88,16 @@ def _observations(kind: str, columns: Mapping[str, npt.ArrayLike], chamber: Sequ
 def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Observations:
     """The plan with what the truth predicts, and noise."""
     scene = truth(kind)
-    found = KINDS[kind].predict(scene, plan, inputs_of(scene).models)
+    exact = KINDS[kind].predict(scene, plan, inputs_of(scene).models)
     columns = dict(plan.columns)
     if kind == "trial_amplitude":
         size = _VIBRATION_NOISE["liquid_ring"]
-        columns["amplitude"] = np.abs(found + size * random.standard_normal(len(plan)))
+        columns["amplitude"] = np.abs(exact + size * random.standard_normal(len(plan)))
     elif KINDS[kind].has_amplitudes:
-        columns |= _vibrations(kind, found[: len(plan)] + 1j * found[len(plan) :], scene, random)
+        columns |= _vibrations(kind, exact[: len(plan)] + 1j * exact[len(plan) :], scene, random)
     else:
-        noise = _RELATIVE_NOISE[kind] * found if kind in _RELATIVE_NOISE else _ANGLE_NOISE
-        columns[KINDS[kind].noisy_column(plan)] = found + noise * random.standard_normal(len(plan))
+        noise = _RELATIVE_NOISE[kind] * exact if kind in _RELATIVE_NOISE else _ANGLE_NOISE
+        columns[KINDS[kind].noisy_column(plan)] = exact + noise * random.standard_normal(len(plan))
     return _observations(kind, columns, plan.chamber.tolist())
 
 

@@ -48,7 +48,7 @@ def _reference_coordinates(system: FlowSystem, points: FloatArray, elements: Int
 
 
 def _outside(local: FloatArray, simplex: bool) -> FloatArray:
-    """How far reference coordinates lie outside the element, 0 inside."""
+    """Distance of reference coordinates from the element, 0 inside."""
     excess = np.maximum(-local.min(axis=0), (local.sum(axis=0) if simplex else local.max(axis=0)) - 1)
     return np.asarray(np.maximum(excess, 0.0), dtype=np.float64)
 
@@ -65,9 +65,9 @@ def _locate(*, system: FlowSystem, points: npt.ArrayLike) -> tuple[IntArray, Flo
     local = _reference_coordinates(system, at[:, point], element)
     outside = _outside(local, system.velocity.mesh.refdom.__name__ in ("RefTri", "RefTet"))
     order = np.lexsort((outside, point))
-    found, first = np.unique(point[order], return_index=True)
+    unique, first = np.unique(point[order], return_index=True)
     best = order[first]
-    if found.size < at.shape[1] or np.any(outside[best] > _MARGIN):
+    if unique.size < at.shape[1] or np.any(outside[best] > _MARGIN):
         raise ValueError("a point lies outside the mesh")
     return element[best], local[:, best]
 

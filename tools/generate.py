@@ -33,12 +33,12 @@ TARGETS: Final = MappingProxyType(
 
 def asked(words: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
     """Targets with the words that narrow them down. Raises: SystemExit: none, or a word before the first."""
-    places = [place for place, word in enumerate(words) if word in TARGETS]
+    places = [start for start, word in enumerate(words) if word in TARGETS]
     if not places or places[0]:
         lines = (f"    {name:<20}{text}" for name, (_, text) in TARGETS.items())
         raise SystemExit("\n".join([(__doc__ or "").rstrip(), *lines]))
-    for place, end in zip(places, [*places[1:], len(words)], strict=True):
-        yield words[place], [*words[place + 1 : end]]
+    for start, end in zip(places, [*places[1:], len(words)], strict=True):
+        yield words[start], [*words[start + 1 : end]]
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -25,7 +25,7 @@ TARGET = Path(__file__).resolve().parents[1] / "reports" / "data" / PACKAGED
 
 
 def kept_document(document: Mapping[str, Any]) -> Record:
-    """What is worth keeping of an evidence document for later reports."""
+    """Parts of an evidence document that later reports use."""
     return {
         "format": document["format"],
         "versions": document["versions"],
@@ -35,23 +35,23 @@ def kept_document(document: Mapping[str, Any]) -> Record:
 
 def document_of(path: Path) -> dict[str, Any]:
     """The evidence in a file; bare cases get the date of their file, and the versions at hand."""
-    found = json.loads(path.read_text(encoding="utf-8"))
-    if isinstance(found, dict):
-        return found
+    document = json.loads(path.read_text(encoding="utf-8"))
+    if isinstance(document, dict):
+        return document
     day = date.fromtimestamp(path.stat().st_mtime).isoformat()
-    return {"format": FORMAT, "versions": versions(), "verification": found, "times": {"date": day}}
+    return {"format": FORMAT, "versions": versions(), "verification": document, "times": {"date": day}}
 
 
 def main(arguments: list[str]) -> int:
     """Write the packaged evidence from files of heavy results."""
-    kept = document_of(TARGET)
-    cases = {case["id"]: case for case in heavy_cases(kept)}
+    stored = document_of(TARGET)
+    cases = {case["id"]: case for case in heavy_cases(stored)}
     for path in map(Path, arguments):
         document = document_of(path)
         cases |= {case["id"]: case for case in heavy_cases(document)}
-        kept = kept_document(document)
-    kept["verification"] = list(cases.values())
-    write_whole(TARGET, json.dumps(kept, allow_nan=False, indent=1, ensure_ascii=False) + "\n")
+        stored = kept_document(document)
+    stored["verification"] = list(cases.values())
+    write_whole(TARGET, json.dumps(stored, allow_nan=False, indent=1, ensure_ascii=False) + "\n")
     print(f"{len(cases)} heavy cases kept in {TARGET}: {', '.join(cases)}")
     return 0
 

@@ -26,12 +26,12 @@ _ASK = "import sys, ensurepip, venv; print('%d.%d' % sys.version_info[:2])"
 
 def supported(classifiers: Sequence[str]) -> list[str]:
     """Minor versions that classifiers name, such as "3.11", in rising order."""
-    found = (re.fullmatch(r"Programming Language :: Python :: 3\.(\d+)", text) for text in classifiers)
-    return [f"3.{minor}" for minor in sorted(int(match[1]) for match in found if match)]
+    matches = (re.fullmatch(r"Programming Language :: Python :: 3\.(\d+)", text) for text in classifiers)
+    return [f"3.{minor}" for minor in sorted(int(match[1]) for match in matches if match)]
 
 
 def starts(python: Path, version: str) -> bool:
-    """Whether this is an interpreter of that minor version which runs and can make environments."""
+    """True if this is an interpreter of that minor version which runs and can make environments."""
     try:
         answer = subprocess.run([python, "-c", _ASK], capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired):
@@ -40,7 +40,7 @@ def starts(python: Path, version: str) -> bool:
 
 
 def candidates(version: str) -> Iterator[Path]:
-    """Where an interpreter of a minor version may be."""
+    """Paths at which an interpreter of a minor version may be."""
     for folder in filter(None, os.environ.get("PATH", "").split(os.pathsep)):
         yield Path(folder) / f"python{version}"
     pyenv = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv")
@@ -65,10 +65,10 @@ def main() -> int:
     others = interpreters([version for version in versions if version != running])
     for version, python in others.items():
         print(f"Python {version}: {python or 'not on this machine, not tested'}", flush=True)
-    here = [version for version in versions if version == running or others[version]]
+    present = [version for version in versions if version == running or others[version]]
     for version, python in others.items():
         if python is not None:
-            target = "test-numbers" if version in (here[0], here[-1]) else "test-short"
+            target = "test-numbers" if version in (present[0], present[-1]) else "test-short"
             command = ["make", target, f"VENV=.venv-{version}", f"PYTHON={python}"]
             code = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
             if code != 0:

@@ -60,7 +60,7 @@ class Session:
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "page"})
 
     def run(self, language: str, code: str) -> str:
-        """What a block prints. Raises: PageError: a command that fails."""
+        """Output of a block. Raises: PageError: a command that fails."""
         if language == "python":
             return self._python(code)
         return "".join(self._command(line) for line in code.replace("\\\n", " ").splitlines())
@@ -72,8 +72,8 @@ class Session:
         return printed.getvalue()
 
     def _command(self, line: str) -> str:
-        own = _COMMAND.fullmatch(line.strip())
-        ended, printed, said = self._program(*own.groups()) if own else self._shell(line)
+        command = _COMMAND.fullmatch(line.strip())
+        ended, printed, said = self._program(*command.groups()) if command else self._shell(line)
         if ended:
             raise PageError(f"{line} ends with {ended}:\n{printed}{said}")
         return printed
@@ -129,7 +129,7 @@ def _ended_with(act: Callable[[], int]) -> None:
 
 
 def numbers_agree(first: str, second: str) -> bool:
-    """Whether two lines differ in the last digits of numbers alone: other processors sum in other orders."""
+    """True if two lines differ in the last digits of numbers alone: other processors sum in other orders."""
     pairs = zip(_NUMBER.findall(first), _NUMBER.findall(second), strict=True)
     return all(abs(float(a) - float(b)) <= max(_last_digit(a), 1e-3 * abs(float(a))) for a, b in pairs)
 
@@ -150,21 +150,25 @@ def shown_lines(shown: Sequence[str], printed: Sequence[str]) -> list[str]:
     """
     if not shown:
         return list(printed)
-    lines, place, gap = [], 0, False
+    lines, position, gap = [], 0, False
     for line in shown:
         if line == GAP:
             lines.append(line)
             gap = True
             continue
-        last = len(printed) if gap else place + 1
-        alike = [i for i in range(place, min(last, len(printed))) if _skeleton(printed[i]) == _skeleton(line)]
+        last = len(printed) if gap else position + 1
+        alike = [
+            i for i in range(position, min(last, len(printed))) if _skeleton(printed[i]) == _skeleton(line)
+        ]
         if not alike:
-            raise PageError(f"shown but not printed: {line!r}, printed there: {printed[place : place + 3]}")
+            raise PageError(
+                f"shown but not printed: {line!r}, printed there: {printed[position : position + 3]}"
+            )
         index = next((i for i in alike if numbers_agree(line, printed[i])), alike[0])
         lines.append(line if numbers_agree(line, printed[index]) else printed[index])
-        place, gap = index + 1, False
-    if place < len(printed) and not gap:
-        raise PageError(f"printed but not shown: {printed[place:]}")
+        position, gap = index + 1, False
+    if position < len(printed) and not gap:
+        raise PageError(f"printed but not shown: {printed[position:]}")
     return lines
 
 
@@ -175,10 +179,10 @@ def fresh_page(page: str, folder: Path) -> str:
     """
     session = Session(folder)
     pieces: list[str] = []
-    place, printed = 0, None
+    position, printed = 0, None
     for block in FENCE.finditer(page):
         language, body = block[1], block[2]
-        between = page[place : block.start()]
+        between = page[position : block.start()]
         pieces.append(between)
         before = between.rstrip().rpartition("\n")[2]
         name = _FILE.search(before) if language != "sh" else None
@@ -195,8 +199,8 @@ def fresh_page(page: str, folder: Path) -> str:
         else:
             printed = None
         pieces.append(f"```{language}\n{body}```")
-        place = block.end()
-    return "".join(pieces) + page[place:]
+        position = block.end()
+    return "".join(pieces) + page[position:]
 
 
 def fresh(path: Path) -> dict[Path, str]:
@@ -210,7 +214,7 @@ def fresh(path: Path) -> dict[Path, str]:
             (folder / linked).symlink_to(ROOT / linked, target_is_directory=True)
         page = fresh_page(path.read_text(encoding="utf-8"), folder)
         written = {each.name: each for each in folder.rglob("*.svg")}
-        pictures = [path.parent / place for place in _PICTURE.findall(page)]
+        pictures = [path.parent / position for position in _PICTURE.findall(page)]
         return {path: page} | {
             each: fresh_picture(each, written[each.name].read_text(encoding="utf-8"))
             for each in pictures
@@ -218,11 +222,11 @@ def fresh(path: Path) -> dict[Path, str]:
         }
 
 
-def fresh_picture(path: Path, drawn: str) -> str:
+def fresh_picture(path: Path, svg: str) -> str:
     """A picture as it was drawn, or as it is kept where no more than last digits differ."""
-    kept = path.read_text(encoding="utf-8") if path.exists() else ""
-    first, second = (_NAME.sub("", each) for each in (kept, drawn))
-    return kept if _skeleton(first) == _skeleton(second) and numbers_agree(first, second) else drawn
+    current = path.read_text(encoding="utf-8") if path.exists() else ""
+    first, second = (_NAME.sub("", each) for each in (current, svg))
+    return current if _skeleton(first) == _skeleton(second) and numbers_agree(first, second) else svg
 
 
 def pages() -> list[Path]:

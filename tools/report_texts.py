@@ -1,4 +1,4 @@
-"""What the pages of two kept reports say, as plain text: what tests compare the templates' words with."""
+"""Plain text of the pages of two kept reports, with which tests compare the templates' words with."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ def kept_evidence(name: str) -> dict[str, Any]:
 
 
 def page_text(page: str) -> str:
-    """What a page says, a line for each block, cells between bars."""
+    """Text of a page, a line for each block, cells between bars."""
     bare = re.sub(r"(?s)<(svg|style|script|head)\b.*?</\1>", " ", page)
     blocks = re.sub(rf"</?(?:{_BLOCKS})\b[^>]*>", "\n", bare)
     cells = re.sub(r"</?(?:td|th)\b[^>]*>", " | ", blocks)
     plain = unescape(re.sub(r"<[^>]+>", "", cells.replace("<br>", " ")))
     lines = (re.sub(r"\s+", " ", line) for line in plain.split("\n"))
-    kept = (re.sub(r"[ |]*\|[ |]*", " | ", line).strip() for line in lines if line.strip(" |"))
-    return "\n".join(kept) + "\n"
+    texts = (re.sub(r"[ |]*\|[ |]*", " | ", line).strip() for line in lines if line.strip(" |"))
+    return "\n".join(texts) + "\n"
 
 
 def report_text(evidence: dict[str, Any]) -> str:
-    """What report and annex say, but the hash of the evidence."""
+    """Text of report and annex, without the hash of the evidence."""
     text = "\n".join(page_text(page) for page in render(evidence).values())
     return re.sub(r"(?<=evidence\.json\n)SHA-256 \w+", "SHA-256 ...", text)
 

@@ -60,7 +60,7 @@ class TableSettings:
     """Cells n of `SectionMesh`, coarse to fine; one and a half times as many across."""
     wall_ratio: float = 15.0
     formal_order: float = 4.0
-    """Of the friction ratio, a functional of a velocity that converges at order 2 in its gradient."""
+    """Order of the friction ratio, a functional of a velocity that converges at order 2 in its gradient."""
     newton_tolerance: float = 1e-7
     path_level: int = 1
     """Mesh on which the paths are followed; the other meshes start from its flows."""
@@ -70,7 +70,7 @@ class TableSettings:
     """Longest step in `a` above that Kl."""
 
     def plain(self) -> dict[str, object]:
-        """As plain data, for a header. Returns: Field names and values."""
+        """Settings as plain data, for a header. Returns: Field names and values."""
         return asdict(self)
 
 
@@ -165,16 +165,16 @@ def _all_values(
     newton = NewtonSettings(tolerance=settings.newton_tolerance, max_iterations=30)
     values = []
     for level, mesh in enumerate(meshes):
-        found = flow
+        solution = flow
         if level != settings.path_level:
             moved = transfer(source=meshes[settings.path_level], solution=flow, target=mesh)
             start = replace(flow, vector=moved)
-            found = solve_point(
+            solution = solve_point(
                 table=column.table, a=a, b=column.b, system=mesh, start=start, settings=newton
             )
-        if not found.status.ok:
-            raise ArithmeticError(f"{column.table} a = {a}, b = {column.b}: {found.status.text}")
-        values.append(friction_ratio(found))
+        if not solution.status.ok:
+            raise ArithmeticError(f"{column.table} a = {a}, b = {column.b}: {solution.status.text}")
+        values.append(friction_ratio(solution))
     return values
 
 
@@ -239,9 +239,9 @@ def _row(column: Column, a: float, values: list[float], settings: TableSettings)
     sizes = [1 / n for n in reversed(settings.around)]
     # Newton's tolerance bounds the noise that the difference of two meshes carries.
     noise = settings.newton_tolerance * values[-1]
-    found = gci(values=values[::-1], sizes=sizes, formal_order=settings.formal_order, round_off=noise)
+    solution = gci(values=values[::-1], sizes=sizes, formal_order=settings.formal_order, round_off=noise)
     numbers = ",".join(f"{v:.9f}" for v in values)
-    return f"{column.table},{a!r},{column.b!r},{numbers},{found.uncertainty:.3e}"
+    return f"{column.table},{a!r},{column.b!r},{numbers},{solution.uncertainty:.3e}"
 
 
 def table_text(*, folder: Path, settings: TableSettings) -> str:

@@ -58,7 +58,7 @@ def _told(schema: Schema | None, name: str) -> object:
 
 def widths(schema: Schema) -> list[str]:
     """The uncertain quantities of each table: all take the same."""
-    own = {
+    variants = {
         name: [key for key, declared in table.keys.items() if declared.uncertain]
         for name, table in schema.tables.items()
     }
@@ -71,7 +71,7 @@ def widths(schema: Schema) -> list[str]:
     return [
         f"It has {how}: a percentage, or a value with its unit. Left out: exact{liquid}.\n",
         "| of table | quantities |\n|---|---|",
-        *(f"| [{name}] | `{'`, `'.join(keys)}` |" for name, keys in own.items() if keys),
+        *(f"| [{name}] | `{'`, `'.join(keys)}` |" for name, keys in variants.items() if keys),
     ]
 
 
@@ -119,7 +119,7 @@ def rows(keys: Mapping[str, Key]) -> list[str]:
 
 
 def when_left_out(key: Key) -> str:
-    """What holds without a key."""
+    """Default of a key, in words."""
     if key.presence.kind == "standard":
         return f"`{toml_text(key.presence.default)}`"
     return key.presence.otherwise

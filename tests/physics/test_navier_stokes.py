@@ -112,7 +112,7 @@ def test_cavity_at_reynolds_1000() -> None:
 
 
 def _cylinder(around: int, across: int, along: int) -> tuple[float, float, float, int]:
-    system, solution = cylinder_flow(mesh=cylinder_mesh(around=around, across=across, along=along))
+    system, solution = cylinder_flow(mesh=cylinder_mesh(around=around, across=across, lengthwise=along))
     assert solution.status.ok
     found = cylinder_forces(system=system, solution=solution)
     drag, lift = found.drag / 5.57953523384 - 1, found.lift / 0.010618948146 - 1

@@ -7,10 +7,8 @@ import copy
 import json
 import math
 import pickle
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,56 +16,32 @@ from typing import Any
 
 import numpy as np
 import pytest
+from short_answers import answer, driven, short
 
 import ringbalance as rb
 from ringbalance import face
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
-from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
-MEASUREMENTS = rb.bundled_scene("liquid_ring_paper").parent / "measurements"
 LONGEST_TEXT = 12
 """Lines; statuses take what they need on one."""
 
 
-@cache
-def short() -> Scene:
-    """The paper's scene, for six seconds."""
-    scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
-    return liquid_ring_scene(scene).with_values({"run.time_limit": "6 s"})
-
-
-@cache
-def driven() -> rb.EccentricScene:
-    """Two eccentric masses, until shortly after the start."""
-    scene = eccentric_scene(rb.load_scene(rb.bundled_scene("driven_masses_small")))
-    return scene.with_values({"run.time_limit": 2.0})
-
-
-ANSWERS: dict[str, Callable[[], Any]] = {
-    "scene": short,
-    "eccentric scene": driven,
-    "calibration": lambda: rb.calibrate(short()),
-    "law": lambda: rb.calibrate(short()).flow_law,
-    "paper's law": lambda: rb.paper_law(short()),
-    "run": lambda: rb.simulate(short(), flow_law=rb.paper_law(short())),
-    "eccentric run": lambda: rb.simulate(driven()),
-    "tuning": lambda: rb.tune(short(), flow_law=rb.paper_law(short())),
-    "fit": lambda: rb.fit(short(), MEASUREMENTS / "trial_weight.csv"),
-    "comparison": lambda: rb.compare(short(), short()),
-}
+ANSWERS = (
+    *("scene", "eccentric scene", "calibration", "law", "paper's law", "run", "eccentric run"),
+    *("tuning", "fit", "comparison"),
+)
 
 
 @pytest.mark.parametrize("name", ANSWERS)
 def test_answers_pickle_copy_and_print_shortly(name: str) -> None:
-    answer = ANSWERS[name]()
-    text = repr(answer)
+    result = answer(name)
+    text = repr(result)
     assert 2 <= len(text.splitlines()) <= LONGEST_TEXT
     assert len(text) < 1500
-    for again in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
+    for again in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
         assert repr(again) == text
-        if hasattr(answer, "to_dict"):
-            assert json.dumps(again.to_dict()) == json.dumps(answer.to_dict())
+        if hasattr(result, "to_dict"):
+            assert json.dumps(again.to_dict()) == json.dumps(result.to_dict())
 
 
 def test_a_pool_gives_calibrations_back() -> None:
@@ -79,7 +53,7 @@ def test_a_pool_gives_calibrations_back() -> None:
 
 
 def test_what_tune_recommends_is_a_scene_that_runs() -> None:
-    tuning = rb.tune(short(), flow_law=rb.paper_law(short()))
+    tuning = answer("tuning")
     scene = liquid_ring_scene(tuning.recommended_scene)
     assert scene.controller == tuning.scene.controller
     assert scene.sha256 != short().sha256
@@ -87,11 +61,11 @@ def test_what_tune_recommends_is_a_scene_that_runs() -> None:
     assert rb.simulate(scene, flow_law=rb.paper_law(scene)).scene == scene
 
 
-@pytest.mark.parametrize("asked", [True, False])
-def test_a_search_over_the_pressure_can_be_asked_for(monkeypatch: pytest.MonkeyPatch, asked: bool) -> None:
+@pytest.mark.parametrize("pressure", [True, False])
+def test_a_search_over_the_pressure_is_an_option(monkeypatch: pytest.MonkeyPatch, pressure: bool) -> None:
     monkeypatch.setattr(face, "tuned", lambda _, **options: options)
-    options: Any = rb.tune(short(), flow_law=rb.paper_law(short()), pressure=asked)
-    assert options["along"] is asked
+    options: Any = rb.tune(short(), flow_law=rb.paper_law(short()), pressure=pressure)
+    assert options["along"] is pressure
 
 
 class Wrapped:
@@ -112,7 +86,7 @@ class Wrapped:
 def test_an_algorithm_of_one_s_own_runs_and_is_named() -> None:
     law = rb.paper_law(short())
     own = rb.simulate(short(), flow_law=law, controller=Wrapped(1.0))
-    usual = rb.simulate(short(), flow_law=law)
+    usual = answer("run")
     np.testing.assert_array_equal(own.amplitude, usual.amplitude[: own.amplitude.size])
     assert own.to_dict()["controller"] == "Wrapped"
     assert own.to_dict()["gas_line_runs"] == []

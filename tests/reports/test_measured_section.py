@@ -10,7 +10,6 @@ import pytest
 
 from ringbalance.reports.evidence import _scene_record
 from ringbalance.reports.page import render
-from ringbalance.reports.pages import eccentric
 from ringbalance.reports.pages.measured import SECTION
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import Measured, MeasuredFile, MeasuredFinding, _MeasuredQuantity
@@ -49,9 +48,11 @@ def fitted(evidence: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.usefixtures("unwritten")
-def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
-    page = render(fitted)["annex.html"]
-    section = page.split('id="measured"')[1].split("<section")[0]
+def test_report_and_annex_of_a_fitted_scene_name_its_measurements(fitted: dict[str, Any]) -> None:
+    pages = render(fitted)
+    assert "Fitted to 31 measurements of this device" in pages["report.html"]
+    assert "No comparison with measurements of this device exists" not in pages["report.html"]
+    section = pages["annex.html"].split('id="measured"')[1].split("<section")[0]
     text = " ".join(re.sub(r"<[^>]+>", " ", section).split())
     assert "fitted to 31 measurements" in text
     assert "identify 1 of 2 fitted quantities" in text
@@ -60,13 +61,6 @@ def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
     assert "1.450 to 1.550" in text
     assert "1.460 to 1.480" in text
     assert "The data identify" in text
-
-
-@pytest.mark.usefixtures("unwritten")
-def test_the_report_says_what_it_was_fitted_to(fitted: dict[str, Any]) -> None:
-    page = render(fitted)["report.html"]
-    assert "Fitted to 31 measurements of this device" in page
-    assert "No comparison with measurements of this device exists" not in page
 
 
 @pytest.mark.usefixtures("unwritten")
@@ -86,7 +80,3 @@ def test_the_evidence_has_what_the_scene_says(paper_scene: Scene) -> None:
     assert _scene_record(paper_scene, "")["measured"] is None
     scene = replace(paper_scene, measured=MEASURED)
     assert _scene_record(scene, "")["measured"]["files"][0]["rows"] == 31
-
-
-def test_both_balancers_show_it() -> None:
-    assert SECTION in eccentric.SECTIONS

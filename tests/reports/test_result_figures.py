@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from short_answers import answer, short
 
-import ringbalance as rb
 from ringbalance.reports.figure import LIGHT
 from ringbalance.results.result import Result, Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene import registry
-from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.trade import TradeStudy
-
-RIG = Path(__file__).resolve().parents[2] / "scenes" / "measurements" / "trial_weight.csv"
-
-
-@cache
-def short() -> rb.Scene:
-    scene = liquid_ring_scene(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
-    return scene.with_values({"run.time_limit": "6 s"})
 
 
 def trade_study() -> TradeStudy:
@@ -34,25 +24,10 @@ def trade_study() -> TradeStudy:
     return TradeStudy(scene=short(), quantities=(quantity,), times={"velocity": rates})
 
 
-@cache
-def results() -> dict[str, Result]:
-    law = rb.paper_law(short())
-    masses = rb.load_scene(rb.bundled_scene("driven_masses_small")).with_values({"run.time_limit": 2.0})
-    return {
-        "calibration": rb.calibrate(short()),
-        "run": rb.simulate(short(), flow_law=law),
-        "masses": rb.simulate(masses),
-        "tuning": rb.tune(short(), flow_law=law),
-        "fit": rb.fit(short(), RIG),
-        "comparison": rb.compare(short(), short()),
-        "trade": trade_study(),
-    }
-
-
-DRAWN = {
+FIGURES = {
     "calibration": {"tornado", "moment", "lambda", "drag"},
     "run": {"run-amplitude", "run-valve-open", "fill-ratios", "residual-polar"},
-    "masses": {"eccentric-amplitude", "eccentric-angles", "eccentric-imbalance", "eccentric-friction"},
+    "eccentric run": {"eccentric-amplitude", "eccentric-angles", "eccentric-imbalance", "eccentric-friction"},
     "tuning": {"settling"},
     "fit": {"fit-trial-weight-0"},
     "comparison": {"settling"},
@@ -60,10 +35,11 @@ DRAWN = {
 }
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", FIGURES)
 def test_a_result_draws_itself(name: str, tmp_path: Path) -> None:
-    figures = results()[name].plot(tmp_path / "result.svg")
-    assert {drawing.name for drawing in figures.drawings} == DRAWN[name]
+    result = trade_study() if name == "trade" else answer(name)
+    figures = result.plot(tmp_path / "result.svg")
+    assert {drawing.name for drawing in figures.drawings} == FIGURES[name]
     text = (tmp_path / "result.svg").read_text(encoding="utf-8")
     assert text == figures.svg() == figures._repr_svg_()
     assert ElementTree.fromstring(text).tag.endswith("svg")
@@ -88,12 +64,12 @@ def test_what_has_no_figure_says_so() -> None:
 
 
 def test_quantities_become_a_frame_and_a_dataset(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = {
+    packages = {
         "pandas_frame": lambda columns, index: (columns, index),
         "xarray_array": lambda value, attrs: (value, attrs),
         "xarray_dataset": lambda variables, attrs: (variables, attrs),
     }
-    monkeypatch.setattr("ringbalance.results.result.registered", lambda _, name: made[name])
+    monkeypatch.setattr("ringbalance.results.result.registered", lambda _, name: packages[name])
     columns, index = Answer().to_pandas()
     assert index == ["mass", "time"]
     assert (columns["value"], columns["unit"], columns["upper"]) == ([2.0, None], ["kg", "s"], [3.0, None])

@@ -17,9 +17,8 @@ from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.law.sides import lost_to_crest
 from ringbalance.reduced_model.tube.flow import column_pressure, column_radius
-from ringbalance.reduced_model.tube.heads import roots_of
+from ringbalance.reduced_model.tube.heads import BACK_SHARE, SHARE, roots_of
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
@@ -153,7 +152,9 @@ def _profile(
     place = int(np.argmin(np.abs(line.share - crest)))
     margin = None
     if humped:
-        lost = lost_to_crest(law, ends, reverse=reverse)
+        driving = np.maximum(driving_pressure(law.path, ends), 0.0)
+        column = BACK_SHARE if reverse and law.heads.return_hump else SHARE
+        lost = law.heads.siphon.cubic((driving / law.density) ** 0.125, column) * driving
         margin = float(resting_pressure(law.path, ends) - cavity_pressure(law.path, ends) - lost)
     return HumpProfile(
         path=line.share * tube.length,

@@ -121,6 +121,15 @@ class CalibratedLaw:
         numbers, pieces = constants_of([self])
         return numbers[0], pieces[0]
 
+    def with_gas_factor(self, gas_factor: float) -> CalibratedLaw:
+        """Copy the law with another gas pressure on the liquid over the one at the place of measurement."""
+        copy = replace(self, gas_factor=gas_factor)
+        numbers, pieces = self.constants
+        numbers = numbers.copy()
+        numbers[point.GAS_FACTOR] = gas_factor
+        vars(copy)["constants"] = numbers, pieces
+        return copy
+
     def carrying_pressures(self, table: Table) -> FloatArray:
         """Under which a flow carries half of the gas over the crest out, none and all, Pa."""
         return _carrying_pressures(table, self.density, self.path.froude_velocity)

@@ -69,12 +69,14 @@ def side_laws(scene: Scene) -> tuple[CalibratedLaw, ...]:
     base = with_places(scene, errors)
     sides = [base, *(side for error in errors for side in error.sides(base)), base, base]
     waves = [0.0] * (len(sides) - 2) + [-NORMAL_95, NORMAL_95]
-    asked, laws = scene.gas.pressure, nominal_laws(sides, gravity=False, waves=waves)
-    if not asked:
+    laws = nominal_laws(sides, gravity=False, waves=waves)
+    if not scene.gas.pressure:
         return laws
-    # Gas pressures are asked for as the scene has them.
-    pairs = zip(laws, sides, strict=True)
-    return tuple(replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) for law, side in pairs)
+    # A side's gas pressure is reached by its factor on the pressure of the scene.
+    factors = [
+        law.gas_factor * side.gas.pressure / scene.gas.pressure for law, side in zip(laws, sides, strict=True)
+    ]
+    return tuple(law.with_gas_factor(factor) for law, factor in zip(laws, factors, strict=True))
 
 
 def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Final
 
 import numpy as np
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.half_widths import HalfWidths
-from ringbalance.reduced_model.pieces.table import Table
-from ringbalance.reduced_model.tube.heads import BACK_SHARE, SHARE
-from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, column_flow, driving_pressure
+from ringbalance.reduced_model.pieces import point
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.errors import larger
+from ringbalance.scene.registry import registered
 
 _FILLS: Final = 25
 """Closer to the ends, where a port is uncovered."""
@@ -64,44 +62,20 @@ def half_widths_of(
     Args: `laws`: the nominal one, then those at the low and the high side of each uncertainty in turn.
     Source: ASME V&V 20-2009, one input at a time.
     """
-    nominal, *sides = (_velocity_and_margin(law, fill_ratio, opposite, gas_pressure, primed) for law in laws)
-    changes = np.reshape(np.array(sides) - nominal, (-1, 2, *nominal.shape))
+    answer_each = registered("function", "answer_each")
+    shape = np.shape(fill_ratio)
+    # Copies: compiled code is made for arrays that may be written.
+    conditions = [np.array(each).ravel() for each in (fill_ratio, opposite, gas_pressure, primed)]
+    query, size = np.zeros(point.PLACES_OF_QUERY), conditions[0].size
+    answers = np.empty((len(laws), 2, *shape))
+    for law, (speed, margin) in zip(laws, answers.reshape(len(laws), 2, size), strict=True):
+        numbers, pieces = law.constants
+        numbers = numbers.copy()
+        # Nodes of the table may lie below vacuum.
+        numbers[point.LEAST_PRESSURE] = -np.inf
+        columns = speed, np.empty(size, dtype=np.int64), np.empty(size, dtype=np.bool_), margin
+        answer_each(numbers, pieces, tuple(conditions), query, columns)
+        margin[speed <= 0.0] = np.nan
+        np.abs(speed, out=speed)
+    changes = np.reshape(answers[1:] - answers[0], (-1, 2, 2, *shape))
     return np.asarray(np.sqrt(np.sum(np.nan_to_num(larger(changes)) ** 2, axis=0)))
-
-
-def _velocity_and_margin(
-    law: CalibratedLaw,
-    fill_ratio: FloatArray,
-    opposite: FloatArray,
-    gas_pressure: FloatArray,
-    primed: BoolArray,
-) -> FloatArray:
-    """Speed of the flow in either direction, m/s, and margin over the crest, Pa, NaN without a flow out.
-
-    Returns: Shape (2, ...). Source: `column_flow`, by the law's tables of heads.
-    """
-    x, y = np.minimum(fill_ratio, law.max_fill_ratio), np.clip(opposite, 0.0, law.max_fill_ratio)
-    ahead = law.ends(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=gas_pressure)
-    flow = _directed(law, ahead, primed, reverse=False)
-    speed, flows = flow.velocity.copy(), flow.velocity > 0
-    margin = flow.holding - lost_to_crest(law, ahead, reverse=False) if law.path.crest else 0.0 * speed
-    back = TubeEnds(*(each[~flows] for each in ahead)).reversed()
-    speed[~flows] = _directed(law, back, primed[~flows], reverse=True).velocity
-    return np.array([speed, np.where(flows, margin, np.nan)])
-
-
-def _directed(
-    law: CalibratedLaw, ends: TubeEnds, primed: BoolArray, *, reverse: bool
-) -> ColumnFlow[FloatArray]:
-    def under(way: Table | None, pressure: FloatArray, where: BoolArray) -> FloatArray:
-        return np.where(where, law.heads.velocity(np.maximum(pressure, 0.0) / law.density, way), 0.0)
-
-    separation = partial(under, law.heads.to_crest(reverse=reverse))
-    return column_flow(law.path, ends, primed=primed, siphon=partial(under, None), separation=separation)
-
-
-def lost_to_crest(law: CalibratedLaw, ends: TubeEnds, *, reverse: bool) -> FloatArray:
-    """Pressure that a full siphon loses from its upstream chamber to the crest, Pa."""
-    driving = np.maximum(driving_pressure(law.path, ends), 0.0)
-    column = BACK_SHARE if reverse and law.heads.return_hump else SHARE
-    return np.asarray(law.heads.siphon.cubic((driving / law.density) ** 0.125, column) * driving)

@@ -39,10 +39,7 @@ def modules(code: str) -> frozenset[str]:
         ("from ringbalance.cli import main\nassert main(['--help']) == 0", HEAVY),
         ("import ringbalance\ndir(ringbalance)", HEAVY),
         ("from ringbalance.cli import main\nassert main(['verify', '--list']) == 0", {"numba"}),
-        (
-            f"{SCENE}r.calibrate(scene)",
-            {"numba", "pyamg", "meshio"},
-        ),
+        (f"{SCENE}r.calibrate(scene)", {"pyamg", "meshio"}),
         (
             f"{SCENE}r.sweep(scene, {{'tube.bore': [1e-3, 2e-3]}}, intervals=False)",
             {"numba", "skfem", "pyamg", "ringbalance.design.runs"},

@@ -222,7 +222,7 @@ def bent_tube(
     inflow = _values(folder / "inflow", "Urel")
     developed = _values(folder / "inflow", "p")[:, 0] - (omega * middle[:, 0]) ** 2 / 2
     tube = swept_tube(section=half, segments=segments)
-    stations = np.hstack([tube.place[:, ::2].T, tube.direction[:, ::2].T])
+    stations = np.hstack([tube.path[:, ::2].T, tube.direction[:, ::2].T])
     stations[:, :2] -= stations[:, :2].mean(axis=0)
     patch = {"inlet": {"type": "patch"}, "outlet": {"type": "patch"}}
     mesh = swept_mesh(cells=cells, stations=stations, ends=patch)

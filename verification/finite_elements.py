@@ -33,13 +33,13 @@ _COMPLEX_STEP: Final = 1e-30
 
 def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[tuple[int, ...]]:
     """Cells of a chamber's meshes, radial, angular and, in three dimensions, axial, for levels 1, 2, ..."""
-    radial, share = (2, 4) if dimension == 2 else (1, 8)
-    angular = default_cells(disc=disc)[1] // share
+    radial, divisor = (2, 4) if dimension == 2 else (1, 8)
+    angular = default_cells(disc=disc)[1] // divisor
     return [(radial * n, angular * n, n)[:dimension] for n in levels]
 
 
 def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
-    """Root mean square over the liquid of a pressure's error, relative to that of the exact one at places."""
+    """Root mean square over the liquid of a pressure's error, relative to that of the exact pressure."""
     chamber = solution.chamber
     # More points than the solve has, or its errors at these would be taken for all.
     basis = Basis(chamber.mesh, chamber.mesh.elem(), intorder=8)
@@ -47,19 +47,19 @@ def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatA
     return relative_rms(np.asarray(basis.interpolate(solution.pressure)), true, basis.dx)
 
 
-def relative_rms(found: FloatArray, true: FloatArray, weights: FloatArray) -> float:
+def relative_rms(computed: FloatArray, true: FloatArray, weights: FloatArray) -> float:
     """Root mean square of an error over that of the truth, weighted."""
-    return float(np.sqrt(np.sum(weights * (found - true) ** 2) / np.sum(weights * true**2)))
+    return float(np.sqrt(np.sum(weights * (computed - true) ** 2) / np.sum(weights * true**2)))
 
 
-def slopes(field: Callable[[Any], FloatArray], places: FloatArray) -> FloatArray:
-    """Derivatives of an analytic field along each coordinate, shape (..., dimension, *places.shape[1:]).
+def slopes(field: Callable[[Any], FloatArray], points: FloatArray) -> FloatArray:
+    """Derivatives of an analytic field along each coordinate, shape (..., dimension, *points.shape[1:]).
 
-    By a step into the complex plane, exact to rounding. Args: `places`: shape (dimension, ...).
+    By a step into the complex plane, exact to rounding. Args: `points`: shape (dimension, ...).
     """
-    steps = 1j * _COMPLEX_STEP * np.eye(len(places)).reshape(2 * places.shape[:1] + (1,) * (places.ndim - 1))
-    along = [np.asarray(field(places + step)).imag / _COMPLEX_STEP for step in steps]
-    return np.stack(along, axis=along[0].ndim - places.ndim + 1)
+    steps = 1j * _COMPLEX_STEP * np.eye(len(points)).reshape(2 * points.shape[:1] + (1,) * (points.ndim - 1))
+    derivatives = [np.asarray(field(points + step)).imag / _COMPLEX_STEP for step in steps]
+    return np.stack(derivatives, axis=derivatives[0].ndim - points.ndim + 1)
 
 
 @lru_cache(maxsize=64)
@@ -93,16 +93,13 @@ def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Foun
 
     Its correction is the moment of a ring of the printed radius that no plates take anything from.
     """
-    ring = ring_of(scene, (scene.disc.max_fill_ratio,), density=density)
-    found = found_of(ring, "moment", 0).scaled(factor)
-    return dataclasses.replace(found, corrected=factor * _bare_moment(scene.disc, density))
-
-
-def _bare_moment(disc: Disc, density: float) -> float:
-    bare = with_plate(disc, 0.0)
-    liquid = disc.axial_width * float(liquid_area(disc=bare, surface_radius=RING_RADIUS.value))
+    bare = with_plate(scene.disc, 0.0)
+    liquid = scene.disc.axial_width * float(liquid_area(disc=bare, surface_radius=RING_RADIUS.value))
     fill = liquid / chamber_volume(disc=bare)
-    return float(exact_moment(disc=bare, density=density, fill_ratio=fill))
+    bare_moment = float(exact_moment(disc=bare, density=density, fill_ratio=fill))
+    ring = ring_of(scene, (scene.disc.max_fill_ratio,), density=density)
+    number = found_of(ring, "moment", 0).scaled(factor)
+    return dataclasses.replace(number, corrected=factor * bare_moment)
 
 
 def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:
@@ -127,11 +124,11 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
 
 @contextmanager
 def mutated_force(*, x_factor: float = 1.0, y_factor: float = 1.0) -> Iterator[None]:
-    """Multiply the body force of every liquid solved inside, along the chamber's middle and across it."""
+    """Multiply the body force of every liquid solved inside, along the centre line and across it."""
     true = RotatingLiquid.body_force
 
-    def body_force(liquid: RotatingLiquid, places: FloatArray) -> FloatArray:
-        force = true(liquid, places)
+    def body_force(liquid: RotatingLiquid, points: FloatArray) -> FloatArray:
+        force = true(liquid, points)
         force[:2] *= np.array([x_factor, y_factor]).reshape(2, *[1] * (force.ndim - 1))
         return force
 

@@ -10,7 +10,6 @@ from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import (
     BentTubeFlow,
     Segment,
-    _rotation_with_curvature,
     bend_shift,
 )
 
@@ -125,9 +124,9 @@ def test_a_turning_bend_is_curvature_added_to_rotation(turn: float) -> None:
 
 def test_curvature_counts_as_rotation() -> None:
     # 2 omega' U = 2 omega U + (4/3) U^2/r with Re = U d/nu, R = omega d^2/nu.
-    assert _rotation_with_curvature(reynolds=150.0, rotation_reynolds=40.0, curvature=0.5) == pytest.approx(
-        40.0 + 4 / 3 * 150.0 * 0.25
-    )
+    ratios = rotating_friction_ratio(reynolds=150.0, rotation_reynolds=[40.0 + 4 / 3 * 150.0 * 0.25, 40.0])
+    shift = bend_shift(reynolds=150.0, rotation_reynolds=40.0, angle=1.0, radius=2.0, with_rotation=True)
+    assert shift == pytest.approx(64 / 150 * 2.0 * float(ratios.value[0] - ratios.value[1]))
     against, along, gentle = (
         bend_shift(
             reynolds=200.0, rotation_reynolds=117.8, angle=3.0 / r, radius=r, with_rotation=with_rotation

@@ -20,7 +20,7 @@ def _tube() -> _SweptTube:
 def test_a_path_of_lines_and_a_quarter_circle_ends_where_it_must() -> None:
     tube = _tube()
     # Twice the cells of what lies before: start, both ends and the middle of the bend, and the path's end.
-    place, direction = (each[:, [0, 4, 8, 12, 16]] for each in (tube.place, tube.direction))
+    place, direction = (each[:, [0, 4, 8, 12, 16]] for each in (tube.path, tube.direction))
     # To the right about (1.5, -2), radius 2.
     assert np.allclose(place[:, 1], [1.5, 0.0])
     assert np.allclose(place[:, 2], [1.5 + np.sqrt(2), -2 + np.sqrt(2)])
@@ -58,7 +58,7 @@ def test_volume_and_areas_are_those_of_a_swept_half_disc() -> None:
 def test_nodes_stand_at_their_stations_on_their_section_nodes() -> None:
     tube = _tube()
     section = SectionMesh(around=2, across=2, wall_ratio=3.0).mesh()
-    offset = tube.mesh.doflocs[:2] - tube.place[:, tube.half_station]
+    offset = tube.mesh.doflocs[:2] - tube.path[:, tube.half_station]
     tangent = tube.direction[:, tube.half_station]
     assert np.abs((offset * tangent).sum(axis=0)).max() < 1e-12
     left = offset[1] * tangent[0] - offset[0] * tangent[1]

@@ -97,7 +97,7 @@ def test_the_manufactured_flow_satisfies_its_equation() -> None:
 
 
 def test_the_exact_ring_across_the_shaft_is_a_circle_that_holds_the_liquid(disc: Disc) -> None:
-    ring = _exact_ring(disc=disc, density=800, angular_velocity=60.0, fill_ratio=0.4, across=(5.0, 4.0))
+    ring = _exact_ring(disc=disc, density=800, angular_velocity=60.0, fill_ratio=0.4, transverse=(5.0, 4.0))
     angle = np.linspace(-0.5, 0.5, 7)
     surface = ring.radius(angle) * np.exp(1j * angle)
     centre = -complex(5.0, 4.0) / 60.0**2
@@ -109,7 +109,7 @@ def test_the_exact_ring_across_the_shaft_is_a_circle_that_holds_the_liquid(disc:
 
 
 def test_the_exact_ring_along_the_shaft_is_a_paraboloid_that_holds_the_liquid(disc: Disc) -> None:
-    ring = _exact_ring(disc=disc, density=800, angular_velocity=60.0, fill_ratio=0.4, along=9.81)
+    ring = _exact_ring(disc=disc, density=800, angular_velocity=60.0, fill_ratio=0.4, axial=9.81)
     z = np.linspace(-disc.axial_width / 2, disc.axial_width / 2, 2001)
     radius = ring.radius(0.0, z)
     np.testing.assert_allclose(radius**2 - ring.level**2, 2 * 9.81 / 60.0**2 * z, atol=1e-15)

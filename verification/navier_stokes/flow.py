@@ -21,8 +21,8 @@ from skfem.helpers import dot, grad
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-_ORDER = 6
-"""Of the quadrature: exact for two quadratic functions and a quadratic coefficient on straight cells."""
+_QUADRATURE_ORDER = 6
+"""Exact for two quadratic functions and a quadratic coefficient on straight cells."""
 
 _mass = BilinearForm(lambda u, v, w: w.factor * u * v)
 _load = LinearForm(lambda v, w: w.factor * v)
@@ -77,7 +77,7 @@ class FlowSystem:
     viscous: Any
     """Viscous term between all velocity unknowns."""
     mass: Any
-    """Of one component."""
+    """Mass matrix of one component."""
     gradient: Any
     """Velocity rows of the pressure's term; its transpose is continuity."""
 
@@ -108,7 +108,7 @@ class FlowSystem:
             body_force: of coordinates (dimension, elements, points), giving (components, elements, points).
             stress_form: viscous term with the transposed gradient, needed for the torque on a moving wall.
         """
-        count, order = components or mesh.dim(), {"intorder": _ORDER}
+        count, order = components or mesh.dim(), {"intorder": _QUADRATURE_ORDER}
         quadratic, linear = (ElementQuad2, ElementQuad1) if mesh.dim() == 2 else (ElementHex2, ElementHex1)
         velocity, pressure = Basis(mesh, quadratic(), **order), Basis(mesh, linear(), **order)
         if axisymmetric:
@@ -118,9 +118,9 @@ class FlowSystem:
         values, fixed = np.zeros(size), np.zeros(size, dtype=bool)
         for condition in conditions:
             nodes = velocity.get_dofs(condition.boundary).flatten()
-            value, where = condition.value, condition.component * velocity.N + nodes
-            values[where] = value(velocity.doflocs[:, nodes]) if callable(value) else value
-            fixed[where] = True
+            value, unknowns = condition.value, condition.component * velocity.N + nodes
+            values[unknowns] = value(velocity.doflocs[:, nodes]) if callable(value) else value
+            fixed[unknowns] = True
         if enclosed:
             fixed[count * velocity.N] = True
         force = None if body_force is None else body_force(np.array(velocity.global_coordinates()))
@@ -211,11 +211,11 @@ class FlowSystem:
         """Exact derivative of `convection_vector`: u . grad(du) + du . grad(u)."""
         u, slopes = self.at_points(self.split(vector)[0])
         dimension, nothing = slopes.shape[1], sparse.csr_matrix(self.mass.shape)
-        along = _carried.assemble(self.velocity, carrier=u[:dimension])
+        carried = _carried.assemble(self.velocity, carrier=u[:dimension])
         blocks = [
             [
                 (self.weighted_mass(slopes[c, d]) if d < dimension else nothing)
-                + (along if c == d else nothing)
+                + (carried if c == d else nothing)
                 for d in range(self.components)
             ]
             for c in range(self.components)
@@ -234,18 +234,18 @@ def _loads(velocity: Any, pressure: Any, values: FloatArray) -> FloatArray:
 
 def _viscous(velocity: Any, components: int, axisymmetric: bool, stress_form: bool) -> Any:
     stiffness = _stiffness.assemble(velocity)
-    whole = sparse.kron(sparse.identity(components), stiffness, format="csr")
+    viscous = sparse.kron(sparse.identity(components), stiffness, format="csr")
     if axisymmetric:
         radius = np.asarray(velocity.global_coordinates())[1]
         curved = _mass.assemble(velocity, factor=1 / radius**2)
-        whole = whole + sparse.kron(np.diag([0.0, 1.0]), curved, format="csr")
+        viscous = viscous + sparse.kron(np.diag([0.0, 1.0]), curved, format="csr")
     if stress_form:
         rows = [
             [_transposed.assemble(velocity, row=c, column=d) for d in range(components)]
             for c in range(components)
         ]
-        whole = whole + sparse.bmat(rows, format="csr")
-    return whole
+        viscous = viscous + sparse.bmat(rows, format="csr")
+    return viscous
 
 
 def _gradient(velocity: Any, pressure: Any, components: int, axisymmetric: bool) -> Any:

@@ -5,8 +5,8 @@ Lengths over the bore d, velocities over the mean velocity U, on meshes coarse e
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -58,9 +58,9 @@ class FlowField:
     """Section: psi/(U d), u = dpsi/dz, v = -dpsi/dy, 0 at the wall; end: psi/(U d^2), u_x = dpsi/dr / r, 0 on
     the axis, 1/8 on the tube's wall; shape (n,)."""
     reynolds: float
-    """Re of the flow given."""
+    """Re of the flow."""
     rotation_reynolds: float = 0.0
-    """R of the flow given."""
+    """R of the flow."""
     friction_ratio: float = 1.0
     """F of the section, on this coarse mesh."""
     status: Status
@@ -73,25 +73,20 @@ def section_field(*, reynolds: float, rotation_reynolds: float) -> FlowField:
     Args: `reynolds`: above zero. `rotation_reynolds`: zero or more.
     Raises: ArithmeticError: the flow was not found.
     """
-    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
-    drawn = min(kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
+    full_kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+    kl = min(full_kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
     system = _SECTION.system()
     settings = NewtonSettings(max_iterations=10, tolerance=1e-6)
-    flow = developed_section(system=system, kl=drawn, s=s, settings=settings)
+    flow = developed_section(system=system, kl=kl, s=s, settings=settings)
     status = Status()
-    if drawn < kl:
+    if kl < full_kl:
         text = (
             f"drawn at the nearest flow of the same R/Re with R Re <= {LARGEST_KL:.0e} and "
             f"R <= {LARGEST_ROTATION:.0e}: beyond, steady flow in one pair of vortices is not to be expected"
         )
         status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
-    return _whole_section(system, flow, reynolds if drawn == kl else float(np.sqrt(drawn / s)), s, status)
-
-
-def _whole_section(
-    system: FlowSystem, flow: FlowSolution, reynolds: float, s: float, status: Status
-) -> FlowField:
-    """The half section and its mirror image, which share the nodes on the symmetry line."""
+        reynolds = float(np.sqrt(kl / s))
+    # The half section and its mirror image share the nodes on the symmetry line.
     half = system.nodes
     off = np.setdiff1d(np.arange(half.shape[1]), system.boundary_nodes("symmetry"))
     image = np.arange(half.shape[1])
@@ -103,7 +98,7 @@ def _whole_section(
     psi = _potential(system, in_plane[::-1] * [[[-1.0]], [[1.0]]], {0.0: edge})
 
     def both(*fields: tuple[FloatArray, float]) -> FloatArray:
-        """Fields of the half and of its image, whose sign is given."""
+        """Fields of the half and of its image, each with the sign of its image."""
         return np.stack([np.concatenate([values, sign * values[off]]) for values, sign in fields])
 
     return FlowField(
@@ -133,45 +128,22 @@ def end_field(end: End, *, reynolds: float) -> FlowField:
     settings = NewtonSettings(max_iterations=10, tolerance=1e-5)
 
     def solve_at(a: float, start: FlowSolution | None) -> FlowSolution:
-        at = _END_SCALE * float(np.expm1(a))
-        return solve_end(system=system, reynolds=at, start=start, settings=settings)
+        scaled = _END_SCALE * float(np.expm1(a))
+        return solve_end(system=system, reynolds=scaled, start=start, settings=settings)
 
     flow = flow_at(solve=solve_at, parameter=float(np.log1p(reynolds / _END_SCALE)), first=first)
-    return _near_the_mouth(end, system, flow, reynolds)
-
-
-def _sink(component: int) -> Callable[[FloatArray], FloatArray]:
-    """Velocity of a half-space that drains U pi d^2/4 at the origin."""
-
-    def velocity(at: FloatArray) -> FloatArray:
-        distance = np.maximum(np.hypot(at[0], at[1]), 0.5)
-        return np.asarray(-at[component] / (8 * distance**3), dtype=np.float64)
-
-    return velocity
-
-
-def _entrance_system(cells: EndMesh) -> FlowSystem:
-    """An entrance fed by a sink's flow: let in freely so near, liquid at high Re makes the solve unstable."""
-    conditions = [Dirichlet(boundary=b, component=c, value=_sink(c)) for b in ("far", "side") for c in (0, 1)]
-    conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
-    conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
-    return FlowSystem.of(mesh=cells.mesh(end="entrance"), conditions=conditions, axisymmetric=True)
-
-
-def _near_the_mouth(end: End, system: FlowSystem, flow: FlowSolution, reynolds: float) -> FlowField:
-    at = system.nodes
     low, high, radius = _WINDOWS[end]
-    x, r = at[:, system.velocity.element_dofs[8]]
-    cells = np.flatnonzero((x > low) & (x < high) & (r < radius))
-    used, triangles = np.unique(_triangles(system, cells), return_inverse=True)
+    x, r = system.nodes[:, system.velocity.element_dofs[8]]
+    in_window = np.flatnonzero((x > low) & (x < high) & (r < radius))
+    used, triangles = np.unique(_triangles(system, in_window), return_inverse=True)
     u, v = system.at_points(flow.velocity)[0]
     # Weighted so that the fit is of the velocity, whose every component is a derivative of psi over r; one r
     # is in the weights already.
     r = system.points[1]
-    known = {0.0: system.boundary_nodes("axis"), _FLOW_THROUGH: system.boundary_nodes("wall")}
-    psi = _potential(system, np.stack([-r * v, r * u]), known, r**-2)
+    boundary_values = {0.0: system.boundary_nodes("axis"), _FLOW_THROUGH: system.boundary_nodes("wall")}
+    psi = _potential(system, np.stack([-r * v, r * u]), boundary_values, r**-2)
     return FlowField(
-        points=at[:, used],
+        points=system.nodes[:, used],
         triangles=triangles.reshape(-1, 3).astype(np.int64),
         velocity=flow.velocity[:, used],
         stream_function=psi[used],
@@ -180,17 +152,38 @@ def _near_the_mouth(end: End, system: FlowSystem, flow: FlowSolution, reynolds: 
     )
 
 
+def _entrance_system(cells: EndMesh) -> FlowSystem:
+    """An entrance fed by a sink's flow: let in freely so near, liquid at high Re makes the solve unstable."""
+
+    def sink_velocity(component: int, points: FloatArray) -> FloatArray:
+        """Velocity of a half-space that drains U pi d^2/4 at the origin."""
+        distance = np.maximum(np.hypot(points[0], points[1]), 0.5)
+        return np.asarray(-points[component] / (8 * distance**3), dtype=np.float64)
+
+    conditions = [
+        Dirichlet(boundary=boundary, component=c, value=partial(sink_velocity, c))
+        for boundary in ("far", "side")
+        for c in (0, 1)
+    ]
+    conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
+    conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
+    return FlowSystem.of(mesh=cells.mesh(end="entrance"), conditions=conditions, axisymmetric=True)
+
+
 def _potential(
-    system: FlowSystem, gradient: FloatArray, known: dict[float, IntArray], weight: FloatArray | float = 1.0
+    system: FlowSystem,
+    gradient: FloatArray,
+    boundary_values: dict[float, IntArray],
+    weight: FloatArray | float = 1.0,
 ) -> FloatArray:
-    """Nodal psi with given values at some nodes whose gradient is nearest to a given one, by a weight."""
+    """Nodal psi, prescribed at the nodes of each boundary value, whose weighted gradient is nearest."""
     basis: Any = system.velocity
     psi = np.zeros(basis.N)
-    for value, nodes in known.items():
+    for value, nodes in boundary_values.items():
         psi[nodes] = value
     matrix = _squared_slope.assemble(basis, weight=weight)
     right = _slope_along.assemble(basis, weight=weight, across=gradient)
-    fixed = np.unique(np.concatenate(list(known.values())))
+    fixed = np.unique(np.concatenate(list(boundary_values.values())))
     return np.asarray(solve(*condense(matrix, right, x=psi, D=fixed)), dtype=np.float64)
 
 

@@ -21,8 +21,9 @@ from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
 
-_GOOD, _USABLE, _REFINEMENTS = 1e-12, 1e-8, 3
-"""Relative residuals: of a solution that is as good as it gets, and of one that will do; attempts between."""
+_GOOD, _USABLE = 1e-12, 1e-8
+"""Relative residuals: of a solution that is as good as it gets, and of one that will do."""
+_MAX_REFINEMENTS = 3
 
 
 class Factors:
@@ -51,7 +52,7 @@ class Factors:
         """Solution with up to three refinements, and its relative residual."""
         scale = float(np.abs(right).max()) or 1.0
         x, gap = np.asarray(self.factors.solve(right), dtype=np.float64), np.inf
-        for _ in range(_REFINEMENTS):
+        for _ in range(_MAX_REFINEMENTS):
             residual = right - self.matrix @ x
             gap, before = float(np.abs(residual).max()) / scale, gap
             if gap <= _GOOD or not gap < before / 2:
@@ -62,7 +63,7 @@ class Factors:
 
 @dataclass(frozen=True, kw_only=True)
 class NewtonSettings:
-    """When Newton's method stops, and when it keeps its factors."""
+    """Criteria by which Newton's method stops, and keeps its factors."""
 
     tolerance: float = 1e-9
     """Largest change of a velocity over the largest velocity at which it has converged."""
@@ -129,66 +130,69 @@ def solve_flow(
     if start is not None and start.vector.size != system.unknowns:
         raise ValueError("start belongs to another system")
     settings = settings or NewtonSettings()
-    if start is None:
-        creeping = _Newton(system, replace(coefficients, inertia=0.0), flow_rate, progress)
-        creeping.iterate(settings)
-        if creeping.problem or coefficients.inertia == 0.0:
-            return creeping.solution()
-        newton = _Newton(system, coefficients, flow_rate, progress, creeping)
-    else:
-        newton = _Newton(system, coefficients, flow_rate, progress)
-        newton.vector[system.free] = start.vector[system.free]
-        newton.gradient = start.driving_gradient
-    newton.iterate(settings)
-    return newton.solution()
+    state = _State(vector=system.fixed_values.copy())
+    stages = [coefficients]
+    if start is not None:
+        state.vector[system.free] = start.vector[system.free]
+        state.gradient = start.driving_gradient
+    elif coefficients.inertia != 0.0:
+        stages = [replace(coefficients, inertia=0.0), coefficients]
+    for stage in stages:
+        equations = _Equations(system, stage.inertia, system.linear_matrix(stage))
+        if problem := _iterate(state, equations, flow_rate, settings, progress):
+            break
+    finite = np.isfinite(state.vector)
+    if not np.all(finite):
+        problem = problem or "the iteration diverged"
+    state.vector = np.where(finite, state.vector, 0.0)
+    if system.enclosed:
+        # Nothing else fixes the pressure's level: its mean is zero.
+        pressure = state.vector[-system.mean_load.size :]
+        pressure -= float(system.mean_load @ pressure) / float(system.mean_load.sum())
+    residual = np.abs(equations.residual(state))
+    at_walls = np.delete(residual, system.free)
+    status = Status()
+    if problem:
+        remedy = "start from the solution of a neighbouring, less convective case, or refine the mesh"
+        status = Status(code=StatusCode.NOT_CONVERGED, text=f"{problem}; {remedy}")
+    return FlowSolution.of(
+        system,
+        state.vector,
+        driving_gradient=state.gradient,
+        status=status,
+        statistics=Statistics(
+            unknowns=int(system.free.size),
+            iterations=state.iterations,
+            relative_residual=float(residual[system.free].max() / (at_walls.max() or 1.0)),
+        ),
+    )
 
 
-class _Newton:
-    """Working state of one Newton solve."""
+@dataclass
+class _State:
+    """The flow between two Newton iterations."""
 
-    def __init__(
-        self,
-        system: FlowSystem,
-        coefficients: Coefficients,
-        flow_rate: float,
-        progress: Callable[[str], None] | None,
-        before: _Newton | None = None,
-    ) -> None:
-        self.system, self.inertia, self.flow_rate = system, coefficients.inertia, flow_rate
-        self.linear, self.progress = system.linear_matrix(coefficients), progress
-        self.vector: FloatArray = system.fixed_values.copy() if before is None else before.vector
-        self.gradient: float = 0.0 if before is None else before.gradient
-        self.iterations: int = 0 if before is None else before.iterations
-        self.update, self.contracting, self.problem = np.inf, True, ""
+    vector: FloatArray
+    gradient: float = 0.0
+    iterations: int = 0
 
-    def iterate(self, settings: NewtonSettings) -> None:
-        """Take steps until they are small; `problem` says what went wrong."""
-        factors: Factors | None = None
-        for _ in range(settings.max_iterations):
-            # Contracting: well below the step before, so that old factors may serve once more.
-            keep = self.inertia == 0.0 or (self.update < settings.keep_factors_below and self.contracting)
-            try:
-                if factors is None or not keep:
-                    factors = self._factors()
-                self._step(factors)
-            except RuntimeError as error:
-                self.problem = f"the matrix could not be factorized ({error})"
-                return
-            if not np.isfinite(self.update) or self.update > 1e8:
-                self.problem = "the iteration diverged"
-                return
-            if self.update <= settings.tolerance:
-                return
-        change = f"last relative change {self.update:.1e}"
-        self.problem = f"no convergence in {settings.max_iterations} iterations ({change})"
 
-    def _residual(self) -> FloatArray:
+@dataclass(frozen=True)
+class _Equations:
+    """Discrete equations of a flow at given coefficients."""
+
+    system: FlowSystem
+    inertia: float
+    linear: Any
+
+    def residual(self, state: _State) -> FloatArray:
+        """Imbalance of each equation, full vector."""
         system = self.system
-        residual = np.asarray(self.linear @ self.vector, dtype=np.float64) - system.source
+        residual = np.asarray(self.linear @ state.vector, dtype=np.float64) - system.source
         if system.flow_load is not None:
-            residual -= self.gradient * system.flow_load
+            residual -= state.gradient * system.flow_load
         if self.inertia != 0.0:
-            residual += self.inertia * system.convection_vector(self.vector)
+            residual += self.inertia * system.convection_vector(state.vector)
         if system.enclosed:
             # A boundary flow that does not close in the discrete sense is spread evenly instead of
             # becoming a point source at the pinned node.
@@ -196,59 +200,48 @@ class _Newton:
             mass -= mass.sum() / system.mean_load.sum() * system.mean_load
         return residual
 
-    def _factors(self) -> Factors:
-        system, jacobian = self.system, self.linear
-        if self.inertia != 0.0:
-            jacobian = jacobian + self.inertia * system.convection_matrix(self.vector)
-        factors = Factors(system.free_part(jacobian))
-        if system.flow_load is not None:
-            self.bordering = factors.solve(system.flow_load[system.free])
-        return factors
 
-    def _step(self, factors: Factors) -> None:
-        system = self.system
-        change = np.zeros_like(self.vector)
-        change[system.free] = factors.solve(-self._residual()[system.free])
+def _iterate(
+    state: _State,
+    equations: _Equations,
+    flow_rate: float,
+    settings: NewtonSettings,
+    progress: Callable[[str], None] | None,
+) -> str:
+    """Advance the flow by Newton steps until they are small. Returns: The problem, empty without one."""
+    system, free, factors, contracting, update = equations.system, equations.system.free, None, True, np.inf
+    for _ in range(settings.max_iterations):
+        # Contracting: well below the step before, so that old factors may serve once more.
+        keep = equations.inertia == 0.0 or (update < settings.keep_factors_below and contracting)
+        change = np.zeros_like(state.vector)
+        try:
+            if factors is None or not keep:
+                jacobian = equations.linear
+                if equations.inertia != 0.0:
+                    jacobian = jacobian + equations.inertia * system.convection_matrix(state.vector)
+                factors = Factors(system.free_part(jacobian))
+                if system.flow_load is not None:
+                    bordering = factors.solve(system.flow_load[free])
+            change[free] = factors.solve(-equations.residual(state)[free])
+        except RuntimeError as error:
+            return f"the matrix could not be factorized ({error})"
         if system.flow_load is not None:
-            border = system.flow_load[system.free]
-            missing = self.flow_rate - float(system.flow_load @ (self.vector + change))
-            share = missing / float(border @ self.bordering)
-            change[system.free] += share * self.bordering
-            self.gradient += share
-        self.vector = self.vector + change
-        largest, moved = (float(np.abs(system.split(each)[0]).max()) for each in (self.vector, change))
-        before, self.update = self.update, moved / largest if largest > 0.0 else 0.0
-        self.contracting = self.update < 0.1 * before
-        self.iterations += 1
-        if self.progress is not None:
-            self.progress(f"Newton iteration {self.iterations}: relative change {self.update:.1e}")
-
-    def solution(self) -> FlowSolution:
-        """The flow as it is, with a mean pressure of zero where nothing else fixes its level."""
-        system = self.system
-        if not np.all(np.isfinite(self.vector)):
-            self.problem = self.problem or "the iteration diverged"
-        self.vector = np.where(np.isfinite(self.vector), self.vector, 0.0)
-        if system.enclosed:
-            pressure = self.vector[-system.mean_load.size :]
-            pressure -= float(system.mean_load @ pressure) / float(system.mean_load.sum())
-        residual = np.abs(self._residual())
-        at_walls = np.delete(residual, system.free)
-        status = Status()
-        if self.problem:
-            remedy = "start from the solution of a neighbouring, less convective case, or refine the mesh"
-            status = Status(code=StatusCode.NOT_CONVERGED, text=f"{self.problem}; {remedy}")
-        return FlowSolution.of(
-            system,
-            self.vector,
-            driving_gradient=self.gradient,
-            status=status,
-            statistics=Statistics(
-                unknowns=int(system.free.size),
-                iterations=self.iterations,
-                relative_residual=float(residual[system.free].max() / (at_walls.max() or 1.0)),
-            ),
-        )
+            missing = flow_rate - float(system.flow_load @ (state.vector + change))
+            share = missing / float(system.flow_load[free] @ bordering)
+            change[free] += share * bordering
+            state.gradient += share
+        state.vector = state.vector + change
+        largest, moved = (float(np.abs(system.split(each)[0]).max()) for each in (state.vector, change))
+        before, update = update, moved / largest if largest > 0.0 else 0.0
+        contracting = update < 0.1 * before
+        state.iterations += 1
+        if progress is not None:
+            progress(f"Newton iteration {state.iterations}: relative change {update:.1e}")
+        if not np.isfinite(update) or update > 1e8:
+            return "the iteration diverged"
+        if update <= settings.tolerance:
+            return ""
+    return f"no convergence in {settings.max_iterations} iterations (last relative change {update:.1e})"
 
 
 Solve = Callable[[float, FlowSolution | None], FlowSolution]
@@ -264,7 +257,7 @@ class StepRule:
     first: float = 1.0
     smallest: float = 1 / 64
     largest: float = float("inf")
-    """Where several flows exist for one parameter, long steps can land on another branch."""
+    """Longest step: with several flows for one parameter a longer one can land on another branch."""
     growth: float = 1.6
     """Factor after an easy step; a failed step is halved."""
     easy_iterations: int = 6
@@ -282,51 +275,6 @@ class _FlowPath:
     """Steps that had to be repeated with half their length."""
 
 
-@dataclass(eq=False)
-class _Walk:
-    """Where the path is: the last two flows, and the present step."""
-
-    solve: Solve
-    rule: StepRule
-    at: float
-    flow: FlowSolution
-    step: float
-    before: tuple[float, FlowSolution] | None = None
-    failures: int = 0
-
-    def reach(self, target: float) -> bool:
-        """Whether the target is reached."""
-        while self.at != target and self.step >= self.rule.smallest:
-            self._advance(target)
-        return self.at == target
-
-    def _advance(self, target: float) -> None:
-        remaining = abs(target - self.at)
-        length = min(self.step, remaining)
-        # A sliver left over would make the secant through it worthless.
-        length = remaining if remaining - length < 0.1 * length else length
-        parameter = target if length == remaining else self.at + length * (1 if target > self.at else -1)
-        flow = self.solve(parameter, self._predicted(parameter))
-        if not flow.status.ok:
-            self.failures, self.step = self.failures + 1, length / 2
-            return
-        easy = flow.statistics.iterations <= self.rule.easy_iterations
-        self.before = self.at, self.flow
-        self.at, self.flow = parameter, flow
-        self.step = min(max(self.step, length) * (self.rule.growth if easy else 1.0), self.rule.largest)
-
-    def _predicted(self, parameter: float) -> FlowSolution:
-        if self.before is None:
-            return self.flow
-        (at, flow), now = self.before, self.flow
-        share = (parameter - self.at) / (self.at - at)
-        return replace(
-            now,
-            vector=now.vector + share * (now.vector - flow.vector),
-            driving_gradient=now.driving_gradient + share * (now.driving_gradient - flow.driving_gradient),
-        )
-
-
 def follow(
     *,
     solve: Solve,
@@ -341,16 +289,39 @@ def follow(
         order.
     """
     rule = rule or StepRule()
-    walk = _Walk(solve=solve, rule=rule, at=start_at, flow=start, step=rule.first)
+    at, flow, step, failures = start_at, start, rule.first, 0
+    before: tuple[float, FlowSolution] | None = None
     reached: list[FlowSolution] = []
     for target in targets:
-        if not walk.reach(target):
-            text = f"the path ended at {walk.at:.6g} on its way to {target:.6g}"
+        while at != target and step >= rule.smallest:
+            remaining = abs(target - at)
+            length = min(step, remaining)
+            # A sliver left over would make the secant through it worthless.
+            length = remaining if remaining - length < 0.1 * length else length
+            parameter = target if length == remaining else at + length * (1 if target > at else -1)
+            predicted = flow
+            if before is not None:
+                share = (parameter - at) / (at - before[0])
+                gradient, earlier = flow.driving_gradient, before[1]
+                predicted = replace(
+                    flow,
+                    vector=flow.vector + share * (flow.vector - earlier.vector),
+                    driving_gradient=gradient + share * (gradient - earlier.driving_gradient),
+                )
+            solution = solve(parameter, predicted)
+            if not solution.status.ok:
+                failures, step = failures + 1, length / 2
+                continue
+            before, at, flow = (at, flow), parameter, solution
+            easy = flow.statistics.iterations <= rule.easy_iterations
+            step = min(max(step, length) * (rule.growth if easy else 1.0), rule.largest)
+        if at != target:
+            text = f"the path ended at {at:.6g} on its way to {target:.6g}"
             remedy = "refine the mesh or take smaller steps"
             status = Status(code=StatusCode.NOT_CONVERGED, text=f"{text}; {remedy}")
-            return _FlowPath(solutions=tuple(reached), status=status, failures=walk.failures)
-        reached.append(walk.flow)
-    return _FlowPath(solutions=tuple(reached), status=Status(), failures=walk.failures)
+            return _FlowPath(solutions=tuple(reached), status=status, failures=failures)
+        reached.append(flow)
+    return _FlowPath(solutions=tuple(reached), status=Status(), failures=failures)
 
 
 def flow_at(*, solve: Solve, parameter: float, first: float) -> FlowSolution:

@@ -53,12 +53,12 @@ from ringbalance.verification.navier_stokes.newton import (
 )
 
 Test = Callable[[FloatArray], BoolArray]
-"""Whether middles of facets, shape (dimension, n), belong to a boundary."""
+"""Test of middles of facets, shape (dimension, n): true on those that belong to a boundary."""
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
 _KL_SCALE = 300.0
 _TOUCHING = 1e-9
-"""Of the bore: facets nearer than this lie on a line."""
+"""Distance over the bore up to which facets lie on a line."""
 
 
 class _HalfSection(ABC):
@@ -90,8 +90,15 @@ class SectionMesh(_HalfSection):
 
     def mesh(self) -> Any:
         """Quadratic mesh of the half section (y, z >= 0) of a tube of unit bore, refined at its wall."""
-        n = self.around
-        core, edges = _core(n)
+        n, half_width, corner = self.around, 0.26, 0.2
+        bottom = _lines(np.array([[-half_width, 0.0], [half_width, 0.0]]), 2 * n)
+        angles = np.pi * np.linspace(0.75, 0.25, 4 * n + 1)
+        straight = _lines(np.array([[-corner, corner], [corner, corner]]), 2 * n)
+        bulge = np.stack([np.cos(angles), np.sin(angles)], axis=1) * corner * np.sqrt(2.0)
+        top = (straight + bulge) / 2
+        core = ruled(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1))
+        # Right, top and left edges of the core in the order of growing angle.
+        edges = (core[-1], core[::-1, -1], core[0, ::-1])
         vertices = geometric_vertices(cells=self.across, ratio=self.wall_ratio)
         blend = 1 - with_midpoints(vertices=vertices)[::-1]
         patches = [core]
@@ -129,7 +136,7 @@ class DuctMesh(_HalfSection):
 
 
 def on_symmetry(middle: FloatArray) -> BoolArray:
-    """Whether places lie on the line z = 0 of a half section."""
+    """True where points lie on the line z = 0 of a half section."""
     return np.asarray(middle[1] < _TOUCHING)
 
 
@@ -137,18 +144,6 @@ def _lines(points: FloatArray, count: int) -> FloatArray:
     """Nodes on a straight line between two points, shape (2 count + 1, 2)."""
     share = np.linspace(0.0, 1.0, 2 * count + 1)[:, None]
     return np.asarray((1 - share) * points[0] + share * points[1], dtype=np.float64)
-
-
-def _core(n: int) -> tuple[FloatArray, list[FloatArray]]:
-    """Nodes of the core, and its right, top and left edges in the order of growing angle."""
-    half_width, corner = 0.26, 0.2
-    bottom = _lines(np.array([[-half_width, 0.0], [half_width, 0.0]]), 2 * n)
-    angles = np.pi * np.linspace(0.75, 0.25, 4 * n + 1)
-    straight = _lines(np.array([[-corner, corner], [corner, corner]]), 2 * n)
-    bulge = np.stack([np.cos(angles), np.sin(angles)], axis=1) * corner * np.sqrt(2.0)
-    top = (straight + bulge) / 2
-    nodes = ruled(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1))
-    return nodes, [nodes[-1], nodes[::-1, -1], nodes[0, ::-1]]
 
 
 def solve_section(
@@ -175,13 +170,13 @@ def solve_section(
 
 
 def section_coefficients(*, kl: float, s: float, inertia: float = 1.0) -> Coefficients:
-    """Of developed flow, components along (y, z, x): velocities over nu/d in the plane, over U along it."""
+    """Coefficients of developed flow, velocities along (y, z) over nu/d and along x over U."""
     rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (-2 * s, 0.0, 0.0))
     return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
 
 
 def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> FloatArray:
-    """The same in time, from the flow without inertia and a disturbance of one per cent.
+    """Developed flow in time, from the flow without inertia and a disturbance of one per cent.
 
     It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
     Second-order backward differences, convection extrapolated from two steps:
@@ -194,7 +189,14 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
     Returns: G of each step.
     Raises: ArithmeticError: the flow grew without bound; the step is too long.
     """
-    start, free, area = _disturbed(system, kl, s), system.free, float(system.weights.sum())
+    free, area = system.free, float(system.weights.sum())
+    linear = section_coefficients(kl=kl, s=s, inertia=0.0)
+    start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
+    velocity = system.split(start)[0]
+    noise = np.random.default_rng(0).standard_normal(velocity.shape)
+    noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
+    moving = free[free < velocity.size]
+    start[moving] += noise.ravel()[moving]
     assert system.flow_load is not None
     border = system.flow_load[free]
     mass = system.of_all(sparse.kron(sparse.identity(system.components), system.mass))[free]
@@ -203,39 +205,27 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
     bordering = factors.solve(border)
     now, before = start, start
     convection = system.convection_vector(now)
-    found = np.empty(steps)
+    gradients = np.empty(steps)
     for i in range(steps):
         carried, convection = convection, system.convection_vector(now)
         pull = (2 * convection - carried)[free]
         change = factors.factors.solve(mass @ (4 * now - before) / (2 * step) - pull)
-        found[i] = (area - border @ change) / (border @ bordering)
+        gradients[i] = (area - border @ change) / (border @ bordering)
         now, before = start.copy(), now
-        now[free] = change + found[i] * bordering
-        if not np.isfinite(found[i]) or np.abs(now).max() > 1e12:
+        now[free] = change + gradients[i] * bordering
+        if not np.isfinite(gradients[i]) or np.abs(now).max() > 1e12:
             raise ArithmeticError("the flow grew without bound: take shorter steps")
-    return found
-
-
-def _disturbed(system: FlowSystem, kl: float, s: float) -> FloatArray:
-    """The flow without inertia, with noise of one per cent of each component's largest velocity."""
-    linear, area = section_coefficients(kl=kl, s=s, inertia=0.0), float(system.weights.sum())
-    start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
-    velocity = system.split(start)[0]
-    noise = np.random.default_rng(0).standard_normal(velocity.shape)
-    noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
-    moving = system.free[system.free < velocity.size]
-    start[moving] += noise.ravel()[moving]
-    return start
+    return gradients
 
 
 def developed_section(
     *, system: FlowSystem, kl: float, s: float, settings: NewtonSettings | None = None
 ) -> FlowSolution:
-    """The same for any Kl, followed from a small one. Raises: ArithmeticError: the flow was not found."""
+    """Developed flow at any Kl, followed from a small one. Raises: ArithmeticError: it was not found."""
 
     def solve(a: float, start: FlowSolution | None) -> FlowSolution:
-        at = _KL_SCALE * float(np.expm1(a))
-        return solve_section(system=system, kl=at, s=s, start=start, settings=settings)
+        scaled = _KL_SCALE * float(np.expm1(a))
+        return solve_section(system=system, kl=scaled, s=s, start=start, settings=settings)
 
     return flow_at(solve=solve, parameter=float(np.log1p(kl / _KL_SCALE)), first=2.0)
 
@@ -296,7 +286,11 @@ def patch_mesh(patches: Sequence[FloatArray], **named: Test) -> Any:
     keys = np.round((points - points.min(axis=0)) / extent * _GLUE).astype(np.int64)
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     numbers = np.split(inverse.ravel(), np.cumsum([nodes.size // 2 for nodes in patches])[:-1])
-    cells = [_quads(number.reshape(nodes.shape[:2])) for number, nodes in zip(numbers, patches, strict=True)]
+    # Nine nodes per cell: four vertices, four mid-sides, the centre.
+    a, b, c = slice(0, -2, 2), slice(1, None, 2), slice(2, None, 2)
+    order = [(a, a), (c, a), (c, c), (a, c), (b, a), (c, b), (b, c), (a, b), (b, b)]
+    grids = [number.reshape(nodes.shape[:2]) for number, nodes in zip(numbers, patches, strict=True)]
+    cells = [np.stack([grid[i, j].ravel() for i, j in order]) for grid in grids]
     mesh = MeshQuad2(np.ascontiguousarray(points[first].T), np.concatenate(cells, axis=1))
     return mesh.with_boundaries(named_facets(mesh, named))
 
@@ -305,16 +299,9 @@ def named_facets(mesh: Any, named: Mapping[str, Test]) -> dict[str, IntArray]:
     """Outer facets by the test that their middles pass; "wall" has those that pass none."""
     outside = mesh.boundary_facets()
     middle = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
-    found = {name: test(middle) for name, test in named.items()}
-    found["wall"] = ~np.any([*found.values(), np.zeros(outside.size, dtype=bool)], axis=0)
-    return {name: outside[where] for name, where in found.items()}
-
-
-def _quads(number: IntArray) -> IntArray:
-    """Nine nodes per cell: four vertices, four mid-sides, the centre; shape (9, cells)."""
-    a, b, c = slice(0, -2, 2), slice(1, None, 2), slice(2, None, 2)
-    order = [(a, a), (c, a), (c, c), (a, c), (b, a), (c, b), (b, c), (a, b), (b, b)]
-    return np.stack([number[i, j].ravel() for i, j in order])
+    masks = {name: test(middle) for name, test in named.items()}
+    masks["wall"] = ~np.any([*masks.values(), np.zeros(outside.size, dtype=bool)], axis=0)
+    return {name: outside[mask] for name, mask in masks.items()}
 
 
 End = Literal["entrance", "exit"]

@@ -70,60 +70,20 @@ class Segment:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _SweptTube:
-    """A swept mesh with what its structure is good for."""
+    """A swept mesh and its structure."""
 
     mesh: Any
     """`skfem.MeshHex2` with boundaries inlet, outlet, symmetry and wall."""
     section_node: IntArray
-    """Node of the section that each node stands on."""
+    """Section node of each node."""
     half_station: IntArray
-    """Twice the number of the station that each node stands at; odd half-way between two."""
+    """Twice the station of each node; odd half-way between two."""
     arc_length: FloatArray
     """Along the path at every half-station, shape (2 slabs + 1,)."""
-    place: FloatArray
+    path: FloatArray
     """Point of the path at every half-station, shape (2, 2 slabs + 1)."""
     direction: FloatArray
-    """Unit tangent there, the same shape."""
-
-
-def _stations(*, segments: Sequence[Segment]) -> FloatArray:
-    """Arc lengths of all nodes along a path, mid-nodes included. Returns: Shape (2 cells + 1,)."""
-    vertices = [np.zeros(1)]
-    for segment in segments:
-        shares = geometric_vertices(cells=segment.cells, ratio=segment.ratio)
-        vertices.append(vertices[-1][-1] + segment.length * shares[1:])
-    return with_midpoints(vertices=np.concatenate(vertices))
-
-
-def _path_points(*, segments: Sequence[Segment], arc_length: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points of a path at arc lengths, and its unit tangents there, each of shape (2, n)."""
-    place, tangent = np.zeros((2, arc_length.size), dtype=np.complex128)
-    start, origin, heading = 0.0, 0j, 0.0
-    for segment in segments:
-        reached = arc_length >= start
-        s = np.append(np.minimum(arc_length[reached] - start, segment.length), segment.length)
-        # Chord of an arc: s sinc(half the turned angle), in the mean of both headings.
-        half = segment.turn * s / segment.length / 2
-        points = origin + s * np.sinc(half / np.pi) * np.exp(1j * (heading + half))
-        place[reached], tangent[reached] = points[:-1], np.exp(1j * (heading + 2 * half[:-1]))
-        start, origin, heading = start + segment.length, points[-1], heading + segment.turn
-    return np.stack([place.real, place.imag]), np.stack([tangent.real, tangent.imag])
-
-
-def _straight_section(section: Any) -> FloatArray:
-    """Nodes of the section's mesh with straight sides, in the same order."""
-    vertices = np.ascontiguousarray(section.doflocs[:, : section.nvertices])
-    return np.asarray(MeshQuad2.from_mesh(MeshQuad1(vertices, section.t)).doflocs, dtype=np.float64)
-
-
-def _prism(section: Any, slabs: int) -> Any:
-    """Straight mesh of the section's vertices at z = 0 to the number of slabs."""
-    plane = np.asarray(section.doflocs[:, : section.nvertices])
-    count = plane.shape[1]
-    points = np.concatenate([np.vstack([plane, np.full(count, float(k))]) for k in range(slabs + 1)], axis=1)
-    rows = [np.asarray(section.t[corner]) + end * count for corner, end in _HEXAHEDRON]
-    cells = np.concatenate([np.stack(rows) + k * count for k in range(slabs)], axis=1)
-    return MeshHex2.from_mesh(MeshHex1(points, cells))
+    """Unit tangent of the path at every half-station, shape (2, 2 slabs + 1)."""
 
 
 def swept_tube(*, section: Any, segments: Sequence[Segment]) -> _SweptTube:
@@ -139,18 +99,29 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> _SweptTube:
         raise ValueError("a path needs segments of positive length, cells and ratio")
     if any(abs(s.turn) * reach >= s.length for s in segments):
         raise ValueError("a bend is too tight: its radius must exceed half the bore")
-    at = _stations(segments=segments)
-    slabs = (at.size - 1) // 2
-    prism = _prism(section, slabs)
+    ends = [np.zeros(1)]
+    for segment in segments:
+        shares = geometric_vertices(cells=segment.cells, ratio=segment.ratio)
+        ends.append(ends[-1][-1] + segment.length * shares[1:])
+    arc_length = with_midpoints(vertices=np.concatenate(ends))
+    slabs = (arc_length.size - 1) // 2
+    # Straight mesh of the section's vertices at z = 0 to the number of slabs.
+    plane = np.ascontiguousarray(section.doflocs[:, : section.nvertices])
+    count = plane.shape[1]
+    layers = [np.vstack([plane, np.full(count, float(k))]) for k in range(slabs + 1)]
+    rows = [np.asarray(section.t[corner]) + end * count for corner, end in _HEXAHEDRON]
+    cells = np.concatenate([np.stack(rows) + k * count for k in range(slabs)], axis=1)
+    prism = MeshHex2.from_mesh(MeshHex1(np.concatenate(layers, axis=1), cells))
     half = np.rint(2 * prism.doflocs[2]).astype(np.int64)
     # Upright facets between two layers stand at odd half-stations on nodes of the plane section.
-    gap, node = cKDTree(_straight_section(section).T).query(np.asarray(prism.doflocs[:2]).T)
+    straight = np.asarray(MeshQuad2.from_mesh(MeshQuad1(plane, section.t)).doflocs, dtype=np.float64)
+    gap, node = cKDTree(straight.T).query(np.asarray(prism.doflocs[:2]).T)
     if gap.max() > 1e-9:
         raise ValueError("the section's nodes were not found again: it must be a mesh of quadrilaterals")
-    place, direction = _path_points(segments=segments, arc_length=at)
+    path, direction = _path(segments, arc_length)
     y, z = np.asarray(section.doflocs)[:, node]
     left = np.stack([-direction[1], direction[0]])
-    points = np.vstack([place[:, half] + y * left[:, half], z])
+    points = np.vstack([path[:, half] + y * left[:, half], z])
     named = {
         "inlet": lambda at: at[2] < 0.25,
         "outlet": lambda at: at[2] > slabs - 0.25,
@@ -161,10 +132,25 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> _SweptTube:
         mesh=mesh.with_boundaries(named_facets(prism, named)),
         section_node=np.asarray(node, dtype=np.int64),
         half_station=half,
-        arc_length=at,
-        place=place,
+        arc_length=arc_length,
+        path=path,
         direction=direction,
     )
+
+
+def _path(segments: Sequence[Segment], arc_length: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points of a path at arc lengths, and its unit tangents, each of shape (2, n)."""
+    point, tangent = np.zeros((2, arc_length.size), dtype=np.complex128)
+    start, origin, heading = 0.0, 0j, 0.0
+    for segment in segments:
+        reached = arc_length >= start
+        s = np.append(np.minimum(arc_length[reached] - start, segment.length), segment.length)
+        # Chord of an arc: s sinc(half the turned angle), in the mean of both headings.
+        half = segment.turn * s / segment.length / 2
+        points = origin + s * np.sinc(half / np.pi) * np.exp(1j * (heading + half))
+        point[reached], tangent[reached] = points[:-1], np.exp(1j * (heading + 2 * half[:-1]))
+        start, origin, heading = start + segment.length, points[-1], heading + segment.turn
+    return np.stack([point.real, point.imag]), np.stack([tangent.real, tangent.imag])
 
 
 Progress = Callable[[str], None]
@@ -172,7 +158,7 @@ _NEWTON = NewtonSettings(tolerance=1e-7, max_iterations=10)
 
 
 def coefficients(*, reynolds: float, rotation_reynolds: float) -> Coefficients:
-    """Of flow in a tube that turns about e_z, components along (x, y, z)."""
+    """Coefficients of flow in a tube that turns about e_z, components along (x, y, z)."""
     twice = 2 * rotation_reynolds
     rotation = ((0.0, -twice, 0.0), (twice, 0.0, 0.0), (0.0, 0.0, 0.0))
     return Coefficients(inertia=reynolds, viscosity=1.0, rotation=rotation)
@@ -186,11 +172,11 @@ class BentTubeFlow:
     system: FlowSystem
     solution: FlowSolution
     developed: FlowSolution
-    """In the section; in-plane velocity over nu/d."""
+    """Flow in the section; in-plane velocity over nu/d."""
     reynolds: float
     rotation_reynolds: float
     arc_length: FloatArray
-    """Of the stations between slabs, over d."""
+    """Arc length of the stations between slabs, over d."""
     mean_pressure: FloatArray
     """Reduced pressure, mean over the section, over mu U/d, at those stations."""
     energy_flux: FloatArray
@@ -216,9 +202,9 @@ class BentTubeFlow:
             reynolds: Re = U d/nu, above zero.
             rotation_reynolds: R = omega d^2/nu, zero or more, counter-clockwise about e_z.
             coriolis_factor: on the Coriolis force in the tube, not on the inflow; other than 1 only to see
-                that a wrong one is found out.
+                that a wrong one is noticed.
             first_inertia: share of the inertia to start with; bends at rest need less, such as 0.2.
-            progress: called with a short text on what is being done.
+            progress: called with a short text on the present work.
         Returns: The flow; its solution's status says NOT_CONVERGED when Newton's method failed.
         Raises: ValueError: a Reynolds number out of its bounds, or an impossible path.
         Raises: ArithmeticError: the developed flow was not found.
@@ -226,18 +212,20 @@ class BentTubeFlow:
         """
         if not (np.isfinite(reynolds + rotation_reynolds) and reynolds > 0.0 and rotation_reynolds >= 0.0):
             raise ValueError("reynolds must be above zero, rotation_reynolds zero or more, both finite")
-        say = progress or (lambda _: None)
+        report_progress = progress or (lambda _: None)
         section = cells.system()
         kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
         developed = developed_section(system=section, kl=kl, s=s)
         tube = swept_tube(section=cells.mesh(), segments=segments)
         system = _system(tube, section, developed, reynolds)
-        say(f"{system.free.size} unknowns in {tube.arc_length.size // 2} slabs")
+        report_progress(f"{system.free.size} unknowns in {tube.arc_length.size // 2} slabs")
 
         def solve(share: float, start: FlowSolution | None) -> FlowSolution:
-            say(f"inertia {share:.3g} of its full value")
+            report_progress(f"inertia {share:.3g} of its full value")
             c = coefficients(reynolds=share * reynolds, rotation_reynolds=coriolis_factor * rotation_reynolds)
-            return solve_flow(system=system, coefficients=c, start=start, settings=_NEWTON, progress=say)
+            return solve_flow(
+                system=system, coefficients=c, start=start, settings=_NEWTON, progress=report_progress
+            )
 
         solution = solve(first_inertia, _guess(tube, system, developed, reynolds))
         if first_inertia < 1.0 and solution.status.ok:
@@ -264,7 +252,7 @@ class BentTubeFlow:
     def pressure_loss(self, *, start: float, end: float) -> float:
         """Loss coefficient between two arc lengths over d, 2 (H_1 - H_2)/U^2 with H = p/rho + alpha U^2/2.
 
-        With developed flow at both places it is the fall of reduced pressure over rho U^2/2.
+        With developed flow at both ends it is the fall of reduced pressure over rho U^2/2.
         """
         head = 2 / self.reynolds * self.mean_pressure + self.energy_flux
         first, last = np.interp([start, end], self.arc_length, head)
@@ -273,10 +261,10 @@ class BentTubeFlow:
 
 def _swept_velocity(tube: _SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
     """The section's velocity at every node of the tube, Cartesian components (3, nodes)."""
-    left, up, along = developed.velocity[:, tube.section_node]
+    left, up, axial = developed.velocity[:, tube.section_node]
     tangent = tube.direction[:, tube.half_station]
     normal = np.stack([-tangent[1], tangent[0]])
-    return np.asarray(np.vstack([along * tangent + left / reynolds * normal, up / reynolds]))
+    return np.asarray(np.vstack([axial * tangent + left / reynolds * normal, up / reynolds]))
 
 
 def _pressure_nodes(tube: _SweptTube) -> tuple[IntArray, IntArray]:
@@ -285,27 +273,8 @@ def _pressure_nodes(tube: _SweptTube) -> tuple[IntArray, IntArray]:
     return tube.section_node[:count], tube.half_station[:count] // 2
 
 
-def _swept_pressure(tube: _SweptTube, developed: FlowSolution, reynolds: float) -> FloatArray:
-    """Developed pressure along the tube, zero at the outlet but for the section's own variation."""
-    node, station = _pressure_nodes(tube)
-    s = tube.arc_length[::2]
-    fall = developed.driving_gradient * (s[-1] - s)
-    return np.asarray(fall[station] + developed.pressure[node] / reynolds, dtype=np.float64)
-
-
-def _outlet_load(
-    tube: _SweptTube, system: FlowSystem, section: FlowSystem, pressure: FloatArray
-) -> FloatArray:
-    """Integral over the outlet of minus the section's pressure times normal and shape functions."""
-    normal_force = section.load(np.asarray(section.pressure.interpolate(pressure)))
-    at_outlet = np.flatnonzero(tube.half_station == tube.half_station.max())
-    load = np.zeros(system.unknowns)
-    velocity, _ = system.split(load)
-    velocity[:2, at_outlet] = -tube.direction[:, -1:] * normal_force[tube.section_node[at_outlet]]
-    return load
-
-
 def _system(tube: _SweptTube, section: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSystem:
+    """Discrete equations of the tube, with developed inflow and the traction of developed flow outside."""
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
     system = FlowSystem.of(mesh=tube.mesh, conditions=conditions)
@@ -313,13 +282,25 @@ def _system(tube: _SweptTube, section: FlowSystem, developed: FlowSolution, reyn
     velocity[:, system.boundary_nodes("wall")] = 0.0
     fixed = np.append(velocity.ravel(), np.zeros(system.pressure.N))
     fixed[system.free] = 0.0
-    load = _outlet_load(tube, system, section, developed.pressure / reynolds)
+    # Integral over the outlet of minus the section's pressure times normal and shape functions.
+    pressure = developed.pressure / reynolds
+    normal_force = section.load(np.asarray(section.pressure.interpolate(pressure)))
+    at_outlet = np.flatnonzero(tube.half_station == tube.half_station.max())
+    load = np.zeros(system.unknowns)
+    system.split(load)[0][:2, at_outlet] = (
+        -tube.direction[:, -1:] * normal_force[tube.section_node[at_outlet]]
+    )
     return replace(system, fixed_values=fixed, source=load)
 
 
 def _guess(tube: _SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:
+    """Developed flow all along the tube, its pressure zero at the outlet but for the section's variation."""
     velocity = _swept_velocity(tube, developed, reynolds)
-    return FlowSolution.of(system, np.append(velocity.ravel(), _swept_pressure(tube, developed, reynolds)))
+    node, station = _pressure_nodes(tube)
+    s = tube.arc_length[::2]
+    fall = developed.driving_gradient * (s[-1] - s)
+    pressure = np.asarray(fall[station] + developed.pressure[node] / reynolds, dtype=np.float64)
+    return FlowSolution.of(system, np.append(velocity.ravel(), pressure))
 
 
 def _mean_pressure(tube: _SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
@@ -342,28 +323,19 @@ def _energy_flux(tube: _SweptTube, section: FlowSystem, solution: FlowSolution) 
     return np.array([np.sum(weights * (field[:3] ** 2).sum(axis=0) * field[3]) for field in fields])
 
 
-def _rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvature: float) -> float:
-    """Rotation Reynolds number of the straight tube in which liquid is driven aside as strongly.
-
-    R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa, to first order; negative where
-    the curvature outweighs the rotation.
-    Args: `curvature`: kappa d of the path, positive where it turns in the sense of rotation.
-    """
-    return rotation_reynolds + MOMENTUM_FACTOR * reynolds * curvature / 2
-
-
 def bend_shift(
     *, reynolds: float, rotation_reynolds: float, angle: float, radius: float, with_rotation: bool = False
 ) -> float:
-    """What a bend adds to the rotating friction of its own arc, laminar: (64/Re) phi (r/d) (F(R') - F(R)).
+    """Loss coefficient of a bend beyond the rotating friction of its own arc, laminar flow.
 
-    Args: `radius`: r/d, of the path. `with_rotation`: the path turns in the sense of the disc's rotation.
+    (64/Re) phi (r/d) (F(R') - F(R)) with the rotation R' of the straight tube in which liquid is driven aside
+    as strongly: R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa, to first order;
+    negative where the curvature outweighs the rotation.
+    Args: `radius`: r/d, of the path. `with_rotation`: True if the path turns in the sense of the rotation.
     Returns: K, negative where the bend turns against a rotation that outweighs it.
     Range: R well above Re d/r; the stream's recovery behind the bend is left out.
     """
     curvature = (1.0 if with_rotation else -1.0) / radius
-    shifted = _rotation_with_curvature(
-        reynolds=reynolds, rotation_reynolds=rotation_reynolds, curvature=curvature
-    )
+    shifted = rotation_reynolds + MOMENTUM_FACTOR * reynolds * curvature / 2
     ratios = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=[abs(shifted), rotation_reynolds])
     return float(64 / reynolds * angle * radius * (ratios.value[0] - ratios.value[1]))

@@ -23,7 +23,7 @@ from scipy.integrate import quad, quad_vec
 from scipy.linalg import eigvals
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
-from ringbalance.scene.arrays import ComplexArray, FloatArray, IntArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.elements import CORNERS, NODES, between, boundary_facets, reference_nodes
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
@@ -36,17 +36,17 @@ def exact_moment(*, disc: Disc, density: float, fill_ratio: npt.ArrayLike) -> Fl
 
     U = 2 rho B integral of r^2 sin(alpha(r)) dr from a(x) to R2, by adaptive quadrature.
     """
-    inner = surface_radius(disc=disc, fill_ratio=fill_ratio)
-    scale = 2 * density * disc.axial_width
-    values = [scale * _radial_integral(disc, float(a)) for a in inner.ravel()]
-    return np.asarray(values, dtype=np.float64).reshape(inner.shape)
 
-
-def _radial_integral(disc: Disc, inner: float) -> float:
     def integrand(r: float) -> float:
         return float(r**2 * np.sin(half_angle(disc=disc, radius=r)))
 
-    return float(quad(integrand, inner, disc.outer_radius, epsabs=0, epsrel=_RELATIVE)[0])
+    inner = surface_radius(disc=disc, fill_ratio=fill_ratio)
+    scale = 2 * density * disc.axial_width
+    values = [
+        scale * float(quad(integrand, float(a), disc.outer_radius, epsabs=0, epsrel=_RELATIVE)[0])
+        for a in inner.ravel()
+    ]
+    return np.asarray(values, dtype=np.float64).reshape(inner.shape)
 
 
 def exact_wall_pressure(
@@ -92,7 +92,7 @@ def exact_totals(scene: Scene) -> dict[str, float]:
 
 
 def whole_ring_pressure(scene: Scene) -> float:
-    """Wall pressure at the largest fill if the whole ring were one rectangular element, Pa: a mistake.
+    """Wall pressure at the largest fill with all of the ring as one rectangular element, Pa: a mistake.
 
     Centrifugal force of a ring of unit angle over its outer face, integral of rho omega^2 r^2 dr / R2.
     """
@@ -101,8 +101,8 @@ def whole_ring_pressure(scene: Scene) -> float:
     return scene.liquid.density * scene.rotor.speed**2 * (outer**3 - inner**3) / (3 * outer)
 
 
-_PLACES: Final = (2 * reference_nodes("hexahedron27")).astype(np.int64)
-"""Of the nodes of a cube, in halves."""
+_CUBE_NODES: Final = (2 * reference_nodes("hexahedron27")).astype(np.int64)
+"""Coordinates of the nodes of a cube, in halves of its edge."""
 _BOUNDARIES: Final = {
     "inner_wall": (0, 0),
     "outer_wall": (0, 1),
@@ -117,21 +117,26 @@ _KUHN: Final = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5
 
 def block_chamber(
     cells: tuple[int, int, int],
-    place: Callable[[FloatArray], FloatArray],
+    mapping: Callable[[FloatArray], FloatArray],
     *,
     kind: CellKind = "hexahedron27",
 ) -> ChamberGeometry:
-    """A mapped block of hexahedra, or of six tetrahedra in the place of each.
+    """A mapped block of hexahedra, each of which may be cut into six tetrahedra.
 
     Args:
-        place: from the unit cube, shape (..., 3), to places, m; the first coordinate goes outward.
+        mapping: from the unit cube, shape (..., 3), to coordinates, m; the first coordinate goes outward.
     """
     shape = tuple(2 * n + 1 for n in cells)
     steps = [np.linspace(0, 1, n) for n in shape]
-    points = place(np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)).reshape(-1, 3)
+    points = mapping(np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)).reshape(-1, 3)
     numbers = np.arange(len(points)).reshape(shape)
     starts = np.stack(np.meshgrid(*[2 * np.arange(n) for n in cells], indexing="ij"), axis=-1)
-    local = _local(kind)
+    # Coordinates of the nodes of each cell in a cube, in halves, shape (cells, nodes, 3).
+    if CORNERS[kind] == 8:
+        local = _CUBE_NODES[None, : NODES[kind]]
+    else:
+        corners = _CUBE_NODES[np.array(_KUHN)]
+        local = np.stack([corners[:, list(each)].sum(axis=1) // len(each) for each in between(kind)], axis=1)
     at = (starts.reshape(-1, 1, 1, 3) + local).reshape(-1, local.shape[1], 3)
     bare = ChamberGeometry(
         file="block",
@@ -150,14 +155,6 @@ def block_chamber(
     return replace(bare, boundaries=boundaries)
 
 
-def _local(kind: CellKind) -> IntArray:
-    """Places of the nodes of each cell in a cube, in halves, shape (cells, nodes, 3)."""
-    if CORNERS[kind] == 8:
-        return _PLACES[None, : NODES[kind]]
-    corners = _PLACES[np.array(_KUHN)]
-    return np.stack([corners[:, list(each)].sum(axis=1) // len(each) for each in between(kind)], axis=1)
-
-
 def disc_chamber(
     disc: Disc, cells: tuple[int, int, int], *, kind: CellKind = "hexahedron27"
 ) -> ChamberGeometry:
@@ -165,14 +162,14 @@ def disc_chamber(
     t = disc.plate_thickness
     faces = [float(np.sqrt(radius**2 - t**2)) for radius in (disc.inner_radius, disc.outer_radius)]
 
-    def place(cube: FloatArray) -> FloatArray:
+    def mapping(cube: FloatArray) -> FloatArray:
         # Along a plate's straight face distances grow evenly.
         radius = np.hypot(faces[0] + cube[..., 0] * (faces[1] - faces[0]), t)
         turned = (2 * cube[..., 1] - 1) * half_angle(disc=disc, radius=radius)
         axial = disc.axial_width * (cube[..., 2] - 0.5)
         return np.stack([radius * np.cos(turned), radius * np.sin(turned), axial], axis=-1)
 
-    return block_chamber(cells, place, kind=kind)
+    return block_chamber(cells, mapping, kind=kind)
 
 
 _TERMS = 160
@@ -187,11 +184,11 @@ class CosineWaves:
     wavenumber: FloatArray
     """k, shape (n,)."""
     mass: FloatArray
-    """Of phi, shape (n, n), diagonal."""
+    """Matrix of phi, shape (n, n), diagonal."""
     spring: FloatArray
-    """Of a q, diagonal."""
+    """Matrix of a q, diagonal."""
     mixed: FloatArray
-    """Of -psi: integral of cos(m ...) sin(n ...), rows m."""
+    """Matrix of -psi: integral of cos(m ...) sin(n ...), rows m."""
 
     @classmethod
     def of(cls, *, central_angle: float, depth: float) -> CosineWaves:
@@ -237,9 +234,9 @@ class CosineWaves:
         """
         half, radius = self.central_angle / 2, np.exp(-depth)
         drive = (1 - radius) * np.sin(half) / half
-        found = _potential(self, frequency_ratio, radius * _load(self), still=False)
+        waves = _potential(self, frequency_ratio, radius * _load(self), still=False)
         order = self.wavenumber * self.central_angle / np.pi
-        stream = -np.sum(found * (1 - np.cos(np.pi * order)) / (np.pi * order))
+        stream = -np.sum(waves * (1 - np.cos(np.pi * order)) / (np.pi * order))
         return float(abs(1 + 2 * stream / drive))
 
 
@@ -256,7 +253,7 @@ def _load(waves: CosineWaves) -> ComplexArray:
 def _potential(
     waves: CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
 ) -> ComplexArray:
-    """B, of the forced waves or of a surface that follows at once."""
+    """Coefficients B of the forced waves or of a surface that follows at once."""
     s = frequency_ratio
     inertia = 0.0 if still else s**2 * waves.mass + 2j * s * waves.mixed
     return np.asarray(np.linalg.solve(inertia - waves.spring, -1j * s * load), dtype=np.complex128)

@@ -10,7 +10,7 @@ form, whose right-hand sides are put into the solver.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
-from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
+from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics.pressure.solve import (
     PressureProblem,
@@ -44,13 +44,13 @@ from ringbalance.verification.evidence import (
 )
 from ringbalance.verification.finite_elements import field_error, mutated_force, refined_cells, slopes
 
-_GAUSS_RING: Final = 60
-_TILT: Final = 0.1
+_RING_GAUSS_POINTS: Final = 60
+_MAX_TILT: Final = 0.1
 """Largest g/(omega^2 R1): a surface so tilted that a concentric one would be visibly wrong."""
-_ROOM: Final = 0.3
-"""Share of the room between surface and walls that the tilt may take."""
-_DIRECTION: Final = 0.6
-"""Of gravity from the chamber's centre line, rad: no axis of symmetry."""
+_MAX_GAP_FRACTION: Final = 0.3
+"""Fraction of the gaps between surface and walls that the tilt may take."""
+_DIRECTION_RAD: Final = 0.6
+"""Angle of gravity from the chamber's centre line: no axis of symmetry."""
 _GRAVITY: Final = 9.80665
 _GRAVITY_FLIPPED: Final = "gravity_sign_flipped"
 _FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
@@ -60,8 +60,8 @@ _FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
     }
 )
 """Mutations of the body force."""
-_FILL_SHARE: Final = 0.8
-"""Of the largest fill, in the study."""
+_FILL_OF_MAX: Final = 0.8
+"""Fill of the study over the largest fill."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,20 +79,20 @@ class _ExactRing:
     level: float
     """c, m."""
 
-    def radius(self, angle: npt.ArrayLike, axial_place: npt.ArrayLike = 0.0) -> FloatArray:
+    def radius(self, angle: npt.ArrayLike, axial_position: npt.ArrayLike = 0.0) -> FloatArray:
         """Radius of the free surface, m.
 
         r^2 + 2 r G.e_r + |G|^2 = c^2 with G = g/omega^2 across the shaft, r^2 = c^2 + 2 G z along it.
         """
-        phi, z = np.asarray(angle, dtype=np.float64), np.asarray(axial_place, dtype=np.float64)
-        along = self.offset[0] * np.cos(phi) + self.offset[1] * np.sin(phi)
-        across = self.offset[0] ** 2 + self.offset[1] ** 2
-        return np.asarray(-along + np.sqrt(along**2 + self.level**2 - across + 2 * self.axial * z))
+        phi, z = np.asarray(angle, dtype=np.float64), np.asarray(axial_position, dtype=np.float64)
+        radial = self.offset[0] * np.cos(phi) + self.offset[1] * np.sin(phi)
+        square = self.offset[0] ** 2 + self.offset[1] ** 2
+        return np.asarray(-radial + np.sqrt(radial**2 + self.level**2 - square + 2 * self.axial * z))
 
-    def pressure(self, places: FloatArray) -> FloatArray:
-        """Pressure of the liquid, Pa, the gas counted as zero, at places in m, shape (2 or 3, ...)."""
-        square = (places[0] + self.offset[0]) ** 2 + (places[1] + self.offset[1]) ** 2
-        depth = self.axial * places[2] if len(places) == 3 else 0.0
+    def pressure(self, points: FloatArray) -> FloatArray:
+        """Pressure of the liquid, Pa, the gas counted as zero, at points in m, shape (2 or 3, ...)."""
+        square = (points[0] + self.offset[0]) ** 2 + (points[1] + self.offset[1]) ** 2
+        depth = self.axial * points[2] if len(points) == 3 else 0.0
         scale = self.density * self.angular_velocity**2
         return np.asarray(scale * ((square - self.level**2) / 2 - depth))
 
@@ -103,61 +103,45 @@ def _exact_ring(
     density: float,
     angular_velocity: float,
     fill_ratio: float,
-    across: tuple[float, float] = (0.0, 0.0),
-    along: float = 0.0,
+    transverse: tuple[float, float] = (0.0, 0.0),
+    axial: float = 0.0,
 ) -> _ExactRing:
     """The ring that holds a fill ratio under gravity, m/s^2.
 
-    Args: `across`: across the shaft in the chamber's axes. `along`: along the negative z axis.
+    Args: `transverse`: across the shaft in the chamber's axes. `axial`: along the negative z axis.
     Raises: ValueError: gravity so strong that no closed ring holds the liquid.
     """
     square = angular_velocity**2
     target = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
+    abscissa, weight = map(np.asarray, np.polynomial.legendre.leggauss(_RING_GAUSS_POINTS))
 
     def ring(level: float) -> _ExactRing:
         return _ExactRing(
             density=density,
             angular_velocity=angular_velocity,
-            offset=(across[0] / square, across[1] / square),
-            axial=along / square,
+            offset=(transverse[0] / square, transverse[1] / square),
+            axial=axial / square,
             level=level,
         )
 
-    area = _mean_area_along if along else _area_across
-    reach = 1.5 * float(np.hypot(*across)) / square + 1.5 * along / square * disc.axial_width / middle
-    level = brentq(
-        lambda c: area(disc, ring(c)) - target, middle - reach, middle + reach, xtol=1e-17, rtol=1e-15
-    )
-    return ring(float(level))
+    def excess(level: float) -> float:
+        """Mean area of the liquid's section less that of the fill."""
+        if axial:
+            radii = ring(level).radius(np.zeros_like(abscissa), disc.axial_width / 2 * abscissa)
+        else:
+            # With phi = eta alpha(r) the area element is alpha r dr d eta, so each ray holds half of A(r_s).
+            # The angle of a ray depends on the radius through the plates.
+            radii = np.full(abscissa.shape, disc.outer_radius)
+            for _ in range(100):
+                update = ring(level).radius(abscissa * half_angle(disc=disc, radius=radii))
+                if np.max(np.abs(update - radii)) < 1e-16:
+                    break
+                radii = update
+        return float(weight @ liquid_area(disc=disc, surface_radius=radii) / 2) - target
 
-
-def _rule() -> tuple[FloatArray, FloatArray]:
-    abscissa, weight = np.polynomial.legendre.leggauss(_GAUSS_RING)
-    return np.asarray(abscissa), np.asarray(weight)
-
-
-def _on_rays(disc: Disc, radius: Callable[[FloatArray], FloatArray], eta: FloatArray) -> FloatArray:
-    """Surface radius on the rays phi = eta alpha(r), whose angle depends on the radius through the plates."""
-    r = np.full(eta.shape, disc.outer_radius)
-    for _ in range(100):
-        update = radius(eta * half_angle(disc=disc, radius=r))
-        if np.max(np.abs(update - r)) < 1e-16:
-            break
-        r = update
-    return r
-
-
-def _area_across(disc: Disc, ring: _ExactRing) -> float:
-    """With phi = eta alpha(r) the area element is alpha r dr d eta, so each ray holds half of A(r_s)."""
-    eta, weight = _rule()
-    return float(weight @ liquid_area(disc=disc, surface_radius=_on_rays(disc, ring.radius, eta)) / 2)
-
-
-def _mean_area_along(disc: Disc, ring: _ExactRing) -> float:
-    zeta, weight = _rule()
-    radius = ring.radius(np.zeros_like(zeta), disc.axial_width / 2 * zeta)
-    return float(weight @ liquid_area(disc=disc, surface_radius=radius) / 2)
+    reach = 1.5 * float(np.hypot(*transverse)) / square + 1.5 * axial / square * disc.axial_width / middle
+    return ring(float(brentq(excess, middle - reach, middle + reach, xtol=1e-17, rtol=1e-15)))
 
 
 def gravity_study(
@@ -170,15 +154,15 @@ def gravity_study(
     Raises: ValueError: a search or solve that failed on some level.
     """
     cells = refined_cells(scene.disc, levels[level], dimension=3 if shaft == "vertical" else 2)
-    disc, fill = scene.disc, _FILL_SHARE * scene.disc.max_fill_ratio
+    disc, fill = scene.disc, _FILL_OF_MAX * scene.disc.max_fill_ratio
     true = tilted_liquid(disc=disc, density=scene.liquid.density, fill_ratio=fill, shaft=shaft)
     exact = _exact_ring(
         disc=disc,
         density=true.density,
         angular_velocity=true.angular_velocity,
         fill_ratio=fill,
-        across=(true.gravity[0], true.gravity[1]),
-        along=-sum(true.gravity[2:]),
+        transverse=(true.gravity[0], true.gravity[1]),
+        axial=-sum(true.gravity[2:]),
     )
     liquid = replace(true, gravity=tuple(-g for g in true.gravity)) if defect == _GRAVITY_FLIPPED else true
     with mutated_force(**_FACTORS.get(defect, {})):
@@ -193,10 +177,15 @@ def gravity_study(
         geometry="quadratic",
         note=f"cells {_listed(cells)}",
     )
-    surface = study(
-        "place of the free surface, over the depth",
-        error=[_surface_error(disc, s, exact) for s in solutions],
-    )
+    surface_errors = []
+    for solution in solutions:
+        nodes = solution.chamber.places[:, solution.chamber.grid[0]]
+        angle = np.arctan2(nodes[1], nodes[0])
+        axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
+        away = np.hypot(nodes[0], nodes[1]) - exact.radius(angle, axial)
+        depth = disc.outer_radius - float(np.mean(solution.chamber.surface_radius))
+        surface_errors.append(float(np.max(np.abs(away))) / depth)
+    surface = study("place of the free surface, over the depth", error=surface_errors)
     field = study("pressure field, relative error", error=[field_error(s, exact.pressure) for s in solutions])
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
@@ -205,7 +194,7 @@ def gravity_study(
             **orders_found({"surface": surface, "field": field}),
             "volume_error": Found(value=volume),
         },
-        numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION},
+        numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION_RAD},
         series=(order_figure({"free surface": surface, "pressure field": field}),),
         convergence=(surface, field),
     )
@@ -220,75 +209,65 @@ def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft
 
     Gravity has two components across a horizontal shaft, at no angle of symmetry, three along a vertical one.
     """
+    inner, outer = disc.inner_radius, disc.outer_radius
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
-    speed = float(np.sqrt(_GRAVITY / _offset(disc, middle, shaft)))
-    across = (_GRAVITY * float(np.cos(_DIRECTION)), _GRAVITY * float(np.sin(_DIRECTION)))
-    gravity = (0.0, 0.0, -_GRAVITY) if shaft == "vertical" else across
+    gravity: tuple[float, ...]
+    if shaft == "horizontal":
+        offset = min(_MAX_TILT * inner, _MAX_GAP_FRACTION * min(middle - inner, outer - middle))
+        gravity = (_GRAVITY * float(np.cos(_DIRECTION_RAD)), _GRAVITY * float(np.sin(_DIRECTION_RAD)))
+    else:
+        gaps = min(middle**2 - inner**2, outer**2 - middle**2)
+        offset = _MAX_GAP_FRACTION * gaps / disc.axial_width
+        gravity = (0.0, 0.0, -_GRAVITY)
+    speed = float(np.sqrt(_GRAVITY / offset))
     return RotatingLiquid(density=density, angular_velocity=speed, gravity=gravity)
 
 
-def _offset(disc: Disc, middle: float, shaft: Shaft) -> float:
-    """g/omega^2, so large that the surface is far from concentric and still closed."""
-    inner, outer = disc.inner_radius, disc.outer_radius
-    if shaft == "horizontal":
-        return min(_TILT * inner, _ROOM * min(middle - inner, outer - middle))
-    return _ROOM * min(middle**2 - inner**2, outer**2 - middle**2) / disc.axial_width
-
-
-def _surface_error(disc: Disc, solution: PressureSolution, exact: _ExactRing) -> float:
-    nodes = solution.chamber.places[:, solution.chamber.grid[0]]
-    angle = np.arctan2(nodes[1], nodes[0])
-    axial = nodes[2] if len(nodes) == 3 else np.zeros_like(angle)
-    away = np.hypot(nodes[0], nodes[1]) - exact.radius(angle, axial)
-    depth = disc.outer_radius - float(np.mean(solution.chamber.surface_radius))
-    return float(np.max(np.abs(away))) / depth
-
-
-_SCALE: Final = 1e5
-"""P, Pa."""
+_SCALE_PA: Final = 1e5
 _SLOPES: Final = (3.0, 0.7, 1.8)
 _SHIFTS: Final = (0.4, 0.2)
-_GAUSS: Final = 40
+_WALL_GAUSS_POINTS: Final = 40
 _WALL_ORDER: Final = {"quadratic": 4.0, "straight": 2.0}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manufactured:
-    """The chosen pressure and its derivatives at any place, lengths in metres."""
+    """The chosen pressure and its derivatives at any point, lengths in metres."""
 
     length: float
     """R2, m."""
     width: float
     """B, m."""
 
-    def pressure(self, places: Any) -> FloatArray:
-        """The chosen pressure, Pa, at places in m, shape (dimension, ...)."""
-        x, y = places[0] / self.length, places[1] / self.length
-        z = places[2] / self.width if len(places) == 3 else np.zeros_like(x)
+    def pressure(self, points: Any) -> FloatArray:
+        """The chosen pressure, Pa, at points in m, shape (dimension, ...)."""
+        x, y = points[0] / self.length, points[1] / self.length
+        z = points[2] / self.width if len(points) == 3 else np.zeros_like(x)
         wave = np.sin(_SLOPES[0] * x + _SHIFTS[0]) * np.exp(_SLOPES[1] * y)
-        return np.asarray(_SCALE * (wave * np.cos(_SLOPES[2] * z + _SHIFTS[1]) + (x**2 + y**2) / 2))
+        return np.asarray(_SCALE_PA * (wave * np.cos(_SLOPES[2] * z + _SHIFTS[1]) + (x**2 + y**2) / 2))
 
-    def gradient(self, places: FloatArray) -> FloatArray:
-        """Its gradient, Pa/m, the shape of `places`."""
-        return slopes(self.pressure, places)
+    def gradient(self, points: FloatArray) -> FloatArray:
+        """Pressure gradient, Pa/m, the shape of `points`."""
+        return slopes(self.pressure, points)
 
     def problem(self, defect: str | None = None) -> PressureProblem:
         """The right-hand sides that make this pressure the solution, with a deliberate error built in."""
+
+        def force_along(points: FloatArray) -> FloatArray:
+            force = self.gradient(points)
+            force[1] = 0.0
+            return force
+
         exact = PressureProblem(force=self.gradient, surface_pressure=self.pressure)
         if defect == "force_off_by_a_percent":
-            return replace(exact, force=lambda places: 1.01 * self.gradient(places))
+            return replace(exact, force=lambda points: 1.01 * self.gradient(points))
         if defect == "force_across_dropped":
-            return replace(exact, force=self._without_across)
+            return replace(exact, force=force_along)
         if defect == "surface_pressure_shifted":
-            return replace(exact, surface_pressure=lambda places: self.pressure(places) + 1e-3 * _SCALE)
+            return replace(exact, surface_pressure=lambda points: self.pressure(points) + 1e-3 * _SCALE_PA)
         if defect is not None:
             raise ValueError(f"unknown defect {defect}")
         return exact
-
-    def _without_across(self, places: FloatArray) -> FloatArray:
-        force = self.gradient(places)
-        force[1] = 0.0
-        return force
 
 
 def manufactured_study(
@@ -344,20 +323,21 @@ def manufactured_study(
 def _solutions(
     disc: Disc, problem: PressureProblem, cells: Sequence[tuple[int, ...]], *, straight: bool
 ) -> list[PressureSolution]:
-    """A wrong wall integral is seen against the true arc, so straight sides show in it."""
-    radius = float(surface_radius(disc=disc, fill_ratio=_FILL_SHARE * disc.max_fill_ratio))
-    meshes = (chamber_mesh(disc=disc, surface_radius=radius, cells=count) for count in cells)
-    return [
-        solve_pressure(chamber=_straightened(mesh) if straight else mesh, problem=problem) for mesh in meshes
-    ]
+    """Solutions on ever finer meshes, with nodes within cells on straight lines between corners or not.
 
-
-def _straightened(chamber: ChamberMesh) -> ChamberMesh:
-    """The same mesh with nodes within cells on straight lines between the corners."""
-    first, second = (MeshQuad1, MeshQuad2) if chamber.dimension == 2 else (MeshHex1, MeshHex2)
-    mesh = chamber.mesh
-    flat = second.from_mesh(first(mesh.p, mesh.t))
-    return replace(chamber, mesh=second(flat.doflocs, mesh.t, mesh.boundaries))
+    A wrong wall integral is seen against the true arc, so straight sides show in it.
+    """
+    radius = float(surface_radius(disc=disc, fill_ratio=_FILL_OF_MAX * disc.max_fill_ratio))
+    solutions = []
+    for count in cells:
+        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=count)
+        if straight:
+            mesh = chamber.mesh
+            first, second = (MeshQuad1, MeshQuad2) if chamber.dimension == 2 else (MeshHex1, MeshHex2)
+            flat = second.from_mesh(first(mesh.p, mesh.t))
+            chamber = replace(chamber, mesh=second(flat.doflocs, mesh.t, mesh.boundaries))
+        solutions.append(solve_pressure(chamber=chamber, problem=problem))
+    return solutions
 
 
 def _wall_integral(solution: PressureSolution) -> float:
@@ -368,12 +348,12 @@ def _wall_integral(solution: PressureSolution) -> float:
 
 
 def _exact_wall_integral(disc: Disc, exact: Manufactured, *, dimension: int) -> float:
-    abscissa, weight = np.polynomial.legendre.leggauss(_GAUSS)
+    abscissa, weight = np.polynomial.legendre.leggauss(_WALL_GAUSS_POINTS)
     alpha = float(half_angle(disc=disc, radius=disc.outer_radius))
     arc = disc.outer_radius * np.exp(1j * alpha * abscissa)
     area = disc.outer_radius * alpha * weight
     if dimension == 2:
         return float(area @ exact.pressure(np.stack([arc.real, arc.imag])))
     axial = disc.axial_width / 2 * abscissa
-    places = np.stack(np.broadcast_arrays(arc.real[:, None], arc.imag[:, None], axial[None, :]))
-    return float(area @ exact.pressure(places) @ (disc.axial_width / 2 * weight))
+    points = np.stack(np.broadcast_arrays(arc.real[:, None], arc.imag[:, None], axial[None, :]))
+    return float(area @ exact.pressure(points) @ (disc.axial_width / 2 * weight))

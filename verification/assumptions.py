@@ -1,4 +1,4 @@
-"""Inputs that nobody gave: which of them a claim rests on, and how far they may move what is found."""
+"""Inputs that nobody gave: those that a claim rests on, and how far they may move a computed number."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Assumption:
     origin: str
     """ "assumed", "inferred" or "default"."""
     value: float
-    """In the scene, SI."""
+    """Value in the scene, SI."""
     low: float
     high: float
     """Ends of its range, SI."""
     why: str
-    """What the range rests on."""
+    """Reason for the range."""
     covered: str = ""
-    """What accounts for the range other than computing at its ends."""
+    """Reason why the case is not computed at the ends of the range: something else accounts for it."""
 
 
 def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption, ...]:
@@ -45,21 +45,22 @@ def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption,
     says nothing of a part that nobody described.
     Raises: ValueError: an input without any of these.
     """
-    found = []
-    for one in rests_on:
-        origin, value = scene.origin_of(one.path), raw_value_at(scene, one.path)
-        if origin in KNOWN or value is None:
-            continue
-        low, high, why = _range(one, scene, value, origin)
-        ends = {"low": min(low, value), "high": max(high, value)}
-        found.append(
-            Assumption(path=one.path, origin=origin, value=value, why=why, covered=one.covered, **ends)
-        )
-    return tuple(found)
+    assumptions = []
+    for needed in rests_on:
+        origin, value = scene.origin_of(needed.path), raw_value_at(scene, needed.path)
+        if origin not in KNOWN and value is not None:
+            low, high, why = _range(needed, scene, value, origin)
+            ends = {"low": min(low, value), "high": max(high, value)}
+            assumptions.append(
+                Assumption(
+                    path=needed.path, origin=origin, value=value, why=why, covered=needed.covered, **ends
+                )
+            )
+    return tuple(assumptions)
 
 
 _CHANGES: Final[Mapping[str, Callable[..., Any]]] = {"eccentric_mass": changed}
-"""How values are changed in scenes whose defaults follow from others."""
+"""Function that changes values, by the balancer of scenes whose defaults follow from others."""
 
 
 def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -> Any:
@@ -67,13 +68,12 @@ def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -
 
     Raises: ValueError: a table or quantity that a scene does not have.
     """
-    for path, given in overrides.items():
+    for path, override in overrides.items():
         table, _, key = path.partition(".")
         if not hasattr(getattr(scene, table, None), key):
             raise ValueError(f'a scene has no quantity "{path}"')
-        value = None if given == "absent" else given
         change: Callable[..., Any] = _CHANGES.get(scene.balancer, with_values_at)
-        scene = change(scene, {path: value})
+        scene = change(scene, {path: None if override == "absent" else override})
     return scene
 
 
@@ -82,42 +82,42 @@ def widened(
 ) -> Evidence:
     """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
 
-    What moves is the error, so an input that moves number and reference alike counts for nothing.
-    Args: `at`: what is judged on another scene, or a part of it.
+    The reach is that of the error: an input that moves number and reference alike counts for nothing.
+    Args: `at`: evidence of another scene, or a part of it.
     """
     if not assumptions:
         return evidence
 
-    def errors(of: Any) -> Mapping[str, float]:
-        return {name: found.error for name, found in at(of).quantities.items()}
+    def errors(varied: Any) -> Mapping[str, float]:
+        return {name: number.error for name, number in at(varied).quantities.items()}
 
-    here = errors(scene)
-    paths = [one.path for one in assumptions]
-    corners = itertools.product(*((one.low, one.high) for one in assumptions))
-    moved = [errors(overridden(scene, dict(zip(paths, corner, strict=True)))) for corner in corners]
-    found = dict(evidence.quantities)
-    for name, error in here.items():
-        changes = [one[name] - error for one in moved]
-        found[name] = found[name].moved(min(changes), max(changes))
-    return dataclasses.replace(evidence, quantities=found)
+    nominal = errors(scene)
+    paths = [assumption.path for assumption in assumptions]
+    corners = itertools.product(*((assumption.low, assumption.high) for assumption in assumptions))
+    at_corners = [errors(overridden(scene, dict(zip(paths, corner, strict=True)))) for corner in corners]
+    quantities = dict(evidence.quantities)
+    for name, error in nominal.items():
+        changes = [corner[name] - error for corner in at_corners]
+        quantities[name] = quantities[name].moved(min(changes), max(changes))
+    return dataclasses.replace(evidence, quantities=quantities)
 
 
-def _range(one: RestsOn, scene: Any, value: float, origin: str) -> tuple[float, float, str]:
-    if one.low is not None and one.high is not None:
-        return one.low, one.high, one.why
-    stated = [
+def _range(needed: RestsOn, scene: Any, value: float, origin: str) -> tuple[float, float, str]:
+    if needed.low is not None and needed.high is not None:
+        return needed.low, needed.high, needed.why
+    half_widths = [
         stated.absolute(value)
         for stated in getattr(scene, "uncertainty", ())
-        if stated.quantity == one.path.partition(".")[2] and not one.documented
+        if stated.quantity == needed.path.partition(".")[2] and not needed.documented
     ]
-    ends, why = _DOCUMENTED.get(one.path, (None, ""))
-    if stated and (origin == "inferred" or ends is None):
-        return value - stated[0], value + stated[0], "[uncertainty] of the scene"
+    ends, why = _DOCUMENTED.get(needed.path, (None, ""))
+    if half_widths and (origin == "inferred" or ends is None):
+        return value - half_widths[0], value + half_widths[0], "[uncertainty] of the scene"
     if ends is None:
-        raise ValueError(f"{one.path}: nobody gave it, and no range is stated or documented")
+        raise ValueError(f"{needed.path}: nobody gave it, and no range is stated or documented")
     low, high = ends(scene, value)
-    width = stated[0] if stated else 0.0
-    return min(low, value - width), max(high, value + width), one.why or why
+    half_width = half_widths[0] if half_widths else 0.0
+    return min(low, value - half_width), max(high, value + half_width), needed.why or why
 
 
 def _factor(low: float, high: float) -> Callable[[Any, float], tuple[float, float]]:
@@ -129,8 +129,7 @@ def _between(low: float, high: float) -> Callable[[Any, float], tuple[float, flo
 
 
 def _crest(scene: Scene, _: float) -> tuple[float, float]:
-    """Inside the fullest ring the tube is disconnected at rest; it cannot lie inside the chamber's inner
-    wall."""
+    # Inside the fullest ring the tube is disconnected at rest; it cannot lie inside the chamber's inner wall.
     ring = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
     return scene.disc.inner_radius, min(0.999 * ring, scene.tube.port_radius)
 

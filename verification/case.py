@@ -81,7 +81,7 @@ class CaseError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class _ReferenceText:
-    """Where the reference comes from and how far it is to be trusted."""
+    """Source of the reference and its uncertainty."""
 
     kind: _ReferenceKind
     source: Text
@@ -98,16 +98,16 @@ class RestsOn:
     """Smallest and largest value, SI, where this claim has its own reason for them."""
     high: float | None = None
     documented: bool = False
-    """Whether the documented range counts even where the scene states one, such as for an input that was
+    """True if the documented range counts even where the scene states one, such as for an input that was
     inferred from this very claim."""
     covered: str = ""
-    """Why the case is not computed at the ends of its range: what else accounts for it."""
+    """Reason why the case is not computed at the ends of its range: something else accounts for it."""
     why: str = ""
     """Reason for a range of its own, or for taking the documented one."""
 
     def __post_init__(self) -> None:
-        own = self.low is not None
-        if own != (self.high is not None) or bool(self.why) != (own or self.documented):
+        ranged = self.low is not None
+        if ranged != (self.high is not None) or bool(self.why) != (ranged or self.documented):
             raise ValueError(f"{self.path}: low, high and why, or documented and why, or the path alone")
 
 
@@ -119,7 +119,7 @@ class _LeftOut:
     why: Text
     """Following their number: "of shorter tubes, which flow leaves before it has developed"."""
     taught: bool = False
-    """Whether they taught a coefficient: they are no predictions at all, and not among all readings."""
+    """True if they taught a coefficient: they are no predictions at all, and not among all readings."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +138,7 @@ class JudgedQuantity:
     correction: str = ""
     """Named correction after which a claim's number is reproduced."""
     against: str = ""
-    """Of a claim: what the number that it is compared with is, where the paper does not print it."""
+    """Name of the number that a claim is compared with, where the paper does not print it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,18 +164,18 @@ class _Study:
 
 @dataclass(frozen=True, kw_only=True)
 class CaseDefinition:
-    """All of a case that is not computed."""
+    """A case's text and criteria: all of it that is not computed."""
 
     id: Identifier
     paper: Literal["liquid_ring", "eccentric_mass"] = "liquid_ring"
-    """Whose claim it is, or whose balancer a check belongs to."""
+    """Paper of a claim, or of the balancer that a check belongs to."""
     number: int | None = None
-    """Of the claim, from 1 in each paper."""
+    """Number of the claim, from 1 in each paper."""
     order: int | None = None
     """Position in the report of a case that is no claim; claims go by their number."""
     kind: Kind
     about: tuple[Identifier, ...] = ()
-    """What it is evidence for: keys of `SUBJECTS`; claims are evidence for none."""
+    """Subjects that the case is evidence for, keys of `SUBJECTS`; claims are evidence for none."""
     title: Text
     claim: Text
     """One sentence: what is claimed, or required of the program."""
@@ -183,25 +183,25 @@ class CaseDefinition:
     assumes: tuple[Text, ...]
     does_not_cover: tuple[Text, ...]
     explanation: str = ""
-    """What was found and why, with placeholders for its numbers."""
+    """The result and its reason, with placeholders for its numbers."""
     consequence: Mapping[str, Text] = field(default_factory=dict)
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...] = ()
     reference: _ReferenceText
     study: _Study | None = None
-    """What computes it; a user's own case has a `case.py`."""
+    """The function that computes it; a user's own case has a `case.py`."""
     judged_on: Literal["scene", "paper"] = "scene"
-    """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
+    """Judged system: the scene at hand, or the paper's own disc or rotor with eccentric masses."""
     shape: Literal["any", "sector"] = "any"
-    """Whether an imported chamber can be judged, or only the sector between plates that the keys give."""
+    """Chambers that can be judged: imported ones too, or only the sector between plates of the keys."""
     cause: str = ""
-    """Why a claim does not simply hold: one of `CAUSES`; shared by claims that fail together."""
+    """Reason why a claim does not simply hold, one of `CAUSES`; shared by claims that fail together."""
     judgement: str = ""
-    """Why the criteria lead to this verdict and no other, where that may be disputed."""
+    """Reason why the criteria lead to this verdict and no other, where that may be disputed."""
     rests_on: tuple[RestsOn, ...] = ()
     """Inputs that decide the claim."""
     left_out: tuple[_LeftOut, ...] = ()
-    """Of a validation: what the sources have and no verdict rests on."""
+    """Readings in the sources of a validation on which no verdict rests."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
     quantity: tuple[JudgedQuantity, ...]
@@ -209,7 +209,7 @@ class CaseDefinition:
 
     @classmethod
     def parse(cls, text: str, *, source: str) -> CaseDefinition:
-        """A case.toml as a record. Raises: CaseError: not TOML, or not a case, with all faults at once."""
+        """Read a case.toml. Raises: CaseError: not TOML, or not a case, with all errors at once."""
         try:
             return record_from(CaseDefinition, tomllib.loads(text))
         except tomllib.TOMLDecodeError as error:
@@ -227,45 +227,43 @@ class CaseDefinition:
         return self.consequence.get(verdict.value, self.consequence.get("default", ""))
 
     def __post_init__(self) -> None:
+        """Raises: ValueError: keys that contradict each other."""
         if not (self.quantity and self.must_fail):
             raise ValueError("at least one quantity and one must_fail are needed")
         if (self.number is None) == (self.kind == "claim"):
             raise ValueError("a claim has a number, and nothing else has one")
         if self.order is not None and self.kind == "claim":
             raise ValueError("a claim has no order: its place in the report follows from its number")
-        strange = [subject for subject in self.about if subject not in SUBJECTS]
-        if strange or (self.kind == "claim" and self.about):
+        unknown = [subject for subject in self.about if subject not in SUBJECTS]
+        if unknown or (self.kind == "claim" and self.about):
             raise ValueError(f"about: a case that is no claim may name some of {', '.join(SUBJECTS)}")
         _unique("quantity", [quantity.name for quantity in self.quantity])
-        _unique("rests_on", [one.path for one in self.rests_on])
-        _unique("left_out", [one.name for one in self.left_out])
+        _unique("rests_on", [needed.path for needed in self.rests_on])
+        _unique("left_out", [readings.name for readings in self.left_out])
         if self.left_out and self.kind != "validation":
             raise ValueError("left_out: only a validation leaves readings out")
         _unique("must_fail", [mutation.id for mutation in self.must_fail])
-        for quantity in self.quantity:
-            self._check_quantity(quantity)
-        for mutation in self.must_fail:
-            self._check_mutation(mutation)
-        self._check_claim()
-        self._check_consequence()
+        self._check_quantities_and_mutations()
+        self._check_claim_and_consequence()
         for text in self.prose:
             placeholders(text)
 
-    def _check_quantity(self, quantity: JudgedQuantity) -> None:
-        if quantity.metric == "validation" and self.kind not in ("claim", "validation"):
-            raise ValueError(
-                f'{quantity.name}: metric "validation" is for claims and validation; use "within_uncertainty"'
-            )
-        if quantity.metric in NEEDS_REFERENCE and quantity.limit <= 0:
-            raise ValueError(f"{quantity.name}: limit must be positive")
+    def _check_quantities_and_mutations(self) -> None:
+        for quantity in self.quantity:
+            if quantity.metric == "validation" and self.kind not in ("claim", "validation"):
+                raise ValueError(
+                    f'{quantity.name}: metric "validation" is for claims and validation; '
+                    'use "within_uncertainty"'
+                )
+            if quantity.metric in NEEDS_REFERENCE and quantity.limit <= 0:
+                raise ValueError(f"{quantity.name}: limit must be positive")
+        for mutation in self.must_fail:
+            if mutation.expect not in VOCABULARY[self.kind] or mutation.expect is Verdict.NOT_RUN:
+                raise ValueError(f'{mutation.id}: a {self.kind} case cannot come out "{mutation.expect}"')
+            if self.kind.endswith("verification") and mutation.expect is not Verdict.FAILED:
+                raise ValueError(f'{mutation.id}: a mutation of a {self.kind} case must come out "failed"')
 
-    def _check_mutation(self, mutation: Mutation) -> None:
-        if mutation.expect not in VOCABULARY[self.kind] or mutation.expect is Verdict.NOT_RUN:
-            raise ValueError(f'{mutation.id}: a {self.kind} case cannot come out "{mutation.expect}"')
-        if self.kind.endswith("verification") and mutation.expect is not Verdict.FAILED:
-            raise ValueError(f'{mutation.id}: a mutation of a {self.kind} case must come out "failed"')
-
-    def _check_claim(self) -> None:
+    def _check_claim_and_consequence(self) -> None:
         ideas = [quantity for quantity in self.quantity if quantity.judges == "idea"]
         plain = all(q.judges == "number" and not q.correction for q in self.quantity)
         if self.kind != "claim" and not (plain and not self.cause and not self.rests_on):
@@ -274,13 +272,11 @@ class CaseDefinition:
             raise ValueError(f"cause: one of {', '.join(filter(None, CAUSES))}")
         if any(quantity.correction for quantity in self.quantity) and not ideas:
             raise ValueError("a correction needs a quantity that judges the idea")
-
-    def _check_consequence(self) -> None:
-        known = [verdict.value for verdict in VOCABULARY[self.kind]]
-        strange = [key for key in self.consequence if key not in (*known, "default")]
-        if strange:
-            raise ValueError(f'consequence: "{strange[0]}" is no verdict of a {self.kind} case')
-        missing = [word for word in known if word != "not run" and word not in self.consequence]
+        verdicts = [verdict.value for verdict in VOCABULARY[self.kind]]
+        unknown = [key for key in self.consequence if key not in (*verdicts, "default")]
+        if unknown:
+            raise ValueError(f'consequence: "{unknown[0]}" is no verdict of a {self.kind} case')
+        missing = [word for word in verdicts if word != "not run" and word not in self.consequence]
         if self.consequence and missing and "default" not in self.consequence:
             raise ValueError(f'consequence: nothing for "{missing[0]}", and no default')
 
@@ -320,13 +316,11 @@ def fill(text: str, numbers: Mapping[str, float]) -> str:
             raise ValueError(f'the number "{name}" is not finite')
         factor, symbol = _UNITS[unit]
         value = numbers[name] * factor
-        return _shown(round(value) if style.endswith("d") else value, style) + symbol.replace(" ", "\u00a0")
+        digits = format(round(value) if style.endswith("d") else value, style)
+        if style.startswith("#"):
+            digits = digits.rstrip(".")
+        if "e" not in digits:
+            digits = digits.replace("-", "\u2212")
+        return digits + symbol.replace(" ", "\u00a0")
 
     return _PLACEHOLDER.sub(number, text)
-
-
-def _shown(value: float, style: str) -> str:
-    shown = format(value, style)
-    if style.startswith("#"):
-        shown = shown.rstrip(".")
-    return shown.replace("-", "\u2212") if "e" not in shown else shown

@@ -1,6 +1,6 @@
-"""All cases, found by their folders: the program's in the order in which they are reported, and a user's own.
+"""All cases, by their folders: the program's in the order in which they are reported, and a user's own.
 
-What is wrong with a case of a user's own is a `CaseError` in one sentence and stops no other.
+An error in a case of a user's own is a `CaseError` in one sentence and stops no other.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _PAPERS: Final = ("liquid_ring", "eccentric_mass")
 _TEXT: Final = "case.toml"
 _CODE: Final = "case.py"
 _JUDGED: Final = (NotRunError, ValueError, ArithmeticError, RuntimeError)
-"""What the run of a case makes a verdict of."""
+"""Errors that the run of a case turns into a verdict."""
 
 
 @lru_cache(maxsize=1)
@@ -61,8 +61,8 @@ def case_code(case_id: str) -> CaseCode:
     """
     study = load_case(case_id).study
     assert study is not None, f"{case_id}: no [study]"
-    place, _, name = study.of.rpartition(".")
-    module = getattr(cases, place)
+    module_name, _, name = study.of.rpartition(".")
+    module = getattr(cases, module_name)
     compute = partial(getattr(module, name), **study.settings)
     return cast(CaseCode, SimpleNamespace(compute=compute, ends=getattr(module, f"{name}_ends", None)))
 
@@ -70,7 +70,8 @@ def case_code(case_id: str) -> CaseCode:
 @lru_cache(maxsize=64)
 def load_case(case_id: str) -> CaseDefinition:
     """The text and criteria of a case. Raises: UnknownCaseError, or CaseError: its case.toml is not one."""
-    _check_known(case_id)
+    if case_id not in case_ids():
+        raise unknown_case(case_id, case_ids())
     path = files(cases) / case_id / "case.toml"
     definition = CaseDefinition.parse(path.read_text(encoding="utf-8"), source=f"{case_id}/case.toml")
     if definition.id != case_id:
@@ -80,34 +81,25 @@ def load_case(case_id: str) -> CaseDefinition:
 
 def load_cases() -> tuple[CaseDefinition, ...]:
     """All cases in the order of the report: first by `order`, then the claims by paper and number."""
-    return tuple(sorted(map(load_case, case_ids()), key=place))
+    return tuple(sorted(map(load_case, case_ids()), key=report_order))
 
 
-def place(definition: CaseDefinition) -> tuple[bool, int, int, str]:
-    """By which cases are sorted for the report."""
+def report_order(definition: CaseDefinition) -> tuple[bool, int, int, str]:
+    """Key by which cases are sorted for the report."""
     claim = definition.kind == "claim"
     position = definition.number if claim else definition.order
     return claim, _PAPERS.index(definition.paper) if claim else 0, position or 0, definition.id
 
 
-def _check_known(case_id: str) -> None:
-    if case_id in case_ids():
-        return
-    raise unknown_case(case_id, case_ids())
-
-
-def unknown_case(case_id: str, known: Sequence[str]) -> UnknownCaseError:
-    """The error of an id that is none of those known, with the nearest."""
-    near = _by_number(case_id) or difflib.get_close_matches(case_id, known, n=1, cutoff=0.5)
+def unknown_case(case_id: str, ids: Sequence[str]) -> UnknownCaseError:
+    """The error of an id that is none of `ids`, with the nearest of them."""
+    # A claim may be asked for by its number alone.
+    number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
+    start = f"claim_{int(number[1]):02d}_" if number else None
+    near = [name for name in case_ids() if start and name.startswith(start)]
+    near = near or difflib.get_close_matches(case_id, ids, n=1, cutoff=0.5)
     guess = f', did you mean "{near[0]}"?' if near else "."
     return UnknownCaseError(f'unknown case "{case_id}"{guess} `ringbalance verify --list` names them all.')
-
-
-def _by_number(case_id: str) -> list[str]:
-    """A claim may be asked for by its number alone."""
-    number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
-    wanted = f"claim_{int(number[1]):02d}_" if number else None
-    return [known for known in case_ids() if wanted and known.startswith(wanted)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,9 +110,20 @@ class OwnCase:
     definition: CaseDefinition
 
     def code(self) -> CaseCode:
-        """Its functions. Raises: CaseError: they cannot be loaded, or take something else than they must."""
+        """Load its functions. Raises: CaseError: they cannot be loaded, or take other arguments."""
         path = self.folder / _CODE
-        module = _loaded(path)
+        spec = spec_from_file_location(f"own_case_{self.folder.name}", path)
+        if spec is None or spec.loader is None or not path.is_file():
+            raise CaseError(f"{path}: there is no such file")
+        # The module is not entered in `sys.modules`: each run has one of its own.
+        module = module_from_spec(spec)
+        writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            raise CaseError(f"{path}: {_described(error, path)}") from error
+        finally:
+            sys.dont_write_bytecode = writes
         compute = getattr(module, "compute", None)
         if not callable(compute):
             raise CaseError(f"{path}: there is no function compute(scene, level, defect=None)")
@@ -137,7 +140,7 @@ class OwnCase:
 
 @dataclass(frozen=True, kw_only=True)
 class _Code:
-    """What the run of a case asks for, from functions that may give plain numbers."""
+    """Code of a user's own case, whose functions may give plain numbers."""
 
     path: Path
     module: ModuleType
@@ -146,31 +149,27 @@ class _Code:
     takes_defect: bool
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
-        """As `CaseCode.compute`."""
+        """Evidence of the case's functions. Raises: CaseError: they give something else, or break down."""
         arguments = (scene, level, defect) if self.takes_defect else (scene, level)
-        result = self._called(self.module.compute, *arguments)
-        if isinstance(result, Mapping):
-            result = Evidence(quantities=self._records("compute", result, Found))
-        if not isinstance(result, Evidence):
+        evidence = self._called(self.module.compute, *arguments)
+        if isinstance(evidence, Mapping):
+            evidence = Evidence(quantities=self._records("compute", evidence, Found))
+        if not isinstance(evidence, Evidence):
             raise CaseError(
-                f"{self.path}: compute gives {_kind(result)}, not an Evidence or numbers by quantity"
+                f"{self.path}: compute gives {_kind(evidence)}, not an Evidence or numbers by quantity"
             )
-        self._check_names("compute", result.quantities, complete=True)
-        against = self._references(scene)
-        found = {
-            name: found.against(against[name]) if name in against else found
-            for name, found in result.quantities.items()
+        self._check_names("compute", evidence.quantities, complete=True)
+        references = getattr(self.module, "reference", {})
+        references = self._called(references, scene) if callable(references) else references
+        if not isinstance(references, Mapping):
+            raise CaseError(f"{self.path}: reference gives {_kind(references)}, not references by quantity")
+        self._check_names("reference", references, complete=False)
+        references = self._records("reference", references, Reference)
+        quantities = {
+            name: number.against(references[name]) if name in references else number
+            for name, number in evidence.quantities.items()
         }
-        return dataclasses.replace(result, quantities=found)
-
-    def _references(self, scene: Any) -> Mapping[str, Reference]:
-        """What judged quantities are compared with, by name; nothing where the case has none."""
-        given = getattr(self.module, "reference", {})
-        values = self._called(given, scene) if callable(given) else given
-        if not isinstance(values, Mapping):
-            raise CaseError(f"{self.path}: reference gives {_kind(values)}, not references by quantity")
-        self._check_names("reference", values, complete=False)
-        return self._records("reference", values, Reference)
+        return dataclasses.replace(evidence, quantities=quantities)
 
     def _called(self, function: Callable[..., Any], *arguments: Any) -> Any:
         try:
@@ -180,77 +179,51 @@ class _Code:
         except Exception as error:
             raise CaseError(f"{self.path}: {_described(error, self.path)}") from error
 
-    def _records(self, where: str, values: Mapping[str, Any], kind: Callable[..., Any]) -> dict[str, Any]:
-        """Records of a kind by name, plain numbers made into such."""
+    def _records(self, function: str, values: Mapping[str, Any], kind: Callable[..., Any]) -> dict[str, Any]:
+        """Records of a kind by name, plain numbers (of numpy's too) made into such."""
         records = {}
         for name, value in values.items():
-            number = _number(value)
-            if type(value) is not kind and number is None:
+            if type(value) is kind:
+                records[name] = value
+            elif isinstance(value, SupportsFloat) and not isinstance(value, str) and not np.ndim(value):  # type: ignore[arg-type]
+                records[name] = kind(value=float(value))
+            else:
                 raise CaseError(
-                    f'{self.path}: {where} gives {_kind(value)} for "{name}", not a number or a '
+                    f'{self.path}: {function} gives {_kind(value)} for "{name}", not a number or a '
                     f"{kind.__name__}"
                 )
-            records[name] = value if number is None else kind(value=number)
         return records
 
-    def _check_names(self, where: str, values: Mapping[str, Any], *, complete: bool) -> None:
-        strange = [name for name in values if name not in self.judged]
+    def _check_names(self, function: str, values: Mapping[str, Any], *, complete: bool) -> None:
+        unknown = [name for name in values if name not in self.judged]
         missing = [name for name in self.judged if name not in values] if complete else []
-        if strange or missing:
-            what = f'gives "{strange[0]}", which is not judged' if strange else f'lacks "{missing[0]}"'
-            raise CaseError(f"{self.path}: {where} {what}; {_TEXT} judges {', '.join(self.judged)}")
+        if unknown or missing:
+            what = f'gives "{unknown[0]}", which is not judged' if unknown else f'lacks "{missing[0]}"'
+            raise CaseError(f"{self.path}: {function} {what}; {_TEXT} judges {', '.join(self.judged)}")
 
 
 def own_cases(folder: Path) -> tuple[list[OwnCase], list[CaseError]]:
-    """The cases in a folder, or the one that it is, by name, and what is wrong with others."""
-    folders = [folder] if (folder / _TEXT).is_file() else _below(folder)
-    cases, errors = [], []
-    for place in folders:
+    """The cases in a folder, or the one that it is, by name; and the errors of those that cannot be read."""
+    if (folder / _TEXT).is_file():
+        folders = [folder]
+    else:
         try:
-            cases.append(OwnCase(folder=place, definition=_definition(place / _TEXT)))
+            folders = sorted(path.parent for path in folder.glob(f"*/{_TEXT}"))
+        except OSError:
+            folders = []
+    cases, errors = [], []
+    for case_folder in folders:
+        path = case_folder / _TEXT
+        try:
+            text = path.read_text(encoding="utf-8")
+            cases.append(OwnCase(folder=case_folder, definition=CaseDefinition.parse(text, source=str(path))))
+        except (OSError, UnicodeDecodeError) as error:
+            errors.append(CaseError(f"{path}: it cannot be read: {error}"))
         except CaseError as error:
             errors.append(error)
     if not folders:
         errors.append(CaseError(f"{folder}: there is no folder with a {_TEXT} in it"))
     return cases, errors
-
-
-def _below(folder: Path) -> list[Path]:
-    try:
-        return sorted(path.parent for path in folder.glob(f"*/{_TEXT}"))
-    except OSError:
-        return []
-
-
-def _definition(path: Path) -> CaseDefinition:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CaseError(f"{path}: it cannot be read: {error}") from error
-    return CaseDefinition.parse(text, source=str(path))
-
-
-def _loaded(path: Path) -> ModuleType:
-    """A file's module, not entered in `sys.modules`: each run has one of its own."""
-    spec = spec_from_file_location(f"own_case_{path.parent.name}", path)
-    if spec is None or spec.loader is None or not path.is_file():
-        raise CaseError(f"{path}: there is no such file")
-    module = module_from_spec(spec)
-    writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise CaseError(f"{path}: {_described(error, path)}") from error
-    finally:
-        sys.dont_write_bytecode = writes
-    return module
-
-
-def _number(value: object) -> float | None:
-    """A number, of numpy's too; None for what is none."""
-    if isinstance(value, str) or not isinstance(value, SupportsFloat) or np.ndim(cast(Any, value)):
-        return None
-    return float(value)
 
 
 def _described(error: Exception, path: Path) -> str:
@@ -259,8 +232,8 @@ def _described(error: Exception, path: Path) -> str:
         frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)
     ]
     line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-    place = "" if line is None else f"line {line}: "
-    return f"{place}{type(error).__name__}: {' '.join(str(error).split())}"
+    position = "" if line is None else f"line {line}: "
+    return f"{position}{type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def _kind(value: object) -> str:

@@ -15,14 +15,7 @@ from ringbalance.scene.platform.display import display
 from ringbalance.scene.platform.terminal import activity, print_error, results_console
 from ringbalance.scene.registry import registered
 from ringbalance.verification.case import CaseDefinition, CaseError
-from ringbalance.verification.catalogue import (
-    OwnCase,
-    UnknownCaseError,
-    load_case,
-    own_cases,
-    place,
-    unknown_case,
-)
+from ringbalance.verification.catalogue import OwnCase, load_case, own_cases, report_order, unknown_case
 from ringbalance.verification.catalogue import case_ids as program_ids
 from ringbalance.verification.result import CaseResult, definition_document, kind_text
 from ringbalance.verification.runner import paper_scene, run_cases, run_definition, scene_of
@@ -36,23 +29,34 @@ def verify(options: SimpleNamespace) -> int:
     if options.data is not None:
         _print_judgement(registered("function", "data_document")(options.data), json=options.json)
         return 0
-    found, errors = own_cases(options.cases) if options.cases is not None else ([], [])
-    own = {case.definition.id: case for case in found}
-    try:
-        chosen, more = _chosen(options.case_ids, own)
-    except UnknownCaseError as error:
-        # A case whose text cannot be read is unknown, too; what is wrong with it is said alone.
-        said: Sequence[Exception] = errors or [error]
-        for wrong in said:
-            print_error(f"ringbalance: {wrong}")
+    user_cases, errors = own_cases(options.cases) if options.cases is not None else ([], [])
+    users = {case.definition.id: case for case in user_cases}
+    ids = (*program_ids(), *users)
+    if unknown := [name for name in options.case_ids if name not in ids]:
+        # A case whose text cannot be read is unknown, too; its own error is reported alone.
+        problems: Sequence[Exception] = errors or [unknown_case(unknown[0], ids)]
+        for problem in problems:
+            print_error(f"ringbalance: {problem}")
         return _BAD_INPUT
-    errors += more
+    definitions: list[CaseDefinition] = []
+    for name in options.case_ids or ids:
+        try:
+            definitions.append(users[name].definition if name in users else load_case(name))
+        except CaseError as error:
+            errors.append(error)
+    if not options.case_ids:
+        definitions.sort(key=lambda definition: (definition.id in users, report_order(definition)))
     results: list[CaseResult] = []
-    if options.list_:
-        _print_list(chosen, json=options.json)
+    if options.list_ and options.json:
+        print(dumps([definition_document(each) for each in definitions], allow_nan=False))
+    elif options.list_:
+        rows = [(each.id, kind_text(each), each.cost, each.title) for each in definitions]
+        table = Table(heads=("case", "kind", "cost", "title"), rows=rows)
+        cases = Rows(title=f"{len(rows)} cases", quantities=(), tables=(table,), listed=0)
+        print_rows(cases, headline=False)
     else:
-        results, broken = _run(chosen, own, options)
-        errors += broken
+        results, code_errors = _run([each.id for each in definitions], users, options)
+        errors += code_errors
         if options.json:
             print(dumps([result.to_dict() for result in results], allow_nan=False))
         else:
@@ -62,46 +66,28 @@ def verify(options: SimpleNamespace) -> int:
     return _BAD_INPUT if errors else _exit_code(results)
 
 
-def _chosen(ids: Sequence[str], own: Mapping[str, OwnCase]) -> tuple[list[CaseDefinition], list[CaseError]]:
-    """Cases by their ids, or all, the program's first; and what is wrong with some of them."""
-    known = (*program_ids(), *own)
-    unknown = [name for name in ids if name not in known]
-    if unknown:
-        raise unknown_case(unknown[0], known)
-    chosen: list[CaseDefinition] = []
-    errors = []
-    for name in ids or known:
-        try:
-            chosen.append(own[name].definition if name in own else load_case(name))
-        except CaseError as error:
-            errors.append(error)
-    if not ids:
-        chosen.sort(key=lambda definition: (definition.id in own, place(definition)))
-    return chosen, errors
-
-
 def _run(
-    chosen: Sequence[CaseDefinition], own: Mapping[str, OwnCase], options: SimpleNamespace
+    ids: Sequence[str], users: Mapping[str, OwnCase], options: SimpleNamespace
 ) -> tuple[list[CaseResult], list[CaseError]]:
-    """Results in the order of the cases, and errors in the code of own ones."""
+    """Results in the order of the cases, and errors in the code of users' own ones."""
     results: dict[str, CaseResult] = {}
     errors: list[CaseError] = []
-    ids, total = [definition.id for definition in chosen], len(chosen)
     scene = paper_scene() if options.scene is None else load_scene(options.scene)
     effort: dict[str, Any] = {"level": options.level, "mutations": options.mutations}
-    with activity("verify", f"0 of {total} cases") as shown:
+    with activity("verify", f"0 of {len(ids)} cases") as shown:
 
         def done(result: CaseResult) -> None:
             name = result.definition.id
             results[name] = result
-            shown.show(f"{len(results)} of {total} cases, {name} done", done=len(results), total=total)
+            text = f"{len(results)} of {len(ids)} cases, {name} done"
+            shown.show(text, done=len(results), total=len(ids))
 
-        if packaged := [name for name in ids if name not in own]:
+        if packaged := [name for name in ids if name not in users]:
             run_cases(packaged, scene=scene, workers=options.workers, progress=done, **effort)
-        for case in (own[name] for name in ids if name in own):
-            definition, given = case.definition, scene_of(case.definition, liquid_ring_scene(scene))
+        for case in (users[name] for name in ids if name in users):
+            case_scene = scene_of(case.definition, liquid_ring_scene(scene))
             try:
-                done(run_definition(definition, case.code(), scene=given, **effort))
+                done(run_definition(case.definition, case.code(), scene=case_scene, **effort))
             except CaseError as error:
                 errors.append(error)
     return [results[name] for name in ids if name in results], errors
@@ -140,16 +126,6 @@ def _print_judgement(document: Mapping[str, Any], *, json: bool) -> None:
         listed=0,
     )
     print_rows(rows, headline=False)
-
-
-def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:
-    if json:
-        print(dumps([definition_document(d) for d in definitions], allow_nan=False))
-        return
-    rows = [(d.id, kind_text(d), d.cost, d.title) for d in definitions]
-    table = Table(heads=("case", "kind", "cost", "title"), rows=rows)
-    cases = Rows(title=f"{len(rows)} cases", quantities=(), tables=(table,), listed=0)
-    print_rows(cases, headline=False)
 
 
 def _print_results(results: Sequence[CaseResult]) -> None:

@@ -1,6 +1,6 @@
-"""What a case hands to the framework: numbers with uncertainties, curves and tables.
+"""Evidence of a case for the framework: numbers with uncertainties, curves and tables.
 
-A found number S is compared with a reference D (ASME V&V 20): the error E = S - D with the validation
+A computed number S is compared with a reference D (ASME V&V 20): the error E = S - D with the validation
 uncertainty u_val = sqrt(u_num^2 + u_input^2 + u_D^2).  All u are standard uncertainties; the half-width
 2 u_val covers 95 %.  An error inside it cannot be distinguished from none; one outside it can.
 """
@@ -80,7 +80,7 @@ def printed(value: float, *, last_digit: float) -> Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class Deviation:
-    """A found number S against a reference D."""
+    """Departure of a computed number S from a reference D."""
 
     error: float
     """E = S - D."""
@@ -89,28 +89,28 @@ class Deviation:
 
     @property
     def consistent(self) -> bool:
-        """Whether |E| <= 2 u_val: the comparison sees no difference."""
+        """True if |E| <= 2 u_val: the comparison sees no difference."""
         return abs(self.error) <= self.half_width
 
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """A number that a case found; SI, in the unit that the case's text names."""
+    """A number that a case computed; SI, in the unit that the case's text names."""
 
     value: float
     numerical: float = 0.0
     """u_num, standard uncertainty of the calculation."""
     input: float = 0.0
-    """u_input, standard uncertainty from what the calculation was given, without `assumed`."""
+    """u_input, standard uncertainty from the inputs of the calculation that somebody vouches for."""
     reach: tuple[float, float] = (0.0, 0.0)
-    """How far down and up the number moves against its reference while all inputs that nobody gave pass
-    through their ranges; what is random is in `input`."""
+    """Lowest and highest change of the number against its reference while all inputs that nobody gave pass
+    through their ranges; random effects are in `input`."""
     corrected: float | None = None
     """The number once the correction that the case's text names is made; None where there is none."""
     conclusive: bool = True
-    """False when the sequence behind the number is not asymptotic, or a solve did not succeed."""
+    """False if the sequence behind the number is not asymptotic, or a solve did not succeed."""
     reference: Reference | None = None
-    """What it is compared with; None where a limit alone judges it."""
+    """The number that it is compared with; None where a limit alone judges it."""
 
     def __post_init__(self) -> None:
         corrected = 0.0 if self.corrected is None else self.corrected
@@ -128,7 +128,7 @@ class Found:
         return self.value - (0.0 if self.reference is None else self.reference.value)
 
     def against(self, reference: Reference | SupportsFloat) -> Found:
-        """The number beside what it is compared with; a plain number is exact."""
+        """The number with its reference; a plain number is an exact one."""
         exact = reference if isinstance(reference, Reference) else Reference(value=float(reference))
         return dataclasses.replace(self, reference=exact)
 
@@ -155,7 +155,7 @@ class Found:
         )
 
     def with_correction(self) -> Found:
-        """The number with its correction made: what a case finds once the plates are left out."""
+        """The corrected number in place of the number, such as the one without plates."""
         corrected = self.value if self.corrected is None else self.corrected
         return Found(value=corrected, reference=self.reference)
 
@@ -201,7 +201,7 @@ class Series:
 
 
 def figure(name: str, x: tuple[str, str, npt.ArrayLike], *curves: Curve, log: bool = False) -> Series:
-    """A figure of curves over one axis, given by its name, unit and values."""
+    """A figure of curves over one axis: its name, unit and values."""
     title, unit, values = x
     axis = FigureAxis(name=title, unit=unit, values=np.asarray(values, dtype=np.float64))
     return Series(name=name, x=axis, y=curves, log=log)
@@ -217,11 +217,11 @@ class Convergence:
     size: Sequence[float]
     """h, relative to the coarsest, coarse to fine."""
     error: Sequence[float] | None = None
-    """Against an exact value."""
+    """Errors against an exact value."""
     value: Sequence[float] | None = None
-    """Where there is no exact value."""
+    """Values of the quantity, where no exact one is known."""
     observed_order: Sequence[float] = ()
-    """Of each pair of levels, or of each triplet where there is no exact value."""
+    """Order of each pair of levels, or of each triplet where no exact value is known."""
     gci: float | None = None
     """Grid convergence index of the finest value, relative to it: a bound, of no stated probability."""
     geometry: str = ""
@@ -296,10 +296,10 @@ class CaseTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """All that one computation of a case found."""
+    """All results of one computation of a case."""
 
     quantities: Mapping[str, Found]
-    """By the names of the case's quantities."""
+    """Judged numbers by the names of the case's quantities."""
     numbers: Mapping[str, Any] = field(default_factory=dict)
     """Further numbers, SI, for the placeholders of the case's text; kept as floats."""
     series: Sequence[Series] = ()
@@ -315,17 +315,17 @@ class Evidence:
 class CaseCode(Protocol):
     """A case's computation.
 
-    Beside `compute` it may have `ends(scene)`: a shorter way to what is judged, or to the part that assumed
-    inputs move, which is asked for at the ends of their ranges.
+    Beside `compute` it may have `ends(scene)`: a shorter way to the judged numbers, or to those that assumed
+    inputs move, called at the ends of their ranges.
     """
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
-        """What the program finds on a scene, with one of the case's mutations built in by its name."""
+        """Evidence from a scene, with one of the case's mutations built in by its name."""
         ...
 
 
 class NotRunError(Exception):
-    """Raised by a case that cannot be run on this scene, or not yet; its text says why."""
+    """Reason why a case cannot be run on this scene, or not yet."""
 
 
 def _check(*values: float, uncertainties: Sequence[float]) -> None:

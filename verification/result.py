@@ -1,4 +1,4 @@
-"""What running a case gives: each quantity judged, the case's verdict, the evidence, and its mutations."""
+"""Result of running a case: each quantity judged, the case's verdict, the evidence, and its mutations."""
 
 from __future__ import annotations
 
@@ -11,14 +11,20 @@ from ringbalance.results.numbers import format_given
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.verification.assumptions import Assumption
-from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition, JudgedQuantity, fill
+from ringbalance.verification.case import (
+    CAUSES,
+    NEEDS_REFERENCE,
+    CaseDefinition,
+    JudgedQuantity,
+    Mutation,
+    fill,
+)
 from ringbalance.verification.evidence import (
     COVERAGE_FACTOR,
     Deviation,
     Evidence,
     Found,
     Level,
-    Reference,
     from_range,
 )
 from ringbalance.verification.typed_record import plain
@@ -30,7 +36,7 @@ _DEPARTS: Final = {Verdict.CORRECTED, Verdict.REFUTED, Verdict.INCONCLUSIVE}
 _AS_DEFINED: Final = _LISTED | {
     *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on", "left_out"),
 }
-"""What a record has as its case.toml has it."""
+"""Keys of a result that are copied from its case.toml."""
 _CODES: Final = {
     Verdict.PASSED: "case_holds",
     Verdict.CONFIRMED: "case_holds",
@@ -38,7 +44,7 @@ _CODES: Final = {
     Verdict.NOT_RUN: "case_not_run",
 }
 """Finding of a verdict; that of the others is "case_departs"."""
-_DIGITS: Final = 6
+_FIGURES: Final = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,51 +54,47 @@ class QuantityResult:
     quantity: JudgedQuantity
     verdict: Verdict
     number: Found | None = None
-    comparison: Deviation | None = None
+    deviation: Deviation | None = None
 
     @classmethod
-    def of(cls, kind: Kind, quantity: JudgedQuantity, found: Found) -> Self:
-        """Judge what a case found."""
-        verdict, comparison = judge_quantity(
-            kind=kind, metric=quantity.metric, limit=quantity.limit, number=found
+    def of(cls, kind: Kind, quantity: JudgedQuantity, number: Found) -> Self:
+        """Judge a computed number by the quantity's criteria."""
+        verdict, deviation = judge_quantity(
+            kind=kind, metric=quantity.metric, limit=quantity.limit, number=number
         )
-        return cls(quantity=quantity, verdict=verdict, number=found, comparison=comparison)
-
-    @property
-    def reference(self) -> Reference | None:
-        """What the number is compared with, or beside which it is shown."""
-        return None if self.number is None else self.number.reference
+        return cls(quantity=quantity, verdict=verdict, number=number, deviation=deviation)
 
     @property
     def half_width(self) -> float | None:
-        """Of the comparison that decided the quantity: 2 u_val, and as far as assumed inputs move it.
+        """Half-width of the deviation that decided the quantity: 2 u_val, and the reach of assumed inputs.
 
         Zero where nothing uncertain entered; None where the case was not run.
         """
-        found, comparison = self.number, self.comparison
-        if found is None or comparison is None:
+        number, deviation = self.number, self.deviation
+        if number is None or deviation is None:
             return None
-        reach = max(map(abs, found.reach))
-        certain = found.numerical == 0 and found.input == 0
+        reach = max(map(abs, number.reach))
+        certain = number.numerical == 0 and number.input == 0
         judged_alone = self.quantity.metric not in NEEDS_REFERENCE
-        return reach if certain and judged_alone else comparison.half_width + reach
+        return reach if certain and judged_alone else deviation.half_width + reach
 
     def to_dict(self) -> Document:
         """The quantity as its case's JSON has it."""
-        found, reference = self.number, self.reference
+        number = self.number
+        reference = None if number is None else number.reference
         return {
             **vars(self.quantity),
-            "value": None if found is None else found.value,
+            "value": None if number is None else number.value,
             "reference": None if reference is None else reference.value,
             "uncertainty": self.half_width,
             "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
-            **_found(found),
+            **_uncertainties(number),
             "verdict": self.verdict.value,
         }
 
     def row(self) -> Quantity:
-        """The found number with its interval."""
-        quantity, document = self.quantity, _found(self.number)
+        """The computed number with its interval."""
+        quantity, document = self.quantity, _uncertainties(self.number)
         exact = not document["value_uncertainty"]
         return Quantity(
             key=quantity.name,
@@ -101,14 +103,14 @@ class QuantityResult:
             unit=quantity.unit,
             lower=None if exact else document["value_low"],
             upper=None if exact else document["value_high"],
-            digits=_DIGITS,
+            digits=_FIGURES,
         )
 
     def cells(self) -> tuple[str, ...]:
-        """Title, number, what it is compared with, half-width of the comparison, and verdict."""
-        quantity, unit = self.quantity, self.quantity.unit
+        """Title, number, reference or limit, half-width of the deviation, and verdict."""
+        quantity, unit, number = self.quantity, self.quantity.unit, self.number
         bound = {"at_most": "≤ ", "at_least": "≥ "}.get(quantity.metric)
-        reference = None if self.reference is None else self.reference.value
+        reference = None if number is None or number.reference is None else number.reference.value
         against = (
             format_given(reference, unit) if bound is None else bound + format_given(quantity.limit, unit)
         )
@@ -118,27 +120,25 @@ class QuantityResult:
 
 @dataclass(frozen=True, kw_only=True)
 class MutationResult:
-    """What became of a case with a defect built in on purpose."""
+    """Verdict on a case with a defect built in on purpose."""
 
-    id: str
-    what: str
-    expect: Verdict
+    mutation: Mutation
     verdict: Verdict
     status: str
     judged: bool
-    """False when the run broke down before anything was judged."""
+    """False if the run broke down before anything was judged."""
 
     @property
     def caught(self) -> bool:
-        """Whether the case was judged with this defect, and came out as it must."""
-        return self.judged and self.verdict is self.expect
+        """True if the case was judged with this defect, and came out as it must."""
+        return self.judged and self.verdict is self.mutation.expect
 
     def to_dict(self) -> Document:
         """The mutation as its case's JSON has it."""
         return {
-            "id": self.id,
-            "must_fail": self.what,
-            "expect": self.expect.value,
+            "id": self.mutation.id,
+            "must_fail": self.mutation.what,
+            "expect": self.mutation.expect.value,
             "verdict": self.verdict.value,
             "failed": self.caught,
             "status": self.status,
@@ -154,7 +154,7 @@ class CaseResult(Result):
     quantities: tuple[QuantityResult, ...]
     evidence: Evidence | None
     status: str
-    """How the run ended; why it did not take place."""
+    """End of the run, or the reason why it did not take place."""
     level: Level
     scene_name: str
     scene_sha256: str
@@ -165,7 +165,7 @@ class CaseResult(Result):
 
     @property
     def broken(self) -> bool:
-        """True when a mutation was run and not caught: the case proves nothing."""
+        """True if a mutation was run and not caught: the case proves nothing."""
         return any(not mutation.caught for mutation in self.mutations)
 
     @property
@@ -173,13 +173,31 @@ class CaseResult(Result):
         """All numbers that the case's text may ask for.
 
         For each quantity q: q, q_low and q_high (as far as assumed inputs move it), q_reference, q_error,
-        q_relative (error over reference), q_uncertainty (95 % half-width of the comparison), q_limit; and
+        q_relative (error over reference), q_uncertainty (95 % half-width of the deviation), q_limit; and
         the evidence's own.
         """
-        named: dict[str, float] = {}
+        numbers: dict[str, float] = {}
         for result in self.quantities:
-            named |= _named_numbers(result)
-        return named | dict(self.evidence.numbers if self.evidence else {})
+            name, number, deviation = result.quantity.name, result.number, result.deviation
+            if number is None or deviation is None:
+                continue
+            low, high = number.reach
+            numbers |= {
+                name: number.value,
+                f"{name}_low": number.value + low,
+                f"{name}_high": number.value + high,
+                f"{name}_error": deviation.error,
+                f"{name}_uncertainty": deviation.half_width,
+                f"{name}_limit": result.quantity.limit,
+            }
+            if number.corrected is not None:
+                numbers[f"{name}_corrected"] = number.corrected
+            if (reference := number.reference) is not None:
+                numbers[f"{name}_reference"] = reference.value
+                numbers[f"{name}_reference_uncertainty"] = COVERAGE_FACTOR * reference.uncertainty
+                if reference.value != 0:
+                    numbers[f"{name}_relative"] = deviation.error / reference.value
+        return numbers | dict(self.evidence.numbers if self.evidence else {})
 
     def filled(self, text: str) -> str:
         """A text of the case with its numbers put in; empty when it needs numbers and the case was not run.
@@ -198,8 +216,8 @@ class CaseResult(Result):
 
     def to_dict(self) -> Document:
         """The result and all that a report shows of it; SI units, or the unit named beside the number."""
-        definition = self.definition
-        return {
+        definition, evidence = self.definition, self.evidence
+        document = {
             **_part(definition, _AS_DEFINED),
             "verdict": self.verdict.value,
             "quantities": [quantity.to_dict() for quantity in self.quantities],
@@ -209,7 +227,7 @@ class CaseResult(Result):
             "doubts": [text for doubt in definition.reference.doubts if (text := self.filled(doubt))],
             "cause": CAUSES[definition.cause] if self.verdict in _DEPARTS else "",
             "judgement": self.filled(definition.judgement),
-            "rests_on": [vars(one) for one in self.assumptions],
+            "rests_on": [vars(assumption) for assumption in self.assumptions],
             "level": self.level,
             "status": self.status,
             "scene": self.scene_name,
@@ -220,8 +238,14 @@ class CaseResult(Result):
                 {k: v for k, v in vars(mutation).items() if k != "scene"} for mutation in definition.must_fail
             ],
             "broken": self.broken,
-            **_evidence(self.evidence),
         }
+        if evidence is None:
+            return document | {"numbers": {}, "series": [], "convergence": [], "tables": []}
+        document |= {name: plain(getattr(evidence, name)) for name in ("numbers", "series", "tables")}
+        for series in document["series"]:
+            series["y"] = [{k: v for k, v in curve.items() if v is not None} for curve in series["y"]]
+        studies = map(plain, evidence.convergence)
+        return document | {"convergence": [{"h": study.pop("size"), **study} for study in studies]}
 
     def rows(self) -> Rows:
         """Verdict, mutations, and every judged quantity beside what it is compared with."""
@@ -232,7 +256,11 @@ class CaseResult(Result):
         mutations = [
             Finding(
                 code="mutation_caught" if each.caught else "mutation_missed",
-                values={"what": each.what, "verdict": each.verdict.value, "expect": each.expect.value},
+                values={
+                    "what": each.mutation.what,
+                    "verdict": each.verdict.value,
+                    "expect": each.mutation.expect.value,
+                },
             )
             for each in self.mutations
         ]
@@ -248,38 +276,14 @@ class CaseResult(Result):
         )
 
 
-def _named_numbers(result: QuantityResult) -> dict[str, float]:
-    name, found, comparison = result.quantity.name, result.number, result.comparison
-    if found is None or comparison is None:
-        return {}
-    low, high = found.reach
-    named = {
-        name: found.value,
-        f"{name}_low": found.value + low,
-        f"{name}_high": found.value + high,
-        f"{name}_error": comparison.error,
-        f"{name}_uncertainty": comparison.half_width,
-        f"{name}_limit": result.quantity.limit,
-    }
-    if found.corrected is not None:
-        named[f"{name}_corrected"] = found.corrected
-    reference = result.reference
-    if reference is not None:
-        named[f"{name}_reference"] = reference.value
-        named[f"{name}_reference_uncertainty"] = COVERAGE_FACTOR * reference.uncertainty
-        if reference.value != 0:
-            named[f"{name}_relative"] = comparison.error / reference.value
-    return named
-
-
 def kind_text(definition: CaseDefinition) -> str:
-    """Such as "code verification", or "claim 12"."""
+    """Kind and number of a case for readers: "code verification", "claim 12"."""
     number = "" if definition.number is None else f" {definition.number}"
     return definition.kind.replace("_", " ") + number
 
 
 def definition_document(definition: CaseDefinition) -> Document:
-    """What a list of cases says of one of them."""
+    """A case as the list of all cases has it."""
     return _part(definition, _LISTED) | {"mutations": [mutation.id for mutation in definition.must_fail]}
 
 
@@ -287,51 +291,42 @@ def _part(definition: CaseDefinition, names: set[str]) -> Document:
     return {name: value for name, value in plain(definition).items() if name in names}
 
 
-def _found(found: Found | None) -> Document:
-    """Expanded uncertainties of a found number, and the standard ones of V&V 20 by their symbols there."""
-    if found is None:
+def _uncertainties(number: Found | None) -> Document:
+    """Expanded uncertainties of a number, and the standard ones of V&V 20 by their symbols there."""
+    if number is None:
         names = ("error", "value_uncertainty", "value_low", "value_high", "numerical_uncertainty")
         return dict.fromkeys((*names, "input_uncertainty", "corrected", "validation"))
-    (low, high), reference = found.reach, found.reference
-    error = None if reference is None else found.error
-    known = COVERAGE_FACTOR * math.hypot(found.numerical, found.input)
+    (low, high), reference = number.reach, number.reference
+    error = None if reference is None else number.error
+    half_width = COVERAGE_FACTOR * math.hypot(number.numerical, number.input)
     parts = {
-        "u_num": found.numerical,
+        "u_num": number.numerical,
         # An assumed input is equally likely anywhere within its reach.
-        "u_input": math.hypot(found.input, from_range(found.reach)),
+        "u_input": math.hypot(number.input, from_range(number.reach)),
         "u_D": 0.0 if reference is None else reference.uncertainty,
     }
     return {
         "error": error,
-        "value_uncertainty": known + max(-low, high),
-        "value_low": found.value + low - known,
-        "value_high": found.value + high + known,
-        "numerical_uncertainty": COVERAGE_FACTOR * found.numerical,
+        "value_uncertainty": half_width + max(-low, high),
+        "value_low": number.value + low - half_width,
+        "value_high": number.value + high + half_width,
+        "numerical_uncertainty": COVERAGE_FACTOR * number.numerical,
         "input_uncertainty": COVERAGE_FACTOR * parts["u_input"],
-        "corrected": found.corrected,
+        "corrected": number.corrected,
         "validation": {"E": error, **parts, "u_val": math.hypot(*parts.values())},
     }
 
 
-def _evidence(evidence: Evidence | None) -> Document:
-    if evidence is None:
-        return {"numbers": {}, "series": [], "convergence": [], "tables": []}
-    document = {name: plain(getattr(evidence, name)) for name in ("numbers", "series", "tables")}
-    for series in document["series"]:
-        series["y"] = [{k: v for k, v in curve.items() if v is not None} for curve in series["y"]]
-    studies = [{"h": (one := plain(study)).pop("size"), **one} for study in evidence.convergence]
-    return document | {"convergence": studies}
-
-
 def merge_saved(document: Sequence[Document], saved: Sequence[Mapping[str, Any]]) -> list[Document]:
     """The records, with the `saved` result on the same scene for each heavy case that was not run."""
-    earlier = {(case["id"], case["scene_sha256"]): dict(case) for case in saved}
-    return [_merged(case, earlier.get((case["id"], case["scene_sha256"]))) for case in document]
-
-
-def _merged(case: Document, earlier: Document | None) -> Document:
-    keep = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
-    if not keep or earlier is None or earlier["verdict"] == Verdict.NOT_RUN.value:
-        return case
-    status = f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"
-    return earlier | {"about": case["about"], "status": status}
+    earlier_results = {(case["id"], case["scene_sha256"]): dict(case) for case in saved}
+    merged = []
+    for case in document:
+        earlier = earlier_results.get((case["id"], case["scene_sha256"]))
+        waiting = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
+        if waiting and earlier is not None and earlier["verdict"] != Verdict.NOT_RUN.value:
+            status = f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"
+            merged.append(earlier | {"about": case["about"], "status": status})
+        else:
+            merged.append(case)
+    return merged

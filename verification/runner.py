@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
-from typing import Any, Literal
+from typing import Any
 
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.jobs import Job, answers_of
 from ringbalance.scene.platform.processes import beside
-from ringbalance.verification.assumptions import assumptions_of, overridden, widened
+from ringbalance.verification.assumptions import Assumption, assumptions_of, overridden, widened
 from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
 from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError
@@ -39,12 +39,12 @@ def run_case(case_id: str, *, scene: Scene, level: Level = "light", mutations: b
     """Run one case and judge it; one that cannot be run is `not run`, with the reason in its status.
 
     Args: `scene`: a case on the paper's own numbers takes the paper's disc instead. `level`: "light" leaves
-        heavy cases unrun. `mutations`: whether each is built in and judged as well.
+        heavy cases unrun. `mutations`: True to build in and judge each of them as well.
     Raises: KeyError: an unknown case.
     """
     definition, code = load_case(case_id), case_code(case_id)
-    given = scene_of(definition, scene)
-    return run_definition(definition, code, scene=given, level=level, mutations=mutations)
+    case_scene = scene_of(definition, scene)
+    return run_definition(definition, code, scene=case_scene, level=level, mutations=mutations)
 
 
 def run_definition(
@@ -55,53 +55,61 @@ def run_definition(
     level: Level = "light",
     mutations: bool = False,
 ) -> CaseResult:
-    """As `run_case`, of a case given by its text and its code, on the scene exactly as given."""
+    """Run a case by its text and its code, on exactly this scene; options as of `run_case`."""
     result = _judged(definition, code, None, scene=scene, level=level)
     if not mutations or result.verdict is Verdict.NOT_RUN:
         return result
-    affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
-    pairs = [(m, _judged(definition, code, m, scene=scene, level=level)) for m in affordable]
-    caught = tuple(
-        MutationResult(
-            id=mutation.id,
-            what=mutation.what,
-            expect=mutation.expect,
-            verdict=mutated.verdict,
-            status=mutated.status,
-            judged=mutated.evidence is not None,
-        )
-        for mutation, mutated in pairs
-    )
-    return dataclasses.replace(result, mutations=caught)
+    caught = []
+    for mutation in definition.must_fail:
+        if level == "heavy" or mutation.cost == "light":
+            mutated = _judged(definition, code, mutation, scene=scene, level=level)
+            caught.append(
+                MutationResult(
+                    mutation=mutation,
+                    verdict=mutated.verdict,
+                    status=mutated.status,
+                    judged=mutated.evidence is not None,
+                )
+            )
+    return dataclasses.replace(result, mutations=tuple(caught))
 
 
 def _judged(
-    definition: CaseDefinition, code: CaseCode, mutation: Mutation | None, *, scene: Scene, level: Level
+    definition: CaseDefinition, code: CaseCode, mutation: Mutation | None, *, scene: AnyScene, level: Level
 ) -> CaseResult:
     """One run, with one of the case's mutations where one is given."""
     start = time.perf_counter()
-    outcome = partial(_outcome, definition, scene=scene, level=level)
+
+    def without_evidence(status: str, verdict: Verdict = Verdict.NOT_RUN) -> CaseResult:
+        return CaseResult(
+            definition=definition,
+            verdict=verdict,
+            quantities=tuple(QuantityResult(quantity=q, verdict=verdict) for q in definition.quantity),
+            evidence=None,
+            status=status,
+            level=level,
+            scene_name=scene.name,
+            scene_sha256=scene.values_sha256,
+        )
+
     if definition.cost == "heavy" and level == "light":
-        return outcome(status="heavy: run with --level heavy")
+        return without_evidence("heavy: run with --level heavy")
     if definition.shape == "sector" and scene.mesh_digest:
-        return outcome(status=_ABOUT_A_SECTOR)
-    prescribed = {} if mutation is None else mutation.scene
-    built_in = None if mutation is None or prescribed else mutation.id
+        return without_evidence(_ABOUT_A_SECTOR)
     try:
-        mutated = _mutated(scene, prescribed)
-        evidence = code.compute(mutated, level, built_in)
-        rests = [one for one in definition.rests_on if one.path not in prescribed]
-        assumptions = assumptions_of(rests, mutated)
-        at = partial(_evidence_at, code, level, built_in, (mutated, evidence))
-        by_corners = [one for one in assumptions if not one.covered]
-        evidence = widened(evidence, mutated, by_corners, at=at)
-        quantities = _quantities(definition, evidence)
+        evidence, assumptions = _evidence(definition, code, mutation, scene, level)
+        judged, computed = {each.name for each in definition.quantity}, evidence.quantities
+        if set(computed) != judged:
+            raise ValueError(f"{definition.id}: judged are {sorted(judged)}, found {sorted(computed)}")
+        quantities = tuple(
+            QuantityResult.of(definition.kind, each, computed[each.name]) for each in definition.quantity
+        )
     except NotRunError as error:
-        return outcome(status=str(error))
+        return without_evidence(str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
         # A case that breaks down has not shown what it is there to show.
-        verdict = Verdict.INCONCLUSIVE if definition.kind in ("claim", "validation") else Verdict.FAILED
-        return outcome(status=f"{type(error).__name__}: {error}", verdict=verdict)
+        failed = Verdict.INCONCLUSIVE if definition.kind in ("claim", "validation") else Verdict.FAILED
+        return without_evidence(f"{type(error).__name__}: {error}", failed)
     verdict = combine(
         kind=definition.kind,
         verdicts=[result.verdict for result in quantities],
@@ -110,7 +118,7 @@ def _judged(
     if not evidence.status.ok and verdict not in (Verdict.FAILED, Verdict.REFUTED):
         verdict = Verdict.INCONCLUSIVE
     return dataclasses.replace(
-        outcome(status=evidence.status.text, verdict=verdict),
+        without_evidence(evidence.status.text, verdict),
         quantities=quantities,
         evidence=evidence,
         assumptions=assumptions,
@@ -118,62 +126,39 @@ def _judged(
     )
 
 
-def _mutated(scene: AnyScene, values: Mapping[str, float | Literal["absent"]]) -> Any:
-    """The scene with a mutation's values: as a file would give them, where a file may."""
-    if not values:
-        return scene
-    try:
-        return scene.with_values(
-            {path: None if value == "absent" else value for path, value in values.items()}
-        )
-    except SceneError:
-        return overridden(scene, values)
-
-
-def _evidence_at(
-    code: CaseCode, level: Level, defect: str | None, known: tuple[Any, Evidence], scene: Any
-) -> Evidence:
-    """What is judged on another scene, by the case's shorter way to it where it has one.
-
-    Args: `known`: a scene with its evidence.
-    """
+def _evidence(
+    definition: CaseDefinition, code: CaseCode, mutation: Mutation | None, scene: AnyScene, level: Level
+) -> tuple[Evidence, tuple[Assumption, ...]]:
+    """Evidence of a case with the reach of its assumed inputs, and these inputs."""
+    overrides = {} if mutation is None else mutation.scene
+    defect = None if mutation is None or overrides else mutation.id
+    mutated: Any = scene
+    if overrides:
+        try:
+            # As a file would give the values, where a file may.
+            mutated = scene.with_values({k: None if v == "absent" else v for k, v in overrides.items()})
+        except SceneError:
+            mutated = overridden(scene, overrides)
+    evidence = code.compute(mutated, level, defect)
+    needed = [each for each in definition.rests_on if each.path not in overrides]
+    assumptions = assumptions_of(needed, mutated)
     shorter: Callable[[Any], Evidence] | None = getattr(code, "ends", None)
-    try:
-        if shorter is not None and defect is None:
-            return shorter(scene)
-        return known[1] if scene == known[0] else code.compute(scene, level, defect)
-    except NotRunError as error:
-        raise ValueError(f"not at every value of an assumed input: {error}") from error
 
+    def evidence_at(varied: Any) -> Evidence:
+        """Evidence on another scene, by the case's shorter way to it where it has one."""
+        try:
+            if shorter is not None and defect is None:
+                return shorter(varied)
+            return evidence if varied == mutated else code.compute(varied, level, defect)
+        except NotRunError as error:
+            raise ValueError(f"not at every value of an assumed input: {error}") from error
 
-def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
-    """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
-    names = {quantity.name for quantity in definition.quantity}
-    if set(evidence.quantities) != names:
-        raise ValueError(f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.quantities)}")
-    return tuple(
-        QuantityResult.of(definition.kind, quantity, evidence.quantities[quantity.name])
-        for quantity in definition.quantity
-    )
-
-
-def _outcome(
-    definition: CaseDefinition, *, scene: Scene, level: Level, status: str, verdict: Verdict = Verdict.NOT_RUN
-) -> CaseResult:
-    return CaseResult(
-        definition=definition,
-        verdict=verdict,
-        quantities=tuple(QuantityResult(quantity=q, verdict=verdict) for q in definition.quantity),
-        evidence=None,
-        status=status,
-        level=level,
-        scene_name=scene.name,
-        scene_sha256=scene.values_sha256,
-    )
+    by_corners = [each for each in assumptions if not each.covered]
+    return widened(evidence, mutated, by_corners, at=evidence_at), assumptions
 
 
 def scene_of(definition: CaseDefinition, scene: Scene) -> Any:
-    """What a case is run on: the scene at hand, the paper's own disc or its rotor with eccentric masses."""
+    """Scene that a case is run on: the one at hand, the paper's disc or its rotor with eccentric masses."""
     if definition.paper == DRIVEN:
         return driven_scene()
     return paper_scene() if definition.judged_on == "paper" else scene
@@ -197,18 +182,18 @@ def run_cases(
     Raises: SceneError: a balancer without liquid.
     """
     scene = liquid_ring_scene(scene)
-    wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
+    ids = tuple(case_ids) or tuple(definition.id for definition in load_cases())
     results: dict[str, CaseResult] = {}
     reported = 0
     with beside(workers) as pool:
-        jobs = case_jobs(wanted, scene=scene, level=level, mutations=mutations, apart=pool is None)
-        for _, ended in answers_of(jobs, pool):
-            results |= {result.definition.id: result for result in ended}
-            while reported < len(wanted) and wanted[reported] in results:
+        jobs = case_jobs(ids, scene=scene, level=level, mutations=mutations, apart=pool is None)
+        for _, group in answers_of(jobs, pool):
+            results |= {result.definition.id: result for result in group}
+            while reported < len(ids) and ids[reported] in results:
                 if progress is not None:
-                    progress(results[wanted[reported]])
+                    progress(results[ids[reported]])
                 reported += 1
-    return tuple(results[case] for case in wanted)
+    return tuple(results[case] for case in ids)
 
 
 def case_jobs(
@@ -218,7 +203,7 @@ def case_jobs(
 
     First the one that takes longest when nothing is compiled yet: the eccentric masses' cases run one
     compiled strategy, which is compiled once where one process runs them all.
-    Args: `apart`: whether every case is a job of its own.
+    Args: `apart`: True to make every case a job of its own.
     """
     driven = () if apart else tuple(case for case in case_ids if load_case(case).paper == DRIVEN)
     groups = [driven] if driven else []

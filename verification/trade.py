@@ -1,7 +1,7 @@
 """Speed against accuracy, measured on a scene: a chamber's totals and the tube's flow, each by every model.
 
 Each model answers the same questions as the finest one; its error is the largest relative difference from
-that, beside what the finest one is itself known to.  The command `ringbalance trade` prints the study.
+that, to be compared with the uncertainty of the finest one.  `ringbalance trade` prints the study.
 """
 
 from __future__ import annotations
@@ -40,12 +40,11 @@ Record = dict[str, Any]
 Solve = Callable[[], tuple[FloatArray, ...]]
 """Values at the points of a study, one array a quantity."""
 
-_FILE: Final = "trade.json"
-_ENOUGH: Final = 0.2
-"""s of processor time, after which a solve is not repeated."""
-_REPEATS: Final = 5
-_FLOW_SHARES: Final = (0.2, 0.4, 0.5, 0.6, 0.8)
-"""Fills of the driven chamber, of max_fill_ratio."""
+_ENOUGH_CPU_S: Final = 0.2
+"""Processor time after which a solve is not repeated, s."""
+_MAX_REPEATS: Final = 5
+_FLOW_FILLS_OF_MAX: Final = (0.2, 0.4, 0.5, 0.6, 0.8)
+"""Fills of the driven chamber over max_fill_ratio."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -61,31 +60,36 @@ class TradeStudy(Result):
 
     scene: Scene
     quantities: tuple[Record, ...]
-    """Each by every model, the finest last: name and title, points, what the finest model is known to (95 %,
-    relative, without the inputs' part), status; of a model its values at the points, SI, and the largest
-    difference from the finest one, relative to that one's largest value."""
+    """Quantities by every model, the finest last: name and title, points, half-width of the finest model
+    (95 %, relative, without the inputs' part), status; of a model its values at the points, SI, and the
+    largest difference from the finest one, relative to that one's largest value."""
     times: Mapping[str, Sequence[Record]]
-    """Of each quantity's models: processor time of all points, s, the least of some tries, and how many
-    designs a second one processor answers."""
+    """Times of each quantity's models: processor time of all points, s, the least of some tries, and the
+    designs that one processor answers in a second."""
 
     def rows(self) -> Rows:
-        """Of each quantity the fastest model that is no worse than the finest is known, and all models."""
+        """Fastest model of each quantity with an error within the finest one's half-width, and all models."""
+        fastest = []
+        for quantity in self.quantities:
+            name, models = quantity["quantity"], quantity["models"]
+            good = {model["model"] for model in models if model["error"] <= quantity["uncertainty"]}
+            if not models:
+                continue
+            times = (each for each in self.times[name] if each["model"] in good)
+            best = min(times, key=itemgetter("seconds"))
+            fastest.append(
+                Quantity(
+                    key=f"{name}_designs_per_second",
+                    name=f"{quantity['title']}, by {best['model']}",
+                    value=best["designs_per_second"],
+                    unit="designs a second",
+                    digits=2,
+                )
+            )
         return Rows(
             title=f"Speed against accuracy of {self.scene.name} ({self.scene.source})",
-            quantities=tuple(map(self._fastest, filter(itemgetter("models"), self.quantities))),
+            quantities=tuple(fastest),
             tables=tuple(models_table(each, self.times) for each in self.quantities),
-        )
-
-    def _fastest(self, quantity: Record) -> Quantity:
-        name, models = quantity["quantity"], quantity["models"]
-        good = {model["model"] for model in models if model["error"] <= quantity["uncertainty"]}
-        best = min((each for each in self.times[name] if each["model"] in good), key=itemgetter("seconds"))
-        return Quantity(
-            key=f"{name}_designs_per_second",
-            name=f"{quantity['title']}, by {best['model']}",
-            value=best["designs_per_second"],
-            unit="designs a second",
-            digits=2,
         )
 
     def to_dict(self) -> Record:
@@ -144,31 +148,31 @@ def trade_study(
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     check_ring(scene)
-    scene, show = without_fitted(scene), progress or (lambda _: None)
-    show("chamber")
+    scene, report_progress = without_fitted(scene), progress or (lambda _: None)
+    report_progress("chamber")
     chamber, law = chamber_and_law(scene)
     fills = chamber_fills(scene)
     models = _chamber_models(scene, fills, meshes=level == "heavy") if fills.size else {}
     judged = chamber.fill_ratio >= fills.min(initial=1.0)
-    known = [
-        float(np.max(_shares(curve.uncertainty, curve.value), where=judged, initial=0.0))
+    half_widths = [
+        float(np.max(_relative(curve.uncertainty, curve.value), where=judged, initial=0.0))
         for curve in (chamber.wall_pressure, chamber.moment)
     ]
     measured = _measured(
         models,
         {"wall_pressure": "wall pressure, mean over a turn, Pa", "moment": "moment of a chamber, kg m"},
         fills,
-        known=known,
+        half_widths=half_widths,
         status=chamber_status(scene),
     )
-    show("velocity")
-    driven = scene.disc.max_fill_ratio * np.array(_FLOW_SHARES)
+    report_progress("velocity")
+    driven = scene.disc.max_fill_ratio * np.array(_FLOW_FILLS_OF_MAX)
     flow = law.evaluate(fill_ratio=driven, gas_pressure=scene.gas.pressure)
     measured += _measured(
         _flow_models(scene, driven),
         {"velocity": "velocity in the tube, m/s"},
         driven,
-        known=[float(np.max(_shares(flow.uncertainty, flow.velocity)))],
+        half_widths=[float(np.max(_relative(flow.uncertainty, flow.velocity)))],
         status=Status(),
     )
     quantities, times = zip(*measured, strict=True)
@@ -176,7 +180,7 @@ def trade_study(
     return TradeStudy(scene=scene, quantities=quantities, times=dict(zip(names, times, strict=True)))
 
 
-def _shares(width: FloatArray, value: FloatArray) -> FloatArray:
+def _relative(width: FloatArray, value: FloatArray) -> FloatArray:
     return np.asarray(width / np.where(value == 0, math.inf, np.abs(value)))
 
 
@@ -185,28 +189,32 @@ def _measured(
     titles: Mapping[str, str],
     fills: FloatArray,
     *,
-    known: Sequence[float],
+    half_widths: Sequence[float],
     status: Status,
 ) -> list[tuple[Record, list[Record]]]:
     """Every model solved and timed, the last one being the finest: each quantity, and its models' times.
 
     Args: `titles`: by quantity, in the order of the values of a solve.
     """
-    solved = {name: _timed(solve) for name, solve in models.items()}
-    times = [
-        {"model": name, "seconds": seconds, "designs_per_second": 1 / seconds}
-        for name, (_, seconds) in solved.items()
-    ]
+    solutions, times = {}, []
+    for model, solve in models.items():
+        cpu_times: list[float] = []
+        while not cpu_times or (sum(cpu_times) < _ENOUGH_CPU_S and len(cpu_times) < _MAX_REPEATS):
+            start = time.process_time()
+            solutions[model] = solve()
+            cpu_times.append(time.process_time() - start)
+        seconds = max(min(cpu_times), 1e-9)
+        times.append({"model": model, "seconds": seconds, "designs_per_second": 1 / seconds})
     measured = []
-    for place, (name, title) in enumerate(titles.items()):
-        values = {model: found[place] for model, (found, _) in solved.items()}
+    for index, (name, title) in enumerate(titles.items()):
+        values = {model: solution[index] for model, solution in solutions.items()}
         finest = values[next(reversed(values))] if values else np.zeros(0)
         scale = float(np.max(np.abs(finest), initial=0.0)) or 1.0
         record = {
             "quantity": name,
             "title": title,
             "points": [f"fill ratio {x:.3g}" for x in fills],
-            "uncertainty": known[place],
+            "uncertainty": half_widths[index],
             "status": {"code": str(status.code), "text": status.text},
             "models": [
                 {
@@ -219,16 +227,6 @@ def _measured(
         }
         measured.append((record, times))
     return measured
-
-
-def _timed(solve: Solve) -> tuple[tuple[FloatArray, ...], float]:
-    """Values and the least processor time, s."""
-    spent: list[float] = []
-    while not spent or (sum(spent) < _ENOUGH and len(spent) < _REPEATS):
-        start = time.process_time()
-        values = solve()
-        spent.append(time.process_time() - start)
-    return values, max(min(spent), 1e-9)
 
 
 def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[str, Solve]:
@@ -251,8 +249,8 @@ def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[st
     if geometry := scene.disc.geometry:
 
         def on_its_mesh() -> tuple[FloatArray, ...]:
-            found = ImportedElements.of(scene, geometry, fill_ratio=fills)
-            return found.wall_pressure.value, found.moment.value
+            totals = ImportedElements.of(scene, geometry, fill_ratio=fills)
+            return totals.wall_pressure.value, totals.moment.value
 
         models |= {"3-D finite elements on its mesh": on_its_mesh} if meshes else {}
     else:

@@ -1,4 +1,4 @@
-"""Dataclasses from TOML tables, checked against their annotations; all errors at once, each with its place.
+"""Dataclasses from TOML tables, checked against their annotations; all errors at once, each with its key.
 
 Understood: `str`, `float` (whole numbers too), `int`, `bool`, string enumerations, `Literal`, `X | Y`,
 `tuple[X, ...]`, `Mapping[str, X]`, further dataclasses, `Any`, and `Annotated[str, Pattern(...)]`.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -22,14 +22,14 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True)
 class Pattern:
-    """What a text must match as a whole, and that in words."""
+    """Regular expression that a text must match as a whole, and the same in words."""
 
     expression: str
     allowed: str
 
 
 class RecordError(Exception):
-    """What does not fit a record; `errors` has one line for each, with its place."""
+    """Values that do not fit a record; `errors` has one line for each, with its key."""
 
     def __init__(self, errors: list[str]) -> None:
         super().__init__("\n".join(errors))
@@ -39,8 +39,8 @@ class RecordError(Exception):
 def record_from(kind: type[Record], table: Mapping[str, Any]) -> Record:
     """A record of `kind` from a table.
 
-    Raises: RecordError: unknown, missing or unsuitable values, all of them; or, where each value fits, what
-        the record itself objects to (a ValueError of its `__post_init__`).
+    Raises: RecordError: unknown, missing or unsuitable values, all of them; or, where each value fits, the
+        objection of the record itself (a ValueError of its `__post_init__`).
     """
     errors: list[str] = []
     result = _record(kind, table, "", errors)
@@ -69,11 +69,11 @@ def _annotations(kind: type) -> Mapping[str, Any]:
     return MappingProxyType(get_type_hints(kind, include_extras=True))
 
 
-def _record(kind: type, table: Any, place: str, errors: list[str]) -> Any:
+def _record(kind: type, table: Any, path: str, errors: list[str]) -> Any:
     if not isinstance(table, Mapping):
-        errors.append(f"{place or 'case'}: a table is needed")
+        errors.append(f"{path or 'case'}: a table is needed")
         return None
-    inside = f"{place}." if place else ""
+    inside = f"{path}." if path else ""
     declared = {field.name: field for field in fields(kind)}
     before = len(errors)
     errors += [
@@ -93,53 +93,40 @@ def _record(kind: type, table: Any, place: str, errors: list[str]) -> Any:
     try:
         return kind(**values)
     except ValueError as error:
-        errors.append(f"{place or 'case'}: {error}")
+        errors.append(f"{path or 'case'}: {error}")
         return None
 
 
-def _value(annotation: Any, value: Any, place: str, errors: list[str]) -> Any:
+def _value(annotation: Any, value: Any, path: str, errors: list[str]) -> Any:
+    """The value as its annotation asks for it; None, and a line in `errors`, where it does not fit."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if is_dataclass(annotation):
-        return _record(annotation, value, place, errors)  # type: ignore[arg-type]
+        return _record(annotation, value, path, errors)  # type: ignore[arg-type]
     if origin is Annotated:
-        return _matching(arguments, value, place, errors)
+        value, pattern = _value(arguments[0], value, path, errors), arguments[1]
+        value = value.strip() if isinstance(value, str) else value
+        if isinstance(value, str) and not re.fullmatch(pattern.expression, value, re.DOTALL):
+            errors.append(f'{path}: "{value}"; allowed: {pattern.allowed}')
+        return value
     if origin in (Union, UnionType):
-        return _one_of(arguments, value, place, errors)
-    if origin is tuple and isinstance(value, list):
-        return tuple(_value(arguments[0], each, f"{place}.{i}", errors) for i, each in enumerate(value))
-    if origin is not None and issubclass(origin if isinstance(origin, type) else object, Mapping):
-        return _mapping(arguments[1], value, place, errors)
-    return _plain(annotation, value, place, errors)
-
-
-def _matching(arguments: tuple[Any, ...], value: Any, place: str, errors: list[str]) -> Any:
-    value = _value(arguments[0], value, place, errors)
-    pattern: Pattern = arguments[1]
-    value = value.strip() if isinstance(value, str) else value
-    if isinstance(value, str) and not re.fullmatch(pattern.expression, value, re.DOTALL):
-        errors.append(f'{place}: "{value}"; allowed: {pattern.allowed}')
-    return value
-
-
-def _one_of(choices: tuple[Any, ...], value: Any, place: str, errors: list[str]) -> Any:
-    """The first choice that fits; else the errors of the first."""
-    attempts: list[list[str]] = []
-    for choice in choices:
-        wrong: list[str] = []
-        result = _value(choice, value, place, wrong)
-        if not wrong:
-            return result
-        attempts.append(wrong)
-    errors += attempts[0]
-    return None
-
-
-def _mapping(inner: Any, value: Any, place: str, errors: list[str]) -> Any:
-    if not isinstance(value, Mapping):
-        errors.append(f"{place}: a table is needed")
+        # The first choice that fits; else the errors of the first.
+        attempts: list[list[str]] = []
+        for choice in arguments:
+            attempts.append([])
+            result = _value(choice, value, path, attempts[-1])
+            if not attempts[-1]:
+                return result
+        errors += attempts[0]
         return None
-    # A plain dictionary: results with their definitions come back from worker processes.
-    return {key: _value(inner, each, f"{place}.{key}", errors) for key, each in value.items()}
+    if origin is tuple and isinstance(value, list):
+        return tuple(_value(arguments[0], each, f"{path}.{i}", errors) for i, each in enumerate(value))
+    if origin is not None and issubclass(origin if isinstance(origin, type) else object, Mapping):
+        if not isinstance(value, Mapping):
+            errors.append(f"{path}: a table is needed")
+            return None
+        # A plain dictionary: results with their definitions come back from worker processes.
+        return {key: _value(arguments[1], each, f"{path}.{key}", errors) for key, each in value.items()}
+    return _plain_value(annotation, value, path, errors)
 
 
 _PLAIN: Mapping[Any, tuple[tuple[type, ...], str]] = MappingProxyType(
@@ -153,7 +140,7 @@ _PLAIN: Mapping[Any, tuple[tuple[type, ...], str]] = MappingProxyType(
 )
 
 
-def _plain(annotation: Any, value: Any, place: str, errors: list[str]) -> Any:
+def _plain_value(annotation: Any, value: Any, path: str, errors: list[str]) -> Any:
     if annotation is Any:
         return value
     choices: tuple[Any, ...] | None = get_args(annotation) if get_origin(annotation) is Literal else None
@@ -162,11 +149,10 @@ def _plain(annotation: Any, value: Any, place: str, errors: list[str]) -> Any:
     if choices is not None:
         result = next((each for each in choices if each == value), None)
         if result is None:
-            errors.append(f'{place}: "{value}"; allowed: {", ".join(str(each) for each in choices)}')
+            errors.append(f'{path}: "{value}"; allowed: {", ".join(str(each) for each in choices)}')
         return result
     types, needed = _PLAIN.get(annotation, ((tuple,), "a list"))
     if not isinstance(value, types) or (isinstance(value, bool) and annotation is not bool):
-        errors.append(f"{place}: {needed} is needed")
+        errors.append(f"{path}: {needed} is needed")
         return None
-    convert: Callable[[Any], Any] = float if annotation is float else lambda same: same
-    return convert(value)
+    return float(value) if annotation is float else value  # type: ignore[arg-type]

@@ -16,12 +16,11 @@ from ringbalance.verification.evidence import Deviation, Found, Reference
 Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
 Metric = Literal["validation", "within_uncertainty", "relative", "absolute", "at_most", "at_least"]
 Role = Literal["number", "idea", "reading"]
-"""What a quantity of a claim decides: a number of the paper's, the idea behind it, or one of several
-readings."""
+"""Subject of a claim's quantity: a number of the paper's, the idea behind it, or one of several readings."""
 
 
 class Verdict(StrEnum):
-    """What is said of a quantity or a case."""
+    """Verdict on a quantity or a case."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -57,17 +56,17 @@ def judge_quantity(*, kind: Kind, metric: Metric, limit: float, number: Found) -
     reference = Reference(value=limit) if bound else number.reference
     if reference is None:
         raise ValueError(f'metric "{metric}" needs a reference')
-    comparison = number.compared(reference)
+    deviation = number.compared(reference)
     if not number.conclusive:
-        return Verdict.INCONCLUSIVE, comparison
+        return Verdict.INCONCLUSIVE, deviation
     if bound:
-        verdict = _by_bound(kind, metric, number, comparison)
+        verdict = _by_bound(kind, metric, number, deviation)
     elif metric in ("relative", "absolute"):
         scale = abs(reference.value) if metric == "relative" else 1.0
-        verdict = _yes_or_no(kind, abs(comparison.error) <= limit * scale)
+        verdict = _yes_or_no(kind, abs(deviation.error) <= limit * scale)
     else:
-        verdict = _by_uncertainty(kind, limit, number, reference, comparison)
-    return verdict, comparison
+        verdict = _by_uncertainty(kind, limit, number, reference, deviation)
+    return verdict, deviation
 
 
 def _yes_or_no(kind: Kind, holds: bool) -> Verdict:
@@ -77,35 +76,35 @@ def _yes_or_no(kind: Kind, holds: bool) -> Verdict:
 
 
 def _by_uncertainty(
-    kind: Kind, limit: float, found: Found, reference: Reference, comparison: Deviation
+    kind: Kind, limit: float, number: Found, reference: Reference, deviation: Deviation
 ) -> Verdict:
     widest = limit * (abs(reference.value) or 1.0)
-    low, high = (comparison.error + reach for reach in found.reach)
-    if comparison.consistent:
-        decided = comparison.half_width <= widest and max(-low, high) <= widest
+    low, high = (deviation.error + reach for reach in number.reach)
+    if deviation.consistent:
+        decided = deviation.half_width <= widest and max(-low, high) <= widest
         return _yes_or_no(kind, True) if decided else Verdict.INCONCLUSIVE
-    if low <= comparison.half_width and high >= -comparison.half_width:
+    if low <= deviation.half_width and high >= -deviation.half_width:
         return Verdict.INCONCLUSIVE
-    if kind == "claim" and found.corrected is not None:
-        departure = abs(found.corrected - reference.value)
-        return Verdict.CORRECTED if departure <= comparison.half_width else Verdict.REFUTED
+    if kind == "claim" and number.corrected is not None:
+        departure = abs(number.corrected - reference.value)
+        return Verdict.CORRECTED if departure <= deviation.half_width else Verdict.REFUTED
     return _yes_or_no(kind, False)
 
 
-def _by_bound(kind: Kind, metric: Metric, found: Found, comparison: Deviation) -> Verdict:
-    """By the error against the limit; what is exact may lie on the limit."""
-    low, high = found.reach
-    uncertain = found.numerical > 0 or found.input > 0 or low < 0 or high > 0
-    half_width = comparison.half_width
+def _by_bound(kind: Kind, metric: Metric, number: Found, deviation: Deviation) -> Verdict:
+    """Verdict by the error against the limit; an exact number may lie on it."""
+    low, high = number.reach
+    uncertain = number.numerical > 0 or number.input > 0 or low < 0 or high > 0
+    half_width = deviation.half_width
     if (
         kind in ("claim", "validation")
         and uncertain
-        and low - half_width <= -comparison.error <= high + half_width
+        and low - half_width <= -deviation.error <= high + half_width
     ):
         return Verdict.INCONCLUSIVE
-    holds = comparison.error <= 0 if metric == "at_most" else comparison.error >= 0
-    if kind == "claim" and not holds and found.corrected is not None:
-        corrected = found.corrected - found.value + comparison.error
+    holds = deviation.error <= 0 if metric == "at_most" else deviation.error >= 0
+    if kind == "claim" and not holds and number.corrected is not None:
+        corrected = number.corrected - number.value + deviation.error
         explained = corrected <= half_width if metric == "at_most" else corrected >= -half_width
         return Verdict.CORRECTED if explained else Verdict.REFUTED
     return _yes_or_no(kind, holds)
@@ -120,9 +119,9 @@ def combine(*, kind: Kind, verdicts: Sequence[Verdict], roles: Sequence[Role] = 
     Raises: ValueError: a verdict that this kind of case does not know.
     """
     order = VOCABULARY[kind]
-    strange = [verdict for verdict in verdicts if verdict not in order]
-    if strange:
-        raise ValueError(f'a {kind} case knows no "{strange[0]}"')
+    unknown = [verdict for verdict in verdicts if verdict not in order]
+    if unknown:
+        raise ValueError(f'a {kind} case knows no "{unknown[0]}"')
     if not verdicts:
         return Verdict.NOT_RUN
     pairs = list(zip(verdicts, roles or ("number",) * len(verdicts), strict=True))

@@ -24,14 +24,14 @@ Point = Mapping[str, float]
 """Values by axis, in the axis' unit."""
 Changes = Mapping[str, Any]
 """By path, as `SceneFile.with_values` takes them."""
-_PERIODS: Final = 20
-"""Of the controller that a point's closed loop may take."""
-_GAS_TIME: Final = 0.2
-"""s, beyond those: a short period with long valve-open times is no reason for hundreds of operations."""
-_ON_SHAFT: Final = 0.5
-"""Of the axis "place", from which the gas pressure is one on the shaft."""
-_USUAL_SHARE: Final = 0.75
-"""Of the coordinates, drawn from where most discs are; else all but a few points would be refused."""
+_MAX_PERIODS: Final = 20
+"""Periods of the controller that a point's closed loop may take."""
+_GAS_TIME_S: Final = 0.2
+"""Time beyond those, s: a short period with long valve-open times is no reason for hundreds of operations."""
+_ON_SHAFT_FROM: Final = 0.5
+"""Value of the axis "place" from which the gas pressure is one on the shaft."""
+_USUAL_FRACTION: Final = 0.75
+"""Fraction of the coordinates in the usual range; else all but a few points would be refused."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class InputAxis:
     low: float
     high: float
     usual: tuple[float, float]
-    """Ends of the range where most discs are; the rest of the axis lies beyond it on one or both sides."""
+    """Ends of the usual range of discs; the rest of the axis lies beyond it on one or both sides."""
     spacing: Literal["log", "linear"] = "log"
 
     def share(self, value: float) -> float:
-        """How far along the axis a value in `unit` stands, within [0, 1]."""
+        """Fraction of the way along the axis at a value in `unit`, within [0, 1]."""
         if self.spacing == "linear":
             return (value - self.low) / (self.high - self.low)
         return math.log(value / self.low) / math.log(self.high / self.low)
@@ -85,32 +85,25 @@ AXES: Final = (
     # Without gravity there is a closed form to compare the half-widths with.
     InputAxis("gravity", "gravity over standard gravity", "1", 0.0, 2.0, usual=(0.0, 0.0), spacing="linear"),
 )
-"""What a designed set varies together."""
+"""Axes that a designed set varies together."""
 
 
 def scene_at(scene: Scene, point: Point) -> Scene:
     """The scene with some axes set, checked as a file is.
 
     What hangs on a value follows it: four chambers for any central angle, bends that the bore can take, a
-    tube that reaches over the crest; then a rotor that suits what the disc can balance.
+    tube that reaches over the crest; then a rotor that suits what the disc can balance: one that carries less
+    liquid is put on a lighter rotor, whose influence coefficient is larger, so that all liquid of a pair
+    makes the same vibration, and limit, gain and noise mean what they meant before.
     Raises: SceneError: no scene can have these values.
     """
-    period = point.get("period", scene.controller.period)
-    changes: dict[str, Any] = {"run.time_limit": _PERIODS * period + _GAS_TIME}
+    rotor, control = scene.rotor, scene.controller
+    period = point.get("period", control.period)
+    disc_changes: dict[str, Any] = {"run.time_limit": _MAX_PERIODS * period + _GAS_TIME_S}
     for name, value in point.items():
         if name in _CHANGES:
-            changes |= _CHANGES[name](scene, float(value), point)
-    disc = scene.with_values(changes)
-    return disc.with_values(_rotor_and_loop(scene, disc, point))
-
-
-def _rotor_and_loop(scene: Scene, disc: Scene, point: Point) -> Changes:
-    """A disc that carries less liquid is put on a lighter rotor.
-
-    Its influence coefficient grows so that all liquid of a pair makes the same vibration, and limit, gain and
-    noise mean what they meant before.
-    """
-    rotor, control = scene.rotor, scene.controller
+            disc_changes |= _CHANGES[name](scene, float(value), point)
+    disc = scene.with_values(disc_changes)
     lighter = _capacity(scene) / _capacity(disc)
     noise = point.get("noise", scene.sensor.amplitude_noise / control.limit)
     unbalance = point["unbalance"] * _capacity(scene) if "unbalance" in point else rotor.initial_amplitude
@@ -121,9 +114,9 @@ def _rotor_and_loop(scene: Scene, disc: Scene, point: Point) -> Changes:
         "sensor.amplitude_noise": noise * control.limit,
     }
     if "assumed_influence_coefficient" in document_of(scene).get("controller", {}):
-        believed = lighter * control.assumed_influence_coefficient
-        changes["controller.assumed_influence_coefficient"] = believed
-    return changes
+        assumed = lighter * control.assumed_influence_coefficient
+        changes["controller.assumed_influence_coefficient"] = assumed
+    return disc.with_values(changes)
 
 
 def _capacity(scene: Scene) -> float:
@@ -143,8 +136,8 @@ def _plate(scene: Scene, value: float, point: Point) -> Changes:
 
 def _viscosity(scene: Scene, value: float, _: Point) -> Changes:
     liquid = scene.liquid
-    given = {"density": liquid.density, "vapour_pressure": liquid.vapour_pressure}
-    return {"liquid": given | {"kinematic_viscosity": value}}
+    properties = {"density": liquid.density, "vapour_pressure": liquid.vapour_pressure}
+    return {"liquid": properties | {"kinematic_viscosity": value}}
 
 
 def _bore(scene: Scene, value: float, _: Point) -> Changes:
@@ -180,30 +173,25 @@ _CHANGES: Final[Mapping[str, Callable[[Scene, float, Point], Changes]]] = Mappin
         "bore": _bore,
         "roughness": _roughness,
         "pressure": _pressure,
-        "place": lambda _, value, __: {"gas.measured_at": "chamber" if value < _ON_SHAFT else "shaft"},
+        "place": lambda _, value, __: {"gas.measured_at": "chamber" if value < _ON_SHAFT_FROM else "shaft"},
         "period": lambda _, value, __: {"controller.period": value},
         "tolerance": lambda _, value, __: {"accuracy.tolerance": f"{100 * value!r} %"},
         "gravity": lambda _, value, __: {"environment.gravity": 9.80665 * value},
     }
 )
-"""Changed keys of the axes that hang on no other part of the scene; the rest is set by `_rotor_and_loop`."""
+"""Changed keys of the axes that hang on no other part of the scene; `scene_at` sets the rest."""
 
 
 def designed_set(*, count: int, seed: int) -> tuple[Point, ...]:
     """Points spread evenly over all axes at once; a longer set begins with a shorter one.
 
+    On each axis most values lie in the usual range.
     Source: Sobol's sequence, scrambled after Owen, as in scipy.stats.qmc.
     """
     columns = sobol(2 * len(AXES), count, seed=seed).T
-    values = {
-        axis.name: _drawn(axis, share, kind)
-        for axis, share, kind in zip(AXES, columns[: len(AXES)], columns[len(AXES) :], strict=True)
-    }
+    values = {}
+    for axis, share, kind in zip(AXES, columns[: len(AXES)], columns[len(AXES) :], strict=True):
+        low, high = (axis.share(end) for end in axis.usual)
+        shares: list[float] = np.where(kind < _USUAL_FRACTION, low + share * (high - low), share).tolist()
+        values[axis.name] = [float(axis.at(each)) for each in shares]
     return tuple(dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True))
-
-
-def _drawn(axis: InputAxis, share: FloatArray, kind: FloatArray) -> list[float]:
-    """Values that lie in the usual range as often as `_USUAL_SHARE` says."""
-    low, high = (axis.share(end) for end in axis.usual)
-    places: list[float] = np.where(kind < _USUAL_SHARE, low + share * (high - low), share).tolist()
-    return [float(axis.at(place)) for place in places]

@@ -27,16 +27,14 @@ ROUND_OFF: Final = 1e-12
 WIDE: Final = 1.0
 """Half-width over value from which on an answer is no more than an order of magnitude."""
 
-_SOUND_SPEED: Final = 1480.0
-"""m/s, in water at 20 degC."""
-_BULK_MODULUS: Final = 2.2e9
-"""Pa, of the same."""
-_PLAIN_LIQUID: Final = (0.33, 0.05)
-"""Of the speed of sound and of the bulk modulus, beyond which no answer may stand without a reservation."""
+_MAX_PLAIN_VELOCITY: Final = 0.33 * 1480.0
+"""A third of the speed of sound in water at 20 degC, m/s; beyond, no answer stands without a reservation."""
+_MAX_PLAIN_PRESSURE: Final = 0.05 * 2.2e9
+"""A twentieth of the bulk modulus of water at 20 degC, Pa; likewise."""
 
 
 class Ending(StrEnum):
-    """How a point ended."""
+    """Outcome of a point."""
 
     SOLVED = "solved"
     WIDE = "solved, with a wide half-width"
@@ -47,13 +45,13 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class PointJudgement:
-    """What became of one point."""
+    """Outcome of one point, and what was wrong with it."""
 
     ending: Ending
     text: str
     """The program's own message, or its reservation; empty where there is none."""
     violations: tuple[str, ...] = ()
-    """What should have held and did not."""
+    """Violated invariants, in words."""
     residual: float = 0.0
     """Largest relative residual of its linear solves."""
     worst_ratio: float = -1.0
@@ -63,12 +61,12 @@ class PointJudgement:
 
     @property
     def answered(self) -> bool:
-        """Whether the point got an answer, with or without a reservation."""
+        """True if the point got an answer, with or without a reservation."""
         return self.ending not in (Ending.REFUSED, Ending.BROKEN)
 
     @classmethod
     def of_record(cls, record: dict[str, Any]) -> Self:
-        """From plain data, as `judged` gives it and a file keeps it."""
+        """Read plain data that `judged` gave and a file stores."""
         ending, violations = Ending(record["ending"]), tuple(record["violations"])
         return cls(**record | {"ending": ending, "violations": violations})
 
@@ -86,19 +84,34 @@ def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float
         calibration = calibrate(varied)
         run = simulate(varied, calibration.model)
     except SceneError as error:
+        # A refusal has to name what is wrong and what would be accepted.
+        unclear = [
+            f"a refusal that names no key: {fault}"
+            for fault in error.faults
+            if not (fault.key and fault.problem)
+        ]
         # By its name alone: the path of the file is nothing of the scene's.
         text = str(error).replace(scene.file, scene.source)
-        return asdict(PointJudgement(ending=Ending.REFUSED, text=text, violations=tuple(_unclear(error))))
+        return asdict(PointJudgement(ending=Ending.REFUSED, text=text, violations=tuple(unclear)))
     except Exception as error:
         # Whatever it is: finding it is what this is for.
         text = f"{type(error).__name__}: {error}"
         return asdict(PointJudgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",)))
-    ratio, status = _worst_ratio(calibration, width_factor), calibration.chamber.status
+    chamber, k = calibration.chamber, calibration.tube.k
+    ratio = _worst_ratio(calibration, width_factor)
     violations = (*_calibration_faults(calibration, ratio), *_loop_faults(varied, run, leak))
+    lever_width = float(chamber.moment_per_mass.uncertainty) / float(chamber.moment_per_mass.value)
+    k_width = float(np.median(k.uncertainty / (np.abs(k.value) + 1)))
+    if violations:
+        ending = Ending.BROKEN
+    elif not chamber.status.ok:
+        ending = Ending.STATUS
+    else:
+        ending = Ending.WIDE if max(lever_width, k_width) > WIDE else Ending.SOLVED
     return asdict(
         PointJudgement(
-            ending=Ending.BROKEN if violations else _ending(calibration),
-            text="" if status.ok else status.text,
+            ending=ending,
+            text="" if chamber.status.ok else chamber.status.text,
             violations=violations,
             residual=float(calibration.statistics["relative_residual"]),
             worst_ratio=ratio,
@@ -107,25 +120,11 @@ def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float
     )
 
 
-def _unclear(error: SceneError) -> Iterator[str]:
-    """A refusal has to name what is wrong and what would be accepted."""
-    for fault in error.faults:
-        if not (fault.key and fault.problem):
-            yield f"a refusal that names no key: {fault}"
-
-
-def _ending(calibration: Calibration) -> Ending:
-    if not calibration.chamber.status.ok:
-        return Ending.STATUS
-    chamber = calibration.chamber
-    width = float(chamber.moment_per_mass.uncertainty) / float(chamber.moment_per_mass.value)
-    k, uncertainty_95 = calibration.tube.k.value, calibration.tube.k.uncertainty
-    tube = float(np.median(uncertainty_95 / (np.abs(k) + 1)))
-    return Ending.WIDE if max(width, tube) > WIDE else Ending.SOLVED
-
-
 def _worst_ratio(calibration: Calibration, width_factor: float) -> float:
-    """Of the finite elements against the concentric closed form, which is exact where gravity is left out."""
+    """Largest |error| over half-width of the finite elements; -1 where gravity is modelled.
+
+    Errors are against the concentric closed form, which is exact without gravity.
+    """
     chamber, scene = calibration.chamber, calibration.scene
     if chamber.check.gravity:
         return -1.0
@@ -146,7 +145,7 @@ def _worst_ratio(calibration: Calibration, width_factor: float) -> float:
 
 
 def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]:
-    """Finite, monotone where physics is, half-widths that hold."""
+    """Violations by numbers that are not finite or not monotone where physics is, or exceed half-widths."""
     try:
         json.dumps(calibration_document(calibration), allow_nan=False)
     except ValueError:
@@ -171,16 +170,16 @@ def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]
 
 
 def _absurd(calibration: Calibration) -> Iterator[str]:
-    """Velocities and pressures at which the liquid is nothing like one of a single density."""
+    """Violations by velocities and pressures at which the liquid is nothing like one of a single density."""
     if not calibration.chamber.status.ok:
         return
     law, gas = calibration.flow_law, calibration.scene.gas.pressure
     fills = np.linspace(0.0, law.max_fill_ratio, 9)
     fastest = np.abs(law.evaluate(fill_ratio=fills, gas_pressure=gas, primed=True).velocity).max()
-    if fastest > _PLAIN_LIQUID[0] * _SOUND_SPEED:
+    if fastest > _MAX_PLAIN_VELOCITY:
         yield f"{fastest:.3g} m/s in the tube without a reservation"
     highest = calibration.chamber.wall_pressure.value.max()
-    if highest > _PLAIN_LIQUID[1] * _BULK_MODULUS:
+    if highest > _MAX_PLAIN_PRESSURE:
         yield f"{highest / 1e6:.3g} MPa on the wall without a reservation"
 
 
@@ -203,7 +202,7 @@ def _law_faults(calibration: Calibration) -> Iterator[str]:
 
 
 def _loop_faults(scene: Scene, run: Simulation, leak: float) -> Iterator[str]:
-    """Ends with a text, conserves the liquid, keeps fills within bounds."""
+    """Violations by a run without a closing text, with lost liquid or with fills out of bounds."""
     try:
         json.dumps(simulation_document(run), allow_nan=False)
     except ValueError:

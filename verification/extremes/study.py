@@ -30,27 +30,23 @@ from ringbalance.verification.extremes.axes import AXES, InputAxis, Point, desig
 from ringbalance.verification.extremes.point import Ending, PointJudgement, judged
 
 Progress = Callable[[str, int, int], None]
-"""Called with what is being done, the points done of it and their number."""
+"""Called with the name of the present work, the points done of it and their number."""
 Record = dict[str, Any]
 
-_FILE: Final = "extremes.json"
-_STORE: Final = "store"
-"""Folder of kept judgements in that of a study."""
 _SEED: Final = 1
-_MOST_SHOWN: Final = 20
-"""Violations reported in full."""
+_MAX_VIOLATIONS: Final = 20
 
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How much is looked at."""
+    """Extent of a study."""
 
     points: int
-    """Of the designed set."""
+    """Points of the designed set."""
     sweep: int
-    """Values on each axis to begin with."""
+    """First values on each axis."""
     fineness: float
-    """Share of an axis within which the place is found where points begin to end in another way."""
+    """Fraction of an axis within which a change of the ending is located."""
 
 
 SIZES: Final[Mapping[Level, Size]] = {
@@ -75,48 +71,50 @@ class AxisSweep:
 
     @property
     def points(self) -> list[Point]:
-        """Of each judgement."""
+        """Point of each judgement."""
         return [{self.axis.name: value} for value in self.values]
 
     def middles(self, fineness: float) -> list[float]:
         """Fractions half-way between neighbours that end differently, further apart than that."""
-        places, ends = self.shares.tolist(), list(map(_outcome, self.judgements))
+        shares, ends = self.shares.tolist(), list(map(_outcome, self.judgements))
         return [
-            (places[i] + places[i + 1]) / 2
+            (shares[i] + shares[i + 1]) / 2
             for i in range(len(ends) - 1)
-            if ends[i] != ends[i + 1] and places[i + 1] - places[i] > fineness
+            if ends[i] != ends[i + 1] and shares[i + 1] - shares[i] > fineness
         ]
 
     def with_more(self, shares: Sequence[float], judgements: Sequence[PointJudgement]) -> AxisSweep:
-        """The sweep with further places."""
-        places, found = np.append(self.shares, shares), (*self.judgements, *judgements)
-        order = np.argsort(places)
-        return AxisSweep(axis=self.axis, shares=places[order], judgements=tuple(found[i] for i in order))
+        """The sweep with further values."""
+        all_shares, everything = np.append(self.shares, shares), (*self.judgements, *judgements)
+        order = np.argsort(all_shares)
+        return AxisSweep(
+            axis=self.axis, shares=all_shares[order], judgements=tuple(everything[i] for i in order)
+        )
 
     def spans(self) -> list[Record]:
         """The stretches along which points end alike, from one end of the axis to the other.
 
-        Each with its first and last value in the axis' unit, how its points and their loops end, and what the
-        program says there, at the end towards the nearest answer.
+        Each with its first and last value in the axis' unit, the endings of its points and loops, and the
+        program's message at the end towards the nearest answer.
         """
         values, spans = self.values, []
         for _, group in groupby(range(len(values)), key=lambda i: _outcome(self.judgements[i])):
             start, *rest = group
             last = rest[-1] if rest else start
-            said = self.judgements[last if start == 0 else start]
+            message = self.judgements[last if start == 0 else start]
             spans.append(
                 {
                     "low": values[start],
                     "high": values[last],
-                    "ending": str(said.ending),
-                    "loop": said.loop,
-                    "text": said.text,
+                    "ending": str(message.ending),
+                    "loop": message.loop,
+                    "text": message.text,
                 }
             )
         return spans
 
     def to_dict(self) -> Record:
-        """The axis with all its judgements, and what the program says past either end of its answers."""
+        """The axis with all its judgements, and the program's messages past either end of its answers."""
         axis, values = self.axis, self.values
         answered = [value for value, each in zip(values, self.judgements, strict=True) if each.answered]
         beyond = (each.text for each in self.judgements if not each.answered)
@@ -167,6 +165,12 @@ class Extremes(Result):
         """Numbers of points by how they and their loops ended, the worst of them, and every axis."""
         everything = self.everything
         endings = Counter(each.ending for each in everything)
+        points = (*self.points, *(point for sweep in self.sweeps for point in sweep.points))
+        violations = [
+            {"point": dict(point), "violations": list(each.violations)}
+            for point, each in zip(points, everything, strict=True)
+            if each.violations
+        ]
         return {
             "points": len(self.points),
             "judged": len(everything),
@@ -174,17 +178,9 @@ class Extremes(Result):
             "loop_endings": dict(Counter(each.loop for each in everything if each.loop)),
             "worst_residual": max((each.residual for each in everything), default=0.0),
             "worst_error_over_half_width": max((each.worst_ratio for each in everything), default=-1.0),
-            "violations": self._violations(),
+            "violations": violations[:_MAX_VIOLATIONS],
             "axes": [sweep.to_dict() for sweep in self.sweeps],
         }
-
-    def _violations(self) -> list[Record]:
-        points = (*self.points, *(point for sweep in self.sweeps for point in sweep.points))
-        return [
-            {"point": dict(point), "violations": list(each.violations)}
-            for point, each in zip(points, self.everything, strict=True)
-            if each.violations
-        ][:_MOST_SHOWN]
 
     def axes_table(self) -> dict[str, list[Any]]:
         """The stretches of all axes as columns."""
@@ -197,7 +193,7 @@ class Extremes(Result):
         }
 
     def rows(self) -> Rows:
-        """How the points ended, and where along each axis."""
+        """Endings of the points, and their stretches along each axis."""
         document = self.to_dict()
         worst = document["worst_error_over_half_width"]
         quantities = (
@@ -237,25 +233,23 @@ class Extremes(Result):
 
 def axis_rows(columns: Record) -> list[Cells]:
     """The stretches of every axis: its title (at its first), stretch, answer, loop and message."""
-    before = ["", *columns["axis"]]
-    return [
-        (
-            "" if title == before[index] else title,
-            _stretch(columns["from"][index], columns["to"][index], columns["unit"][index]),
-            str(columns["ending"][index]).removesuffix(" with a message"),
-            str(columns["loop"][index]).replace("_", " "),
-            # The first line of a message, without the name of a file that nobody has.
-            str(columns["said"][index]).split("\n")[0].split(".toml: ", 1)[-1],
+    rows, before = [], ""
+    names = ("axis", "from", "to", "unit", "ending", "loop", "said")
+    for title, low, high, unit, ending, loop, message in zip(*(columns[name] for name in names), strict=True):
+        first, last = (number(float(end), digits=3) for end in (low, high))
+        stretch = first if first == last else f"{first} to {last}"
+        rows.append(
+            (
+                "" if title == before else title,
+                stretch if unit == "1" else f"{stretch} {unit.replace('^2', '²')}",
+                str(ending).removesuffix(" with a message"),
+                str(loop).replace("_", " "),
+                # The first line of a message, without the name of a file that nobody has.
+                str(message).split("\n")[0].split(".toml: ", 1)[-1],
+            )
         )
-        for index, title in enumerate(columns["axis"])
-    ]
-
-
-def _stretch(low: float, high: float, unit: str) -> str:
-    """First and last value, or the one where both are the same."""
-    first, last = (number(float(end), digits=3) for end in (low, high))
-    ends = first if first == last else f"{first} to {last}"
-    return ends if unit == "1" else f"{ends} {unit.replace('^2', '²')}"
+        before = title
+    return rows
 
 
 def find_extremes(
@@ -267,9 +261,11 @@ def find_extremes(
     folder: Path | None = None,
     mutation: Mapping[str, float] | None = None,
 ) -> Extremes:
-    """Look at a scene's extremes, with the same result for any number of workers.
+    """Study a scene's extremes, with the same result for any number of workers.
 
-    Args: `folder`: folder from which an interrupted study resumes. `mutation`: see `judged`.
+    Every axis is looked at in even steps, then halved wherever neighbours end differently: of changes back
+    and forth within a step some may be missed.
+    Args: `folder`: stores judgements, so that an interrupted study resumes. `mutation`: see `judged`.
     Raises: SceneError: its chamber is imported.
     Raises: OSError: the folder cannot be written.
     """
@@ -290,35 +286,22 @@ def find_extremes(
         return [PointJudgement.of_record(record) for record in records]
 
     points = designed_set(count=size.points, seed=_SEED)
-    return Extremes(
-        points=points,
-        judgements=tuple(judge_all("designed set", points)),
-        sweeps=_sweeps(partial(judge_all, "axes"), size),
-    )
-
-
-def _sweeps(
-    judge: Callable[[Sequence[Point]], Sequence[PointJudgement]], size: Size
-) -> tuple[AxisSweep, ...]:
-    """Every axis alone, in even steps, then halved wherever neighbours end differently.
-
-    Of changes back and forth within a step some may be missed.
-    """
+    judgements = judge_all("designed set", points)
     sweeps = [AxisSweep(axis=axis, shares=np.zeros(0), judgements=()) for axis in AXES]
-    places = [np.linspace(0, 1, size.sweep).tolist() for _ in AXES]
-    while any(places):
-        points = [
+    shares = [np.linspace(0, 1, size.sweep).tolist() for _ in AXES]
+    while any(shares):
+        on_axes = [
             {axis.name: float(axis.at(share))}
-            for axis, shares in zip(AXES, places, strict=True)
-            for share in shares
+            for axis, axis_shares in zip(AXES, shares, strict=True)
+            for share in axis_shares
         ]
-        found = iter(judge(points))
+        new = iter(judge_all("axes", on_axes))
         sweeps = [
-            sweep.with_more(shares, [next(found) for _ in shares])
-            for sweep, shares in zip(sweeps, places, strict=True)
+            sweep.with_more(axis_shares, [next(new) for _ in axis_shares])
+            for sweep, axis_shares in zip(sweeps, shares, strict=True)
         ]
-        places = [sweep.middles(size.fineness) for sweep in sweeps]
-    return tuple(sweeps)
+        shares = [sweep.middles(size.fineness) for sweep in sweeps]
+    return Extremes(points=points, judgements=tuple(judgements), sweeps=tuple(sweeps))
 
 
 def check_sector(scene: Scene) -> None:

@@ -1,4 +1,4 @@
-"""Closed-loop runs as section 6 of the liquid-ring paper has them: its own law, an exact sensor."""
+"""Closed-loop runs after section 6 of the liquid-ring paper: its own law, an exact sensor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -24,24 +23,22 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import CaseTable, Curve, Found, Series, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
-"""Of the initial vibration, the four cases of Fig. 6."""
+"""Phases of the initial vibration, the four cases of Fig. 6, rad."""
 AMPLITUDES: Final = (2e-6, 4e-6, 6e-6, 8e-6, 10e-6)
-"""Of the initial vibration, the five cases of Fig. 8, m."""
-LARGEST: Final = 10e-6
+"""Amplitudes of the initial vibration, the five cases of Fig. 8, m."""
 GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""
 PERIODS: Final = (0.25, 0.5, 1.0)
 """Between operations, s: the paper gives none; the middle one is judged and the others bound it."""
 _STEPS: Final = ("first_trial", "long_step", "short_step")
-_POINTS: Final = 400
-"""Of a curve."""
+_CURVE_POINTS: Final = 400
 
 
 def loop_scene(
     scene: Scene,
     *,
     kind: ControllerKind,
-    amplitude: float = LARGEST,
+    amplitude: float = AMPLITUDES[-1],
     phase: float = PHASES[0],
     **settings: Any,
 ) -> Scene:
@@ -94,7 +91,7 @@ def runs_with(
     scene: Scene,
     *,
     kind: ControllerKind = "target_vector",
-    amplitudes: Sequence[float] = (LARGEST,),
+    amplitudes: Sequence[float] = AMPLITUDES[-1:],
     phases: Sequence[float] = PHASES[:1],
     periods: Sequence[float] = PERIODS,
     **settings: Any,
@@ -135,21 +132,6 @@ def worst(runs: Sequence[Simulation]) -> float:
     return float(max(run.misadjustments for run in runs))
 
 
-def _most_overshoots(runs: Sequence[Simulation]) -> float:
-    return float(max(run.overshoots for run in runs))
-
-
-_SHOWN: Final[Mapping[str, Callable[[Sequence[Simulation]], float | str]]] = MappingProxyType(
-    {
-        "settled after": settled_after,
-        "misadjustments": worst,
-        "overshoots": _most_overshoots,
-        "most in one run": _most_overshoots,
-        "runs that overshoot": overshooting,
-    }
-)
-
-
 def runs_table(
     name: str,
     settings: Mapping[str, Sequence[float | str]],
@@ -158,14 +140,25 @@ def runs_table(
     shown: Sequence[str] = ("settled after", "misadjustments"),
     units: Mapping[str, str],
 ) -> CaseTable:
-    """What became of groups of runs, each at one value of every setting: the worst of a group."""
-    columns = {what: [_SHOWN[what](runs) for runs in groups] for what in shown}
+    """Worst outcomes of groups of runs, each group at one value of every setting."""
+
+    def most_overshoots(runs: Sequence[Simulation]) -> float:
+        return float(max(run.overshoots for run in runs))
+
+    outcomes: Mapping[str, Callable[[Sequence[Simulation]], float | str]] = {
+        "settled after": settled_after,
+        "misadjustments": worst,
+        "overshoots": most_overshoots,
+        "most in one run": most_overshoots,
+        "runs that overshoot": overshooting,
+    }
+    columns = {title: [outcomes[title](runs) for runs in groups] for title in shown}
     times = {"settled after": "s"} if "settled after" in shown else {}
     return CaseTable(name=name, columns={**settings, **columns}, units={**units, **times})
 
 
 def over_period(numbers: Sequence[float]) -> Found:
-    """A number found with each of `PERIODS`: the middle one's, which the others move."""
+    """A number at the middle one of `PERIODS`, which those at the others move."""
     value = float(numbers[1])
     return Found(value=value).moved(min(numbers) - value, max(numbers) - value)
 
@@ -173,6 +166,6 @@ def over_period(numbers: Sequence[float]) -> Found:
 def amplitude_series(name: str, runs: dict[str, Simulation]) -> Series:
     """Amplitude against time of several runs, by the name of their curve, on one time axis."""
     longest = max(float(run.time[-1]) for run in runs.values())
-    time = np.linspace(0.0, longest, _POINTS)
+    time = np.linspace(0.0, longest, _CURVE_POINTS)
     curves = tuple(Curve(label, "m", np.interp(time, run.time, run.amplitude)) for label, run in runs.items())
     return figure(name, ("time", "s", time), *curves)

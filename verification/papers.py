@@ -47,7 +47,7 @@ DEPARTURE_HIGH: Final = printed(0.229, last_digit=0.001)
 """Under Fig. 4, at HIGH_PRESSURE."""
 LOW_PRESSURE: Final = 0.7e6
 HIGH_PRESSURE: Final = 1.5e6
-"""Of Fig. 4, Pa."""
+"""Gas pressures of Fig. 4, Pa."""
 DENSITY: Final = 1000.0
 """Table 1, kg/m^3."""
 LAMBDA_TOLERANCE: Final = 0.007
@@ -85,8 +85,7 @@ def fig_7_readings() -> tuple[Scene, Scene]:
 
 RPM: Final = 2 * math.pi / 60
 DRIVEN_SCENE: Final = "eccentric_mass_paper"
-_DRAWN: Final = 240
-"""Points of a curve."""
+_CURVE_POINTS: Final = 240
 
 
 @lru_cache(maxsize=1)
@@ -98,13 +97,13 @@ def driven_scene() -> EccentricScene:
 def thinned(values: npt.ArrayLike) -> FloatArray:
     """Evenly chosen values along the last axis, at most 240, the first and last among them."""
     array = np.asarray(values, dtype=np.float64)
-    return np.asarray(array[..., _places(array.shape[-1])], dtype=np.float64)
+    return np.asarray(array[..., _curve_indices(array.shape[-1])], dtype=np.float64)
 
 
 def envelope(values: npt.ArrayLike) -> FloatArray:
     """Largest value in each of so many stretches, so that a thinned curve keeps its peaks."""
     array = np.asarray(values, dtype=np.float64)
-    return np.asarray(np.maximum.reduceat(array, _places(array.size)), dtype=np.float64)
+    return np.asarray(np.maximum.reduceat(array, _curve_indices(array.size)), dtype=np.float64)
 
 
 def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> float:
@@ -116,8 +115,8 @@ def convergence_time(time: FloatArray, error: FloatArray, *, limit: float) -> fl
     return math.inf if last == time.size - 1 else float(time[last + 1])
 
 
-def _places(size: int) -> IntArray:
-    return np.unique(np.linspace(0, size - 1, _DRAWN).round().astype(np.int64))
+def _curve_indices(size: int) -> IntArray:
+    return np.unique(np.linspace(0, size - 1, _CURVE_POINTS).round().astype(np.int64))
 
 
 def changed(scene: EccentricScene, values: Mapping[str, Any]) -> EccentricScene:
@@ -144,6 +143,6 @@ def at_constant_speed(
     scene: EccentricScene, *, time_limit: float, speed: float | None = None
 ) -> EccentricScene:
     """The scene at one speed. Args: `speed`: rad/s; default the first of the scene's profile."""
-    kept = scene.rotor.speed_profile[0].speed if speed is None else speed
-    level = changed(scene, {"rotor.speed_profile": (SpeedPoint(time=0.0, speed=kept),)})
-    return changed(level, {"run.time_limit": time_limit})
+    speed = scene.rotor.speed_profile[0].speed if speed is None else speed
+    constant = changed(scene, {"rotor.speed_profile": (SpeedPoint(time=0.0, speed=speed),)})
+    return changed(constant, {"run.time_limit": time_limit})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ringbalance.verification.cases.finite_elements import _error_ratios, _how_fared
+from ringbalance.verification.cases.finite_elements import _error_ratios, _fared
 
 
 @pytest.mark.parametrize(
@@ -18,13 +18,13 @@ from ringbalance.verification.cases.finite_elements import _error_ratios, _how_f
     ],
 )
 def test_shares_and_medians(ratios: list[float], expected: tuple[float, ...]) -> None:
-    assert _how_fared(np.array(ratios)) == pytest.approx(expected)
+    assert _fared(np.array(ratios)) == pytest.approx(expected)
 
 
 def test_a_dozen_random_discs() -> None:
     ratios = _error_ratios(12, 1)
     assert np.array_equal(ratios, _error_ratios.__wrapped__(12, 1), equal_nan=True)
     for column in ratios.T:
-        fared = _how_fared(column)
+        fared = _fared(column)
         assert fared.share >= 0.9
         assert fared.tightness > 0.02

@@ -48,7 +48,7 @@ from ringbalance.verification.loops import (
 )
 from ringbalance.verification.papers import fig_7_readings
 
-_ABOUT: Final = printed(40.0, last_digit=10.0)
+_PRINTED_SETTLING_TIME: Final = printed(40.0, last_digit=10.0)
 """The paper's settling time of the trial algorithm, s."""
 _STEPS: Final = {
     "light": ((0.02, 0.05), (0.1, 0.2), (0.003, 0.005), (0.25, 1.0)),
@@ -56,7 +56,7 @@ _STEPS: Final = {
 }
 """First trial, long step, short step and period, s: each from barely visible to barely below the limit."""
 _STEP_NAMES: Final = ("first trial", "long step", "short step", "period")
-_BOUND: Final = 5.0
+_PRINTED_BOUND_S: Final = 5.0
 _TRIAL: Final[Mapping[str, Any]] = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
 """Steps with which the trial algorithm settles at every phase, s."""
 
@@ -84,7 +84,9 @@ def trial_algorithm(scene: Scene, level: Level, defect: str | None = None) -> Ev
         raise ValueError("no set of steps settles at all four phases")
     fastest, latest = float(settled.min()), float(settled.max())
     counts = [run.misadjustments for runs in sets for run in runs if run.settled]
-    own = slowest_within(scene, [run_loop(loop_scene(scene, kind="trial", phase=phase)) for phase in PHASES])
+    settling_time = slowest_within(
+        scene, [run_loop(loop_scene(scene, kind="trial", phase=phase)) for phase in PHASES]
+    )
     names = [f"phase {math.degrees(phase):.0f} degrees" for phase in PHASES]
     shown = dict(zip(names, sets[len(sets) // 2], strict=True))
     table = runs_table(
@@ -95,7 +97,9 @@ def trial_algorithm(scene: Scene, level: Level, defect: str | None = None) -> Ev
     )
     return Evidence(
         quantities=as_found(
-            settling_time=Found(value=own, reference=_ABOUT).moved(fastest - own, latest - own),
+            settling_time=Found(value=settling_time, reference=_PRINTED_SETTLING_TIME).moved(
+                fastest - settling_time, latest - settling_time
+            ),
             phases_settled=max(sum(run.settled for run in runs) for runs in sets),
             misadjustments=min(counts),
         ),
@@ -116,13 +120,13 @@ def trial_algorithm(scene: Scene, level: Level, defect: str | None = None) -> Ev
 
 def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The target-vector algorithm over amplitudes and periods."""
-    given = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
-    runs = {period: runs_with(given, amplitudes=AMPLITUDES, periods=(period,)) for period in PERIODS}
+    aimed = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
+    runs = {period: runs_with(aimed, amplitudes=AMPLITUDES, periods=(period,)) for period in PERIODS}
     slowest = [slowest_within(scene, group) for group in runs.values()]
     rises = list(map(worst, runs.values()))
     _, bare = fig_7_readings()
     # No longer than it takes to see whether the bound is met.
-    brief = dataclasses.replace(bare, run=dataclasses.replace(bare.run, time_limit=2 * _BOUND))
+    brief = dataclasses.replace(bare, run=dataclasses.replace(bare.run, time_limit=2 * _PRINTED_BOUND_S))
     calibrated = [
         run_loop(loop_scene(brief, kind="target_vector", amplitude=amplitude, period=0.5), "calibrated")
         for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
@@ -144,7 +148,7 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
             "slowest": slowest[2],
             "rises_slow": rises[2],
             "bore": bare.tube.bore,
-            "calibrated_settled": sum(settling(run) <= _BOUND for run in calibrated),
+            "calibrated_settled": sum(settling(run) <= _PRINTED_BOUND_S for run in calibrated),
             "calibrated_overshoots": sum(run.overshoots for run in calibrated),
         },
         series=(amplitude_series("amplitude over time, a period of 0.5 s", shown),),
@@ -153,10 +157,23 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
 
 
 def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Both algorithms side by side at four phases and several periods."""
+    """Target-vector against trial algorithm at four phases and several periods."""
     aimed = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
-    runs = {period: _at_all_phases(aimed, scene, period) for period in PERIODS}
-    judged = [_compared(scene, *pair) for pair in runs.values()]
+    runs = {}
+    judged: dict[str, list[float]] = {"speed_ratio": [], "largest_rise": [], "misadjustments": []}
+    for period in PERIODS:
+        cases: dict[str, Any] = {"phases": PHASES, "periods": (period,)}
+        target, trial = runs[period] = (
+            runs_with(aimed, **cases),
+            runs_with(scene, kind="trial", **cases, **_TRIAL),
+        )
+        ratios = (
+            slowest_within(scene, [slow]) / slowest_within(scene, [fast])
+            for slow, fast in zip(trial, target, strict=True)
+        )
+        judged["speed_ratio"].append(min(ratios))
+        judged["largest_rise"].append(max(map(_largest_rise, target)))
+        judged["misadjustments"].append(sum(run.misadjustments for run in target))
     periods, phases = zip(*itertools.product(PERIODS, PHASES), strict=True)
     targets, trials = ([[run] for both in runs.values() for run in both[i]] for i in (0, 1))
     table = CaseTable(
@@ -173,7 +190,7 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     first_phase = {name: runs[PERIODS[1]][i][0] for i, name in enumerate(("target vector", "trial"))}
     return Evidence(
-        quantities={name: over_period([one[name] for one in judged]) for name in judged[0]},
+        quantities={name: over_period(numbers) for name, numbers in judged.items()},
         numbers={
             "periods": len(PERIODS),
             "trial_misadjustments": min(map(worst, trials)),
@@ -183,40 +200,23 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _at_all_phases(aimed: Scene, scene: Scene, period: float) -> tuple[list[Simulation], list[Simulation]]:
-    """Runs under the target-vector and under the trial algorithm."""
-    each: dict[str, Any] = {"phases": PHASES, "periods": (period,)}
-    return runs_with(aimed, **each), runs_with(scene, kind="trial", **each, **_TRIAL)
-
-
-def _compared(scene: Scene, target: list[Simulation], trial: list[Simulation]) -> dict[str, float]:
-    return {
-        "speed_ratio": min(
-            slowest_within(scene, [slow]) / slowest_within(scene, [fast])
-            for slow, fast in zip(trial, target, strict=True)
-        ),
-        "largest_rise": max(map(_largest_rise, target)),
-        "misadjustments": sum(run.misadjustments for run in target),
-    }
-
-
 def _largest_rise(run: Simulation) -> float:
-    """From one amplitude that the controller saw to the next, m."""
+    """Largest rise from one amplitude that the controller measured to the next, m."""
     seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
     return float(np.max(np.diff(seen), initial=-np.inf)) if len(seen) > 1 else 0.0
 
 
-_SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
+_SEARCHED_GAINS: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
 _ONSET: Final = (0.12e6, 0.16e6)
 _PRINTED_ONSET: Final = Reference(value=sum(_ONSET) / 2, uncertainty=from_range(_ONSET))
 """Between the last printed Kp without and the first one with an overshoot, s/m."""
-_RAISED: Final = GAINS[:3]
-_INTEGRAL: Final = 48.0
-"""The paper's 0.8 min, s."""
-_SMALL: Final = 1.2
-_INTEGRALS: Final = (None, _INTEGRAL, 6.0, _SMALL, 0.3)
-_DERIVATIVES: Final = (0.0, 0.06, 0.6, 6.0)
-"""None, the paper's 0.001 min, ten and a hundred times that, s."""
+_RAISED_GAINS: Final = GAINS[:3]
+_PRINTED_INTEGRAL_TIME_S: Final = 48.0
+"""The paper's 0.8 min."""
+_SMALL_INTEGRAL_TIME_S: Final = 1.2
+_INTEGRAL_TIMES_S: Final = (None, _PRINTED_INTEGRAL_TIME_S, 6.0, _SMALL_INTEGRAL_TIME_S, 0.3)
+_DERIVATIVE_TIMES_S: Final = (0.0, 0.06, 0.6, 6.0)
+"""None, the paper's 0.001 min, ten and a hundred times that."""
 
 
 def proportional_gain_ends(scene: Scene) -> Evidence:
@@ -230,10 +230,21 @@ def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> 
     _, bare = fig_7_readings()
     rate, calibrated = _rate(scene, paper_model(scene)), _rate(bare, BalancerModel.of(flow_law_of(bare)))
     onset = _onset(scene)
+    # The vibration along a chamber's own axis, so that a single valve answers for the overshoot.
+    phase = -scene.rotor.lag_angle
+    run = run_loop(
+        loop_scene(scene, kind="target_vector", proportional=GAINS[-1], integral_time=None, phase=phase)
+    )
+    measured = [sample.measurement for sample in run.samples if sample.measurement is not None]
+    turn = abs(math.remainder(measured[1].phase - measured[0].phase, 2 * math.pi))
     # With an integral part a larger gain may overshoot less, so they are tried one after the other.
     with_integral = next(
-        (gain for gain in _SEARCHED if _run(scene, gain, scene.controller.integral_time).overshoots > 0),
-        _SEARCHED[-1],
+        (
+            gain
+            for gain in _SEARCHED_GAINS
+            if _run(scene, gain, scene.controller.integral_time).overshoots > 0
+        ),
+        _SEARCHED_GAINS[-1],
     )
     table = runs_table(
         "target-vector algorithm, proportional part alone, 10 micrometres at 90 degrees",
@@ -246,7 +257,7 @@ def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> 
     return Evidence(
         quantities={
             "onset": Found(value=onset, reference=_PRINTED_ONSET),
-            "overshoot_turn": _turn(scene).against(math.pi),
+            "overshoot_turn": Found(value=turn, numerical=1e-9).against(math.pi),
         },
         numbers={
             "rate_um": rate * 1e6,
@@ -267,12 +278,12 @@ def _run(scene: Scene, gain: float, integral_time: float | None = None) -> Simul
 
 
 def _onset(scene: Scene) -> float:
-    """Smallest searched Kp at which the residual turns round; the largest searched one where none does.
+    """Smallest searched Kp at which the residual turns round, or the largest one without any, s/m.
 
     A larger gain never overshoots less, so halving finds what trying one after the other would.
     """
-    first = bisect_left(_SEARCHED, True, key=lambda gain: _run(scene, gain).overshoots > 0)
-    return float(_SEARCHED[min(first, len(_SEARCHED) - 1)])
+    first = bisect_left(_SEARCHED_GAINS, True, key=lambda gain: _run(scene, gain).overshoots > 0)
+    return float(_SEARCHED_GAINS[min(first, len(_SEARCHED_GAINS) - 1)])
 
 
 def _rate(scene: Scene, model: BalancerModel) -> float:
@@ -287,23 +298,12 @@ def _rate(scene: Scene, model: BalancerModel) -> float:
     return scene.rotor.influence_coefficient * per_fill * fills_per_second
 
 
-def _turn(scene: Scene) -> Found:
-    """The vibration along a chamber's own axis, so that a single valve answers for the overshoot."""
-    phase = -scene.rotor.lag_angle
-    run = run_loop(
-        loop_scene(scene, kind="target_vector", proportional=GAINS[-1], integral_time=None, phase=phase)
-    )
-    seen = [sample.measurement for sample in run.samples if sample.measurement is not None]
-    turn = abs(math.remainder(seen[1].phase - seen[0].phase, 2 * math.pi))
-    return Found(value=turn, numerical=1e-9)
-
-
 def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Settling time of the target-vector algorithm over Kp."""
     # The phase of the start makes no difference to this law.
     groups = (runs_with(scene, proportional=gain, integral_time=None, derivative_time=0.0) for gain in GAINS)
     times = np.array([[slowest_within(scene, [run]) for run in group] for group in groups])
-    raised = times[: len(_RAISED)]
+    raised = times[: len(_RAISED_GAINS)]
     periods = [f"period {period:g} s" for period in PERIODS]
     table = CaseTable(
         name="settling time, proportional part alone, 10 micrometres at 90 degrees",
@@ -318,30 +318,33 @@ def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
 
 
 def integral_time_ends(scene: Scene) -> Evidence:
-    """Without the integral times that are shown alone."""
-    small, paper = (overshooting(_integrating(scene, time)) for time in (_SMALL, _INTEGRAL))
+    """Overshoots at the two integral times that are judged."""
+    small, paper = (
+        overshooting(_integrating(scene, time)) for time in (_SMALL_INTEGRAL_TIME_S, _PRINTED_INTEGRAL_TIME_S)
+    )
     return Evidence(quantities=as_found(fraction_small=small, fraction_set=paper))
 
 
 def integral_time(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Overshoots of the target-vector algorithm over the integral time."""
-    small = None if defect == "integral_left_out" else _SMALL
-    runs = {time: _integrating(scene, time) for time in _INTEGRALS}
+    small = None if defect == "integral_left_out" else _SMALL_INTEGRAL_TIME_S
+    runs = {time: _integrating(scene, time) for time in _INTEGRAL_TIMES_S}
     table = runs_table(
         "overshoots over the integral time, Kp = 0.08 s/um",
-        {"integral time": ["none" if time is None else time for time in _INTEGRALS]},
+        {"integral time": ["none" if time is None else time for time in _INTEGRAL_TIMES_S]},
         list(runs.values()),
         shown=("runs that overshoot", "most in one run"),
         units={"integral time": "s"},
     )
     return Evidence(
         quantities=as_found(
-            fraction_small=overshooting(runs[small]), fraction_set=overshooting(runs[_INTEGRAL])
+            fraction_small=overshooting(runs[small]),
+            fraction_set=overshooting(runs[_PRINTED_INTEGRAL_TIME_S]),
         ),
         numbers={
-            "runs": len(runs[_INTEGRAL]),
+            "runs": len(runs[_PRINTED_INTEGRAL_TIME_S]),
             "periods": len(PERIODS),
-            "most": max(run.overshoots for run in runs[_INTEGRALS[-1]]),
+            "most": max(run.overshoots for run in runs[_INTEGRAL_TIMES_S[-1]]),
         },
         tables=(table,),
     )
@@ -364,18 +367,18 @@ def derivative_time(scene: Scene, level: Level, defect: str | None = None) -> Ev
             scene,
             amplitudes=AMPLITUDES,
             proportional=GAINS[1],
-            integral_time=_INTEGRAL,
+            integral_time=_PRINTED_INTEGRAL_TIME_S,
             derivative_time=time,
         )
-        for time in _DERIVATIVES
+        for time in _DERIVATIVE_TIMES_S
     ]
-    without, own, tenfold, hundredfold = fractions = list(map(overshooting, groups))
+    without, printed_time, tenfold, hundredfold = fractions = list(map(overshooting, groups))
     longest = [slowest_within(scene, group) for group in groups]
     last = tenfold if defect == "hundredfold_left_out" else hundredfold
     table = CaseTable(
         name="overshoots over the derivative time, Kp = 0.08 s/um",
         columns={
-            "derivative time": _DERIVATIVES,
+            "derivative time": _DERIVATIVE_TIMES_S,
             "runs that overshoot": fractions,
             "longest settling time": longest,
         },
@@ -386,7 +389,7 @@ def derivative_time(scene: Scene, level: Level, defect: str | None = None) -> Ev
         numbers={
             "runs": len(groups[0]),
             "without": without,
-            "own": own,
+            "own": printed_time,
             "tenfold": tenfold,
             "hundredfold": hundredfold,
             "slower": longest[-1] / longest[0],

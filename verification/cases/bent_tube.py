@@ -33,8 +33,8 @@ LEG_IN, HUMP, LEG_OUT = 3.0, 6.0, 12.0
 _MESHES: Final = ((2, 2, 1.0), (2, 3, 1.5), (3, 4, 2.1))
 """Cells around and across, and along over those of the coarsest; coarse to fine."""
 _FORMAL_ORDER: Final = 4.0
-_DEVELOPED: Final = (5.0, 1.0)
-"""Where flow has developed again: from and to, bores before the outlet."""
+_DEVELOPED_BORES: Final = (5.0, 1.0)
+"""Ends of the stretch of developed flow, bores before the outlet."""
 
 
 def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
@@ -59,87 +59,48 @@ def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
     )
 
 
-def _say(text: str) -> None:
-    print(f"bent_tube_3d: {text}", file=sys.stderr, flush=True)
-
-
-def _rotation(scene: Scene) -> float:
-    return rotation_reynolds_number(
-        angular_velocity=scene.rotor.speed,
-        bore=scene.tube.bore,
-        kinematic_viscosity=VISCOSITY,
-    )
-
-
-def _solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float = 1.0) -> BentTubeFlow:
-    """The flow on a mesh of cells around, cells across and refinement along the path.
-
-    Raises: ArithmeticError: Newton's method failed.
-    """
-    around, across, along = mesh
+def _solve(
+    scene: Scene, mesh: tuple[int, int, float], rotation: float, coriolis_factor: float
+) -> BentTubeFlow:
+    """The flow on one of `_MESHES`. Raises: ArithmeticError: Newton's method failed."""
+    around, across, refinement = mesh
     flow = BentTubeFlow.of(
-        segments=path_over_crest(scene, along),
+        segments=path_over_crest(scene, refinement),
         cells=SectionMesh(around=around, across=across, wall_ratio=3.0),
         reynolds=REYNOLDS,
-        rotation_reynolds=_rotation(scene),
+        rotation_reynolds=rotation,
         coriolis_factor=coriolis_factor,
         # With less rotation the start is further from the flow.
         first_inertia=1.0 if coriolis_factor == 1.0 else 0.5,
-        progress=_say,
+        progress=lambda text: print(f"bent_tube_3d: {text}", file=sys.stderr, flush=True),
     )
     if not flow.solution.status.ok:
         raise ArithmeticError(flow.solution.status.text)
     return flow
 
 
-def _terms(scene: Scene, length: float) -> dict[str, float]:
-    """Friction, rotation and bends of the tube law, and what the bends' curvature does to the rotation."""
-    bore, bend = scene.tube.bore, scene.tube.bends[0]
-    tube = dataclasses.replace(scene.tube, length=length * bore, bends=(bend, bend), drag_coefficient=None)
-    liquid = dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY)
-    same = dataclasses.replace(scene, tube=tube, liquid=liquid, uncertainty=())
-    loss = tube_loss(same, [REYNOLDS * VISCOSITY / bore])
-    arcs = 2 * 64 / REYNOLDS * bend.angle * bend.radius / bore
-    shift = bend_shift(
-        reynolds=REYNOLDS,
-        rotation_reynolds=_rotation(scene),
-        angle=bend.angle,
-        radius=bend.radius / bore,
-        with_rotation=False,
-    )
-    bends = float(loss.terms["bends"][0]) - arcs
-    half_width = float(loss.uncertainty_parts["bends"][0])
-    return {
-        "friction": float(loss.terms["friction"][0]) + arcs,
-        "rotation": loss.terms["rotation"][0],
-        "bends": bends,
-        "bends_half_width": half_width,
-        "shift": 2 * shift,
-    }
-
-
-def _straight(flow: BentTubeFlow, scene: Scene) -> float:
-    """Gradient where flow has developed again, over that of the table."""
-    end = float(flow.arc_length[-1])
-    first, last = (end - distance for distance in _DEVELOPED)
-    gradient = REYNOLDS / 2 * flow.pressure_loss(start=first, end=last) / (last - first)
-    table = rotating_friction_ratio(reynolds=REYNOLDS, rotation_reynolds=_rotation(scene))
-    return gradient / (32 * float(table.value))
-
-
 def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
+    rotation = rotation_reynolds_number(
+        angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY
+    )
     losses: list[float] = []
     for mesh in _MESHES if defect is None else _MESHES[1:2]:
-        # Only the last flow is kept whole; each holds hundreds of megabytes.
-        flow = _solve(scene, mesh=mesh, coriolis_factor=1.0 if defect is None else 0.5)
+        # The flow of the mesh before is given up; each holds hundreds of megabytes.
+        flow = _solve(scene, mesh, rotation, 1.0 if defect is None else 0.5)
         losses.append(flow.pressure_loss(start=0.0, end=float(flow.arc_length[-1])))
-    s, found = flow.arc_length, losses[-1]
+    s, k = flow.arc_length, losses[-1]
+    end = float(s[-1])
     half_width, convergence = (0.0, ()) if defect is not None else _converged(scene, losses)
-    terms = _terms(scene, float(s[-1]))
+    terms = _law_terms(scene, end, rotation)
     plain = terms["friction"] + terms["rotation"]
     with_bends, explained = plain + terms["bends"], plain + terms["shift"]
-    loss = np.array([flow.pressure_loss(start=0.0, end=float(end)) for end in s])
+    # Gradient where flow has developed again, over that of the table.
+    first, last = (end - distance for distance in _DEVELOPED_BORES)
+    gradient = REYNOLDS / 2 * flow.pressure_loss(start=first, end=last) / (last - first)
+    ratio = rotating_friction_ratio(reynolds=REYNOLDS, rotation_reynolds=rotation)
+    straight = gradient / (32 * float(ratio.value))
+    loss = np.array([flow.pressure_loss(start=0.0, end=float(station)) for station in s])
     shown = figure(
         "loss along the path beyond that of the straight turning tube",
         ("arc length over bore", "1", s),
@@ -149,55 +110,78 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
         "friction of the whole length": terms["friction"],
         "rotation": terms["rotation"],
         "bends beyond the friction of their arcs, by the tube law": terms["bends"],
-        "bends in three dimensions": found - plain,
+        "bends in three dimensions": k - plain,
         "bends as curvature added to rotation": terms["shift"],
     }
+    table = CaseTable(
+        name="what the loss coefficient of the bent tube is made of",
+        columns={"term": list(rows), "K": list(rows.values())},
+    )
     return Evidence(
         quantities={
-            "straight": Found(value=_straight(flow, scene)).against(1.0),
-            "explained": Found(value=found / explained, numerical=half_width / explained / 2).against(1.0),
-            "convergence": Found(value=half_width / found),
+            "straight": Found(value=straight).against(1.0),
+            "explained": Found(value=k / explained, numerical=half_width / explained / 2).against(1.0),
+            "convergence": Found(value=half_width / k),
         },
         numbers={
             **terms,
-            "k": found,
+            "k": k,
             "unknowns": flow.solution.statistics.unknowns,
-            "rotation_reynolds": _rotation(scene),
+            "rotation_reynolds": rotation,
             "reynolds": REYNOLDS,
-            "bends_found": found - plain,
+            "bends_found": k - plain,
             "sum": with_bends,
-            "sum_gap": found / with_bends - 1,
-            "explained_gap": found / explained - 1,
+            "sum_gap": k / with_bends - 1,
+            "explained_gap": k / explained - 1,
             "half_width": half_width,
         },
         convergence=convergence,
         series=(shown,),
-        tables=(
-            CaseTable(
-                name="what the loss coefficient of the bent tube is made of",
-                columns={"term": list(rows), "K": list(rows.values())},
-            ),
-        ),
+        tables=(table,),
     )
 
 
+def _law_terms(scene: Scene, length: float, rotation: float) -> dict[str, float]:
+    """Friction, rotation and bends of the tube law, and the bends' effect by their curvature on rotation."""
+    bore, bend = scene.tube.bore, scene.tube.bends[0]
+    tube = dataclasses.replace(scene.tube, length=length * bore, bends=(bend, bend), drag_coefficient=None)
+    liquid = dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY)
+    same = dataclasses.replace(scene, tube=tube, liquid=liquid, uncertainty=())
+    loss = tube_loss(same, [REYNOLDS * VISCOSITY / bore])
+    arcs = 2 * 64 / REYNOLDS * bend.angle * bend.radius / bore
+    shift = bend_shift(
+        reynolds=REYNOLDS,
+        rotation_reynolds=rotation,
+        angle=bend.angle,
+        radius=bend.radius / bore,
+        with_rotation=False,
+    )
+    return {
+        "friction": float(loss.terms["friction"][0]) + arcs,
+        "rotation": loss.terms["rotation"][0],
+        "bends": float(loss.terms["bends"][0]) - arcs,
+        "bends_half_width": float(loss.uncertainty_parts["bends"][0]),
+        "shift": 2 * shift,
+    }
+
+
 def _converged(scene: Scene, losses: list[float]) -> tuple[float, tuple[Convergence, ...]]:
-    """Expanded uncertainty (95 %) of the finest loss, and how the losses came to it."""
+    """Expanded uncertainty (95 %) of the finest loss, and the convergence of the losses."""
     counts = [
-        (2 * around**2 + 4 * around * across) * sum(part.cells for part in path_over_crest(scene, along))
-        for around, across, along in _MESHES
+        (2 * around**2 + 4 * around * across) * sum(part.cells for part in path_over_crest(scene, refinement))
+        for around, across, refinement in _MESHES
     ]
     sizes = [float((counts[0] / count) ** (1 / 3)) for count in counts]
-    found = gci(values=losses[::-1], sizes=sizes[::-1], formal_order=_FORMAL_ORDER, round_off=1e-9)
-    table = Convergence(
+    grid = gci(values=losses[::-1], sizes=sizes[::-1], formal_order=_FORMAL_ORDER, round_off=1e-9)
+    study = Convergence(
         quantity="loss coefficient of the whole tube",
         unit="1",
         formal_order=_FORMAL_ORDER,
         size=sizes,
         value=losses,
-        observed_order=(float(found.observed_order),),
-        gci=float(found.uncertainty) / losses[-1],
+        observed_order=(float(grid.observed_order),),
+        gci=float(grid.uncertainty) / losses[-1],
         geometry="quadratic",
         note="size: cube root of the volume per cell",
     )
-    return float(found.uncertainty), (table,)
+    return float(grid.uncertainty), (study,)

@@ -47,39 +47,53 @@ from ringbalance.verification.papers import (
 )
 from ringbalance.verification.reference.chambers import central_lambda, exact_moment
 
-_LAMBDA_DIGIT: Final = 1e-3
+_LAMBDA_LAST_DIGIT_M: Final = 1e-3
 _PRINTED_LAMBDA: Final = Reference(
     value=paper.PAPER_LAMBDA,
     uncertainty=math.hypot(
-        from_half_width(LAMBDA_TOLERANCE * paper.PAPER_LAMBDA), from_rounding(_LAMBDA_DIGIT)
+        from_half_width(LAMBDA_TOLERANCE * paper.PAPER_LAMBDA), from_rounding(_LAMBDA_LAST_DIGIT_M)
     ),
 )
-"""With the stated error range and the rounding, m."""
+"""The printed lambda with its stated error range and the rounding, m."""
 
 
 def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The chamber's volume from printed numbers that do not contain it: R1'min and Fig. 4's departure."""
     disc, bare = scene.disc, chamber_volume(disc=with_plate(scene.disc, 0.0))
 
+    def plate_from_radius(radius: float) -> float:
+        """Plate thickness with which a half-full chamber's ring has a given inner radius, m."""
+
+        def excess(thickness: float) -> float:
+            return _half_full_radius(with_plate(disc, thickness)) - radius
+
+        return float(brentq(excess, 0.0, 0.3 * disc.inner_radius, xtol=1e-12))
+
     def from_radius(radius: float) -> float:
         if defect == "no_plates":
             return bare
-        return chamber_volume(disc=with_plate(disc, _plate_from_radius(disc, radius)))
+        return chamber_volume(disc=with_plate(disc, plate_from_radius(radius)))
+
+    def from_departure(departure: float) -> float:
+        """Eqs. 18 and 19 turned round: (1 - D)^2 = (p0 - s)/(p0 + s) with s = rho omega^2 V/(2 B theta)."""
+        ratio = (1 - departure) ** 2
+        stall = LOW_PRESSURE * (1 - ratio) / (1 + ratio)
+        per_volume = DENSITY * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
+        return stall / per_volume / 0.5
 
     def liquid(radius: float) -> float:
         """Twice V'_AC, which the paper reads off a radius that it has rounded."""
         return 2 * disc.axial_width * float(liquid_area(disc=disc, surface_radius=radius))
 
-    departure = partial(_volume_from_departure, scene)
-    rounding = input_uncertainty([(departure, DEPARTURE_LOW.value, DEPARTURE_LOW.uncertainty)])
-    found = {
+    rounding = input_uncertainty([(from_departure, DEPARTURE_LOW.value, DEPARTURE_LOW.uncertainty)])
+    volumes = {
         "volume": Found(
             value=from_radius(RING_RADIUS.value),
             input=rounded_radius(from_radius),
             reference=CHAMBER_VOLUME,
         ),
         "volume_from_departure": Found(
-            value=departure(DEPARTURE_LOW.value),
+            value=from_departure(DEPARTURE_LOW.value),
             input=math.hypot(rounding, rounded_radius(liquid)),
             reference=CHAMBER_VOLUME,
         ),
@@ -90,51 +104,32 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         name="the chamber's volume by each printed number that contains the plates",
         columns={
             "from": ["Eq. 4, with the plates inferred from it", "R1'min = 34.9 mm", "departure 45.6 %"],
-            "volume": [by_eq_4, *(one.value for one in found.values())],
-            "half-width": [0.0, *(COVERAGE_FACTOR * one.input for one in found.values())],
+            "volume": [by_eq_4, *(number.value for number in volumes.values())],
+            "half-width": [0.0, *(COVERAGE_FACTOR * number.input for number in volumes.values())],
         },
         units={"volume": "m^3", "half-width": "m^3"},
     )
-    half_width = COVERAGE_FACTOR * rounded_radius(partial(_plate_from_radius, disc))
     return Evidence(
-        quantities=found | as_found(flat_strip=flat_strip),
+        quantities=volumes | as_found(flat_strip=flat_strip),
         numbers={
             "plate_thickness": disc.plate_thickness,
-            "plate_from_radius": _plate_from_radius(disc, RING_RADIUS.value),
-            "plate_from_radius_half_width": half_width,
+            "plate_from_radius": plate_from_radius(RING_RADIUS.value),
+            "plate_from_radius_half_width": COVERAGE_FACTOR * rounded_radius(plate_from_radius),
             "volume_bare": bare,
         },
         tables=(table,),
     )
 
 
-def _plate_from_radius(disc: Disc, radius: float) -> float:
-    """Plate thickness with which a half-full chamber's ring has a given inner radius."""
-
-    def excess(thickness: float) -> float:
-        return _half_full_radius(with_plate(disc, thickness)) - radius
-
-    return float(brentq(excess, 0.0, 0.3 * disc.inner_radius, xtol=1e-12))
-
-
 def _half_full_radius(disc: Disc) -> float:
     return float(surface_radius(disc=disc, fill_ratio=0.5))
 
 
-def _volume_from_departure(scene: Scene, departure: float) -> float:
-    """Eqs. 18 and 19 turned round: (1 - D)^2 = (p0 - s)/(p0 + s) with s = rho omega^2 V/(2 B theta)."""
-    ratio = (1 - departure) ** 2
-    stall = LOW_PRESSURE * (1 - ratio) / (1 + ratio)
-    disc = scene.disc
-    per_volume = DENSITY * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
-    return stall / per_volume / 0.5
-
-
 def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Volumes and the ring's inner radius from the exact area."""
-    disc, bare, whole = scene.disc, with_plate(scene.disc, 0.0), chamber_volume(disc=scene.disc)
+    disc, bare, full = scene.disc, with_plate(scene.disc, 0.0), chamber_volume(disc=scene.disc)
     x = np.linspace(0, 0.5, 51)
-    by_eq_3 = paper.surface_radius_paper(disc=disc, liquid_volume=x * whole * (1 - 1e-9))
+    by_eq_3 = paper.surface_radius_paper(disc=disc, liquid_volume=x * full * (1 - 1e-9))
     shown = figure(
         "inner radius of the ring",
         ("fill ratio", "1", x),
@@ -145,8 +140,8 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     return Evidence(
         quantities={
             "ring_radius": Found(value=_half_full_radius(disc), reference=RING_RADIUS),
-            "max_liquid": Found(value=0.5 * whole, reference=MAX_LIQUID_VOLUME),
-            "initial_liquid": Found(value=0.25 * whole, reference=INITIAL_LIQUID_VOLUME),
+            "max_liquid": Found(value=0.5 * full, reference=MAX_LIQUID_VOLUME),
+            "initial_liquid": Found(value=0.25 * full, reference=INITIAL_LIQUID_VOLUME),
         },
         numbers={"radius_bare": _half_full_radius(bare)},
         series=(shown,),
@@ -160,15 +155,15 @@ def moment_ends(scene: Scene) -> Evidence:
 
 def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Moment of one half-full chamber by finite elements, and the arithmetic of Eq. 7."""
-    given, fills = at_paper_density(scene), (0.1, 0.2, 0.3, 0.4, 0.5)
-    disc, bare = given.disc, with_plate(given.disc, 0.0)
-    ring = ring_of(given, fills)
-    found = chamber_moment(given, density=DENSITY)
+    printed_scene, fills = at_paper_density(scene), (0.1, 0.2, 0.3, 0.4, 0.5)
+    disc, bare = printed_scene.disc, with_plate(printed_scene.disc, 0.0)
+    ring = ring_of(printed_scene, fills)
+    computed = chamber_moment(printed_scene, density=DENSITY)
     if defect == "plates_left_out":
-        found = found.with_correction()
+        computed = computed.with_correction()
     # Eq. 7 takes the sine of half the central angle.
     angle = math.sqrt(2) if defect == "whole_angle" else 1.0
-    without = ring_of(dataclasses.replace(given, disc=bare), (disc.max_fill_ratio,))
+    without = ring_of(dataclasses.replace(printed_scene, disc=bare), (disc.max_fill_ratio,))
     rounded, unrounded = _eq_7(disc, RING_RADIUS.value), _eq_7(disc, _radius_by_eq_3(disc))
     shown = figure(
         "moment of one chamber",
@@ -180,7 +175,7 @@ def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     return Evidence(
         quantities={
-            "moment": found.against(CHAMBER_MOMENT),
+            "moment": computed.against(CHAMBER_MOMENT),
             "arithmetic": Found(
                 value=unrounded, input=rounded_radius(partial(_eq_7, disc)), reference=CHAMBER_MOMENT
             ),
@@ -191,7 +186,7 @@ def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={
             "rounded": rounded,
             "rounding_step": abs(unrounded - rounded),
-            "shortfall": 1 - found.value / CHAMBER_MOMENT.value,
+            "shortfall": 1 - computed.value / CHAMBER_MOMENT.value,
         },
         series=(shown,),
         convergence=(mesh_table(ring, "moment", "kg m", -1),),
@@ -210,8 +205,8 @@ def _eq_7(disc: Disc, radius: float) -> float:
 
 def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Moment of two adjacent full chambers, from one chamber's by finite elements."""
-    given = at_paper_density(scene)
-    both = chamber_moment(given, density=DENSITY, factor=math.sqrt(2))
+    printed_scene = at_paper_density(scene)
+    both = chamber_moment(printed_scene, density=DENSITY, factor=math.sqrt(2))
     if defect == "plates_left_out":
         both = both.with_correction()
     printed = float(paper.capacity(chamber_moment=CHAMBER_MOMENT.value))
@@ -235,7 +230,7 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
         },
         numbers={"guaranteed": chamber},
         series=(shown,),
-        status=ring_of(given, (given.disc.max_fill_ratio,)).status,
+        status=ring_of(printed_scene, (printed_scene.disc.max_fill_ratio,)).status,
     )
 
 

@@ -36,16 +36,14 @@ from ringbalance.verification.evidence import (
 from ringbalance.verification.papers import at_constant_speed, changed, convergence_time, envelope, thinned
 
 _RPM: Final = 30 / np.pi
-_CRITICAL: Final = printed(135.0, last_digit=1.0)
-"""Printed, rpm."""
-_SHOWN: Final = 12.0
-"""s."""
-_PHASES: Final = (45.0, 135.0)
-"""Of the imbalance in Figs. 7 and 8, deg."""
-_BESIDE: Final = math.radians(10.0)
-"""Error of the masses' places in Fig. 8, rad."""
-_RATE: Final = 1.0
-"""rad/s, of the masses against the rotor."""
+_PRINTED_CRITICAL_RPM: Final = printed(135.0, last_digit=1.0)
+_SHOWN_S: Final = 12.0
+_FIG_7_PHASES_DEG: Final = (45.0, 135.0)
+"""Phases of the imbalance in Figs. 7 and 8."""
+_TARGET_ERROR_RAD: Final = math.radians(10.0)
+"""Error of the masses' positions in Fig. 8."""
+_MAX_MASS_RATE: Final = 1.0
+"""Largest rate of the masses against the rotor, rad/s."""
 
 
 def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
@@ -66,7 +64,7 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     runs = {"locked": locked, "balanced at 100 rpm": balanced}
     return Evidence(
         quantities={
-            "critical": Found(value=critical, corrected=without, reference=_CRITICAL),
+            "critical": Found(value=critical, corrected=without, reference=_PRINTED_CRITICAL_RPM),
             "peak": Found(value=peak / largest),
         },
         numbers={
@@ -75,24 +73,26 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
             "peak_speed": _RPM * float(locked.speed[at]),
             "without": without,
         },
-        series=(_amplitudes("amplitude during the run-up", runs, beside="locked"),),
+        series=(_amplitudes("amplitude during the run-up", runs, reference="locked"),),
     )
 
 
 @lru_cache(maxsize=1)
 def _locked(scene: EccentricScene) -> EccentricRun:
-    """With locked masses; no sensor is looked at, so that one run serves every noise of the position."""
+    """Run with locked masses; no sensor is looked at, so that one run serves every noise of the position."""
     return simulate_eccentric(changed(scene, {"supervisor.strategy": "locked"}))
 
 
 def _amplitudes(
-    name: str, runs: Mapping[str, EccentricRun], *, until: float = math.inf, beside: str = ""
+    name: str, runs: Mapping[str, EccentricRun], *, until: float = math.inf, reference: str = ""
 ) -> Series:
-    """Amplitude over time of runs with the same samples, by curve name; `beside` is one to compare with."""
+    """Amplitude over time of runs with the same samples, by curve name, one of them the reference."""
     time = next(iter(runs.values())).time
     shown = time <= until
     curves = (
-        Curve(label, "m", envelope(run.amplitude[shown]), style="reference" if label == beside else "found")
+        Curve(
+            label, "m", envelope(run.amplitude[shown]), style="reference" if label == reference else "found"
+        )
         for label, run in runs.items()
     )
     return figure(name, ("time", "s", thinned(time[shown])), *curves)
@@ -102,9 +102,9 @@ class _Balanced(NamedTuple):
     """Runs for several phases of the imbalance."""
 
     runs: Mapping[str, EccentricRun]
-    """By what a figure calls them."""
+    """Runs by their names in a figure."""
     before: FloatArray
-    """Steady amplitude of each before anything is moved, m."""
+    """Steady amplitude of each run before anything is moved, m."""
     positioned: FloatArray
     """Mean amplitude in the last second of the check, m; infinite without one."""
     after: FloatArray
@@ -113,41 +113,42 @@ class _Balanced(NamedTuple):
 
 def _balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> _Balanced:
     """Balance the two imbalances of the paper's Fig. 7."""
-    level = at_constant_speed(scene, time_limit=time_limit)
+    constant = at_constant_speed(scene, time_limit=time_limit)
     runs = {
         f"imbalance at {phase:.0f} degrees": simulate_eccentric(
-            changed(level, {"imbalance.phase": math.radians(phase)})
+            changed(constant, {"imbalance.phase": math.radians(phase)})
         )
-        for phase in _PHASES
+        for phase in _FIG_7_PHASES_DEG
     }
+    positioned = []
+    for run in runs.values():
+        end = next((stage.end for stage in run.stages if stage.name == "check"), None)
+        if end is None:
+            positioned.append(math.inf)
+        else:
+            positioned.append(float(np.mean(run.amplitude[(run.time > end - 1.0) & (run.time <= end)])))
     return _Balanced(
         runs=runs,
         before=np.array([run.unbalanced_amplitude for run in runs.values()]),
-        positioned=np.array([_in_check(run) for run in runs.values()]),
+        positioned=np.array(positioned),
         after=np.array([run.final_amplitude for run in runs.values()]),
     )
 
 
-def _beside_the_targets(scene: EccentricScene) -> EccentricScene:
-    """With masses that stop 10 degrees beside their targets, then trials alone, as in Fig. 8."""
-    return changed(scene, {"supervisor.target_error": (_BESIDE, _BESIDE), "supervisor.correction": "trials"})
-
-
-def _in_check(run: EccentricRun) -> float:
-    end = next((stage.end for stage in run.stages if stage.name == "check"), None)
-    if end is None:
-        return math.inf
-    return float(np.mean(run.amplitude[(run.time > end - 1.0) & (run.time <= end)]))
+def _off_target(scene: EccentricScene) -> EccentricScene:
+    """The scene with masses that stop 10 degrees off their targets, then trials alone, as in Fig. 8."""
+    error = (_TARGET_ERROR_RAD, _TARGET_ERROR_RAD)
+    return changed(scene, {"supervisor.target_error": error, "supervisor.correction": "trials"})
 
 
 def positioning(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Two imbalances balanced at constant speed: amplitudes before, on the way and after, Fig. 7."""
-    given = scene if defect is None else _beside_the_targets(scene)
-    found = _balanced_at_constant_speed(given, time_limit=30.0)
-    runs = list(found.runs.values())
-    shown = runs[0].time <= _SHOWN
+    aimed = scene if defect is None else _off_target(scene)
+    balanced = _balanced_at_constant_speed(aimed, time_limit=30.0)
+    runs = list(balanced.runs.values())
+    shown = runs[0].time <= _SHOWN_S
     angles = figure(
-        f"angles of the masses, {next(iter(found.runs))}",
+        f"angles of the masses, {next(iter(balanced.runs))}",
         ("time", "s", thinned(runs[0].time[shown])),
         *(
             Curve(name, "rad", thinned(angle[shown]))
@@ -156,37 +157,38 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
     )
     arrived = [stage.end for run in runs for stage in run.stages if stage.name == "positioning"]
     return Evidence(
-        quantities=as_found(ratio=np.max(found.positioned / found.before)),
+        quantities=as_found(ratio=np.max(balanced.positioned / balanced.before)),
         numbers={
-            "before": found.before[0],
-            "first": found.positioned[0],
-            "second": found.positioned[1],
+            "before": balanced.before[0],
+            "first": balanced.positioned[0],
+            "second": balanced.positioned[1],
             "arrived": max(arrived),
         },
-        series=(_amplitudes("amplitude", found.runs, until=_SHOWN), angles),
+        series=(_amplitudes("amplitude", balanced.runs, until=_SHOWN_S), angles),
     )
 
 
 def fine_tuning(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Masses ten degrees beside their targets, then tuned by trial, Fig. 8."""
+    """Masses ten degrees off their targets, then tuned by trial, Fig. 8."""
     time_limit = 200.0 if defect is None else 25.0
-    found = _balanced_at_constant_speed(_beside_the_targets(scene), time_limit=time_limit)
-    settled = [run.settling_time or run.time[-1] for run in found.runs.values()]
+    balanced = _balanced_at_constant_speed(_off_target(scene), time_limit=time_limit)
+    settled = [run.settling_time or run.time[-1] for run in balanced.runs.values()]
     return Evidence(
         quantities=as_found(
-            left=np.min(found.positioned / found.before), ended=np.max(found.after / found.before)
+            left=np.min(balanced.positioned / balanced.before),
+            ended=np.max(balanced.after / balanced.before),
         ),
         numbers={
-            "left_m": found.positioned.min(),
-            "end": found.after.max(),
+            "left_m": balanced.positioned.min(),
+            "end": balanced.after.max(),
             "time": max(settled),
         },
-        series=(_amplitudes("amplitude", found.runs),),
+        series=(_amplitudes("amplitude", balanced.runs),),
     )
 
 
 def bound(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Appendix B: the printed force beside the largest one, and the corrected bound beside a run.
+    """Appendix B: the printed force over the largest one, and a run's amplitude over the corrected bound.
 
     The printed argument shows that the energy falls while the rotor's fixed-frame velocity exceeds Y/C_B, and
     concludes that the motion is bounded.  That does not follow: nothing is said of the displacement, and the
@@ -194,8 +196,10 @@ def bound(scene: EccentricScene, level: Level, defect: str | None = None) -> Evi
     """
     speed = scene.rotor.speed_profile[0].speed
     parameters = PlantParameters.of(scene)
-    turning = _motion_bound(parameters, speed=speed, rate=_RATE)
-    judged = _motion_bound(parameters, speed=0.0, rate=_RATE) if defect == "rotor_at_rest" else turning
+    turning = _motion_bound(parameters, speed=speed, rate=_MAX_MASS_RATE)
+    judged = (
+        _motion_bound(parameters, speed=0.0, rate=_MAX_MASS_RATE) if defect == "rotor_at_rest" else turning
+    )
     runs = _balanced_at_constant_speed(scene, time_limit=30.0).runs.values()
     largest = max(run.worst_amplitude for run in runs)
     return Evidence(
@@ -236,23 +240,23 @@ def _motion_bound(parameters: PlantParameters, *, speed: float, rate: float) -> 
     return _MotionBound(force, printed, amplitude)
 
 
-_PRINTED: Final = 3.5
+_PRINTED_TIME_S: Final = 3.5
 """Middle of the printed 3 to 4 s."""
-_TURNED: Final = (30.0, 100.0, 210.0, 300.0)
-"""Of the imbalance in Fig. 4, deg."""
-_KNOWN: Final = 0.02
+_FIG_4_PHASES_DEG: Final = (30.0, 100.0, 210.0, 300.0)
+"""Phases of the imbalance in Fig. 4."""
+_CONVERGED_IMBALANCE: Final = 0.02
 """Relative error of the imbalance within which its estimate has converged."""
-_SCALES: Final = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
+_NOISE_RATIOS: Final = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
 """Sensor noise that the filter assumes, over the true one."""
-_RECORD: Final = 8.0
-"""Time of a record for Fig. 4, s."""
-_FRICTION_TIME: Final = 12.0
-"""Time limit of a run for Fig. 5, s."""
-_BEFORE, _AFTER = 0.1, 0.6
-"""Shown around the beginning of the friction stage, s."""
-_ARMS: Final = (0.01, 0.005)
-"""Of Fig. 5, m."""
-_ARM_KNOWN: Final = 0.05
+_RECORD_S: Final = 8.0
+"""Duration of a record for Fig. 4."""
+_FRICTION_S: Final = 12.0
+"""Time limit of a run for Fig. 5."""
+_BEFORE_S, _AFTER_S = 0.1, 0.6
+"""Times shown before and after the beginning of the friction stage."""
+_FRICTION_ARMS_M: Final = (0.01, 0.005)
+"""Friction arms of Fig. 5."""
+_CONVERGED_ARM: Final = 0.05
 """Relative error of the friction arm within which its estimate has converged."""
 
 
@@ -270,66 +274,65 @@ class _ImbalanceRecord:
 
 
 class _FigureFour(NamedTuple):
-    """Estimates of four imbalances, and how their convergence hangs on the covariances."""
+    """Estimates of four imbalances, and their convergence times under several covariances."""
 
     time: FloatArray
     """s, shape (n,)."""
     true: FloatArray
-    """Along the rotor's axes, kg m, shape (phases, 2)."""
+    """True imbalances along the rotor's axes, kg m, shape (phases, 2)."""
     estimate: FloatArray
-    """With honest covariances, kg m, shape (phases, n, 2)."""
+    """Estimates with honest covariances, kg m, shape (phases, n, 2)."""
     covariance_norm: FloatArray
     """Largest singular value of P, shape (phases, n)."""
     honest_time: tuple[float, ...]
-    """From when on the estimate keeps within 2 % of the imbalance, for each phase, s."""
+    """Time from which on the estimate keeps within 2 % of the imbalance, for each phase, s."""
     scales: FloatArray
     """Assumed over true sensor noise, shape (scales,)."""
     scaled_time: FloatArray
-    """The same time for the first phase, s, shape (scales,); infinite where it is never reached."""
+    """Time of the first phase under each scale, s, shape (scales,); infinite where it is never reached."""
 
 
 def imbalance_ends(scene: EccentricScene) -> Evidence:
-    """With honest covariances alone."""
+    """Convergence with honest covariances alone."""
     return Evidence(quantities=_judged(_figure_four(scene, scales=(1.0,))))
 
 
-def _judged(found: _FigureFour, time: float | None = None) -> dict[str, Found]:
+def _judged(estimates: _FigureFour, time: float | None = None) -> dict[str, Found]:
     """Args: `time`: of convergence, s; default that with honest covariances."""
-    norm, slowest = found.covariance_norm, max(found.honest_time) if time is None else time
-    return as_found(honest=min(slowest, found.time[-1]), covariance=np.max(norm[:, -1] / norm[:, 0]))
+    norm, slowest = estimates.covariance_norm, max(estimates.honest_time) if time is None else time
+    return as_found(honest=min(slowest, estimates.time[-1]), covariance=np.max(norm[:, -1] / norm[:, 0]))
 
 
 def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """How fast four imbalances become known, and under which covariances that takes the printed time."""
-    found = _figure_four(scene)
-    reached = np.isfinite(found.scaled_time)
-    scales, times = found.scales[reached], found.scaled_time[reached]
-    scale = np.exp(np.interp(_PRINTED, times, np.log(scales)))
+    """Convergence of the estimates of four imbalances, and the covariances that take the printed time."""
+    estimates = _figure_four(scene)
+    reached = np.isfinite(estimates.scaled_time)
+    scales, times = estimates.scales[reached], estimates.scaled_time[reached]
+    scale = np.exp(np.interp(_PRINTED_TIME_S, times, np.log(scales)))
     over_scale = figure(
         "time to be within 2 % over the noise that the filter assumes",
         ("assumed over true noise", "1", scales),
         Curve("found", "s", times),
-        Curve("printed", "s", np.full(times.shape, _PRINTED), style="paper"),
+        Curve("printed", "s", np.full(times.shape, _PRINTED_TIME_S), style="paper"),
         log=True,
     )
+    # The figure's own four curves, as distances from the truth over the imbalance.
+    error = np.linalg.norm(estimates.estimate - estimates.true[:, None, :], axis=2)
+    relative = error / np.linalg.norm(estimates.true, axis=1)[:, None]
+    shown = estimates.time <= 0.5
+    errors = figure(
+        "error of the estimate over the imbalance, honest covariances",
+        ("time", "s", thinned(estimates.time[shown])),
+        *(
+            Curve(f"{phase:.0f} degrees", "1", thinned(row[shown]))
+            for phase, row in zip(_FIG_4_PHASES_DEG, relative, strict=True)
+        ),
+    )
     return Evidence(
-        quantities=_judged(found, None if defect is None else float(found.scaled_time[-1])),
-        numbers={"printed": _PRINTED, "scale": float(scale)},
-        series=(_estimates(found), over_scale),
+        quantities=_judged(estimates, None if defect is None else float(estimates.scaled_time[-1])),
+        numbers={"printed": _PRINTED_TIME_S, "scale": float(scale)},
+        series=(errors, over_scale),
     )
-
-
-def _estimates(found: _FigureFour) -> Series:
-    """The figure's own four curves, as distances from the truth over the imbalance."""
-    error = np.linalg.norm(found.estimate - found.true[:, None, :], axis=2)
-    relative = error / np.linalg.norm(found.true, axis=1)[:, None]
-    shown = found.time <= 0.5
-    curves = (
-        Curve(f"{phase:.0f} degrees", "1", thinned(row[shown]))
-        for phase, row in zip(_TURNED, relative, strict=True)
-    )
-    name = "error of the estimate over the imbalance, honest covariances"
-    return figure(name, ("time", "s", thinned(found.time[shown])), *curves)
 
 
 def _imbalance_record(scene: EccentricScene, *, duration: float) -> _ImbalanceRecord:
@@ -365,20 +368,22 @@ def _estimate_imbalance(
     )
 
 
-def _figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _SCALES) -> _FigureFour:
+def _figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _NOISE_RATIOS) -> _FigureFour:
     """Estimates of the four imbalances of the paper's Fig. 4, and of one under dishonest covariances."""
-    turned = [changed(scene, {"imbalance.phase": math.radians(phase)}) for phase in _TURNED]
-    records = [_imbalance_record(one, duration=_RECORD) for one in turned]
+    turned = [changed(scene, {"imbalance.phase": math.radians(phase)}) for phase in _FIG_4_PHASES_DEG]
+    records = [_imbalance_record(rotor, duration=_RECORD_S) for rotor in turned]
     pairs = list(zip(turned, records, strict=True))
-    found = [_estimate_imbalance(*pair) for pair in pairs]
+    estimates = [_estimate_imbalance(*pair) for pair in pairs]
     first, record = pairs[0]
     scaled = (_estimate_imbalance(first, record, scale=scale)[0] for scale in scales)
     return _FigureFour(
         time=record.time,
-        true=np.array([[one.imbalance.real, one.imbalance.imag] for one in records]),
-        estimate=np.array([states[:, 4:] for states, _ in found]),
-        covariance_norm=np.array([np.linalg.norm(covariances, 2, (1, 2)) for _, covariances in found]),
-        honest_time=tuple(_time_of(one, states) for one, (states, _) in zip(records, found, strict=True)),
+        true=np.array([[each.imbalance.real, each.imbalance.imag] for each in records]),
+        estimate=np.array([states[:, 4:] for states, _ in estimates]),
+        covariance_norm=np.array([np.linalg.norm(covariances, 2, (1, 2)) for _, covariances in estimates]),
+        honest_time=tuple(
+            _time_of(each, states) for each, (states, _) in zip(records, estimates, strict=True)
+        ),
         scales=np.asarray(scales, dtype=np.float64),
         scaled_time=np.array([_time_of(record, states) for states in scaled]),
     )
@@ -386,19 +391,19 @@ def _figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _SCALES) 
 
 def _time_of(record: _ImbalanceRecord, states: FloatArray) -> float:
     error = np.abs(states[:, 4] + 1j * states[:, 5] - record.imbalance) / abs(record.imbalance)
-    return convergence_time(record.time, error, limit=_KNOWN)
+    return convergence_time(record.time, error, limit=_CONVERGED_IMBALANCE)
 
 
 def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Two friction arms found while both masses go round: their errors and the time they take."""
+    """Two friction arms estimated while both masses go round: their errors and the time they take."""
     runs = _friction_runs(scene)
     wrong = 1.1 if defect == "another_friction" else 1.0
     errors = [
         np.max(np.abs(run.history["friction_arm"][-1] / (wrong * arm) - 1)) for arm, run in runs.items()
     ]
     slowest = max(friction_time(run, arm) for arm, run in runs.items())
-    time = runs[_ARMS[0]].time - _begun(runs[_ARMS[0]])
-    shown = (time > -_BEFORE) & (time < _AFTER)
+    time = runs[_FRICTION_ARMS_M[0]].time - _begun(runs[_FRICTION_ARMS_M[0]])
+    shown = (time > -_BEFORE_S) & (time < _AFTER_S)
     when = thinned(time[shown])
     estimated = (
         Curve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.history["friction_arm"][shown, 0]))
@@ -416,14 +421,17 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
 
 def _friction_runs(scene: EccentricScene) -> Mapping[float, EccentricRun]:
     """Runs by their true friction arm, m. Source: Fig. 5 of the paper on eccentric masses."""
-    level = at_constant_speed(scene, time_limit=_FRICTION_TIME)
-    return {a: simulate_eccentric(changed(level, {"masses.friction_arm": (a, a)})) for a in _ARMS}
+    constant = at_constant_speed(scene, time_limit=_FRICTION_S)
+    return {
+        arm: simulate_eccentric(changed(constant, {"masses.friction_arm": (arm, arm)}))
+        for arm in _FRICTION_ARMS_M
+    }
 
 
 def friction_time(run: EccentricRun, arm: float) -> float:
-    """From the beginning of the friction stage until both estimates keep within 5 %, s."""
+    """Time from the beginning of the friction stage until both estimates keep within 5 %, s."""
     error = np.max(np.abs(run.history["friction_arm"] - arm), axis=1) / arm
-    return convergence_time(run.time, error, limit=_ARM_KNOWN) - _begun(run)
+    return convergence_time(run.time, error, limit=_CONVERGED_ARM) - _begun(run)
 
 
 def _begun(run: EccentricRun) -> float:

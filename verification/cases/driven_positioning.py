@@ -17,45 +17,42 @@ from ringbalance.scene.platform.compiled import compiled
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, as_found, figure
 from ringbalance.verification.papers import changed
 
-_STEP: Final = {"light": 4e-4, "heavy": 1e-4}
-"""s, of the integration, which is of first order; the effort hangs on it by a thousandth."""
-_DURATION: Final = 3.0
-"""Of the move, s."""
+_STEP_S: Final = {"light": 4e-4, "heavy": 1e-4}
+"""Step of the integration, which is of first order; the effort changes by a thousandth with it."""
+_MOVE_S: Final = 3.0
 _MASS_RATIOS: Final = (0.035, 0.023)
 """m_b/m_r of Fig. 6."""
 _WEIGHT_RATIOS: Final = (1.0, 2.0, 3.5, 5.0)
 """q/r."""
 _SPEED_RATIOS: Final = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 """W over sqrt(K_B/M)."""
-_TRAVEL: Final = (-1.0, 0.6)
-"""rad, of the two masses."""
-_SHARES: Final = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
-"""Of the friction arm that is compensated; as printed the angle stands where the rate belongs."""
-_START: Final = 1.0
-"""rad, of a mass from its target."""
-_FAR: Final = 10.0
-"""rad, from which on a mass does not come back."""
-_KNOWN: Final = 0.98
-"""Of the friction arm, what is compensated."""
+_TRAVEL_RAD: Final = (-1.0, 0.6)
+_COMPENSATED: Final = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
+"""Fraction of the friction arm that is compensated; as printed the angle stands where the rate belongs."""
+_START_RAD: Final = 1.0
+"""First distance of a mass from its target."""
+_LOST_RAD: Final = 10.0
+"""Distance from which on a mass does not come back."""
+_NEARLY_COMPENSATED: Final = 0.98
+"""Fraction of the friction arm that is compensated where a mass comes to rest."""
 _CASES: Final = 20_000
 _SEED: Final = 20_200_627
 _INSTANTS: Final = 201
-_FASTER: Final = 2.0
+_PACE_RATIO: Final = 2.0
 """Pace of one mass over that of the other, where these differ."""
-_ROUND_OFF: Final = 1e-9
-"""rad."""
+_ROUND_OFF_RAD: Final = 1e-9
 
 
 def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """What positioning costs over weights and speed, and which friction compensation makes it grow.
+    """Effort of positioning over weights and speed, and its growth by each friction compensation.
 
     The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are
     not in it: what the regulator has to do is the move itself and the friction that compensation leaves.
     """
-    found = _efforts(scene, step=_STEP[level])
-    grown = {name: growth(each) for name, each in found.items()}
+    efforts = _efforts(scene, step=_STEP_S[level])
+    grown = {name: growth(each) for name, each in efforts.items()}
     # The first mass ratio at the third weight, near the paper's own choice.
-    shown = {name: each[0, 2] for name, each in found.items()}
+    shown = {name: each[0, 2] for name, each in efforts.items()}
     over_speed = figure(
         "effort of one move over the speed",
         ("speed over natural frequency", "1", _SPEED_RATIOS),
@@ -64,9 +61,9 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
         Curve("not compensated", "N m s", shown["without"]),
         Curve("as printed", "N m s", shown["printed"], style="paper"),
     )
-    judged, short = (float(grown[name if defect is None else "without"].min()) for name in ("exact", "short"))
+    exact, short = (float(grown[name if defect is None else "without"].min()) for name in ("exact", "short"))
     return Evidence(
-        quantities={"exact": Found(value=judged).moved(0.0, short - judged)},
+        quantities={"exact": Found(value=exact).moved(0.0, short - exact)},
         numbers={
             "without": grown["without"].min(),
             "without_most": grown["without"].max(),
@@ -79,10 +76,10 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
 
 def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Growth of the same efforts with q/r and with the mass ratio."""
-    found = _efforts(scene, step=_STEP[level])
+    efforts = _efforts(scene, step=_STEP_S[level])
     # The largest over the smallest q/r, and the larger over the smaller mass ratio.
-    over_weight = {name: each[:, -1] / each[:, 0] for name, each in found.items()}
-    over_mass = {name: each[0] / each[1] for name, each in found.items()}
+    over_weight = {name: each[:, -1] / each[:, 0] for name, each in efforts.items()}
+    over_mass = {name: each[0] / each[1] for name, each in efforts.items()}
     exact, short = ("exact", "short") if defect is None else ("without", "without")
     return Evidence(
         quantities={
@@ -102,19 +99,20 @@ def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> E
 def _efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
     """Effort J(q, r) of one move, N m s, by the way in which friction is compensated: the paper's Fig. 6.
 
-    Returns: Of shape (mass ratios, weight ratios, speed ratios).
+    Returns: Arrays of shape (mass ratios, weight ratios, speed ratios).
     """
     shape = (len(_MASS_RATIOS), len(_WEIGHT_RATIOS), len(_SPEED_RATIOS))
-    arm, found = scene.masses.friction_arm[0], {name: np.empty(shape) for name in _SHARES}
+    arm, efforts = scene.masses.friction_arm[0], {name: np.empty(shape) for name in _COMPENSATED}
     for i, j in np.ndindex(shape[:2]):
         heavier = changed(scene, {"masses.mass": _MASS_RATIOS[i] * scene.rotor.mass})
         weighted = changed(heavier, {"lqr.state_weight": _WEIGHT_RATIOS[j] * scene.lqr.input_weight})
         law = DriveLaw.of(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
         natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * _MASS_RATIOS[i])))
-        for (name, share), (k, ratio) in itertools.product(_SHARES.items(), enumerate(_SPEED_RATIOS)):
+        for (name, share), (k, ratio) in itertools.product(_COMPENSATED.items(), enumerate(_SPEED_RATIOS)):
             speed, printed = ratio * natural, name == "printed"
-            found[name][i, j, k], _ = _move(law, arm, share * arm, speed, *_TRAVEL, step, _DURATION, printed)
-    return found
+            result = _move(law, arm, share * arm, speed, *_TRAVEL_RAD, step, _MOVE_S, printed)
+            efforts[name][i, j, k] = result[0]
+    return efforts
 
 
 def growth(effort: FloatArray) -> FloatArray:
@@ -126,7 +124,7 @@ def growth(effort: FloatArray) -> FloatArray:
 def _move(
     law: DriveLaw,
     arm: float,
-    believed_arm: float,
+    assumed_arm: float,
     speed: float,
     first: float,
     second: float,
@@ -140,20 +138,20 @@ def _move(
         target in the end, rad, or where it has gone far away.
     Source: Eqs. 40 and 55 of the paper on eccentric masses.
     """
-    angle, rate, asked = np.array([-first, -second]), np.zeros(2), np.zeros(2)
+    angle, rate, torque = np.array([-first, -second]), np.zeros(2), np.zeros(2)
     total = 0.0
     for _ in range(round(duration / step)):
         for i in range(2):
-            asked[i] = regulator_torque(law, angle[i], rate[i], 0.0)
+            torque[i] = regulator_torque(law, angle[i], rate[i], 0.0)
             if printed:
-                extra = _printed_compensation(law, believed_arm, speed, angle[i], rate[i])
+                extra = _printed_compensation(law, assumed_arm, speed, angle[i], rate[i])
             else:
-                extra = friction_torque(law, believed_arm, 0.0, speed, rate[i], -angle[i])
-            net = asked[i] + extra - law.track.damping * rate[i]
+                extra = friction_torque(law, assumed_arm, 0.0, speed, rate[i], -angle[i])
+            net = torque[i] + extra - law.track.damping * rate[i]
             rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
             angle[i] += step * rate[i]
-        total += step * math.hypot(asked[0], asked[1])
-        if abs(angle[0]) > _FAR:
+        total += step * math.hypot(torque[0], torque[1])
+        if abs(angle[0]) > _LOST_RAD:
             break
     return total, abs(angle[0])
 
@@ -181,25 +179,25 @@ def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float
 
 
 def stability(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Where a mass comes to rest under the regulator with friction, and the poles of the linear loop.
-
-    Distance from the target at rest, and the decay of the slowest pole."""
+    """Resting distance of a mass from its target under friction, and the slowest pole of the linear loop."""
     law = DriveLaw.of(scene)._replace(breaks_away=True, slow=0.0, near=0.0)
     if defect == "gain_turned":
         law = law._replace(position_gain=-law.position_gain)
     arm = 0.0 if defect == "no_friction" else scene.masses.friction_arm[0]
     speed = scene.rotor.speed_profile[0].speed
-    decay = _decay(law)
+    # Slowest pole of (J + J_add) e'' + (C_add + k_d) e' + k_p e = 0, 1/s.
+    polynomial = [law.track.inertia, law.track.damping + law.rate_gain, law.position_gain]
+    decay = -float(np.max(np.roots(polynomial).real))
     duration = 25.0 / abs(decay)
     rest, exact = (
-        _move(law, arm, share * arm, speed, _START, 0.0, _STEP[level], duration, False)[1]
-        for share in (_KNOWN, 1.0)
+        _move(law, arm, share * arm, speed, _START_RAD, 0.0, _STEP_S[level], duration, False)[1]
+        for share in (_NEARLY_COMPENSATED, 1.0)
     )
     friction = law.track.moment * speed**2
     return Evidence(
         quantities={"rest": Found(value=rest, corrected=exact), "decay": Found(value=decay)},
         numbers={
-            "band": (1 - _KNOWN) * arm * friction / abs(law.position_gain),
+            "band": (1 - _NEARLY_COMPENSATED) * arm * friction / abs(law.position_gain),
             "exact": exact,
             "step": scene.lqr.step,
             "margin": RecommendedGains.of(scene).regulator.gain_margin,
@@ -207,23 +205,26 @@ def stability(scene: EccentricScene, level: Level, defect: str | None = None) ->
     )
 
 
-def _decay(law: DriveLaw) -> float:
-    """Of the slowest pole of (J + J_add) e'' + (C_add + k_d) e' + k_p e = 0, 1/s."""
-    polynomial = [law.track.inertia, law.track.damping + law.rate_gain, law.position_gain]
-    return -float(np.max(np.roots(polynomial).real))
-
-
 def collision(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Random masses on the way to targets that are assigned by the paper's rule.
 
     Judged is the fraction in which they come nearer on the way than at both ends of it.
+    Source: Eqs. 26 to 28 of the paper on eccentric masses.
     """
-    start, goal = _drawn(np.random.default_rng(_SEED))
-    printed = _assigned(start, goal)
+    random = np.random.default_rng(_SEED)
+    start = random.uniform(-np.pi, np.pi, (2, _CASES))
+    phase = random.uniform(-np.pi, np.pi, _CASES)
+    # Targets are phi_im +- beta, with beta on the far side of the imbalance.
+    half_angle = random.uniform(np.pi / 2, np.pi, _CASES)
+    goal = np.stack([phase + half_angle, phase - half_angle])
+    # The rule: the least sum of squared travels.
+    straight = np.sum((start - goal) ** 2, axis=0)
+    crossed = np.sum((start - goal[::-1]) ** 2, axis=0)
+    printed = np.where(straight <= crossed, goal, goal[::-1])
     fractions = {
-        "printed": _nearer(start, printed, faster=1.0),
-        "other_assignment": _nearer(start, printed[::-1], faster=1.0),
-        "unequal_pace": _nearer(start, printed, faster=_FASTER),
+        "printed": _nearer(start, printed, pace_ratio=1.0),
+        "other_assignment": _nearer(start, printed[::-1], pace_ratio=1.0),
+        "unequal_pace": _nearer(start, printed, pace_ratio=_PACE_RATIO),
     }
     return Evidence(
         quantities=as_found(nearer=fractions[defect or "printed"]),
@@ -235,39 +236,21 @@ def collision(scene: EccentricScene, level: Level, defect: str | None = None) ->
     )
 
 
-def _drawn(random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Angles of the masses at the start and of their targets, rad, each of shape (2, cases).
-
-    Targets are phi_im +- beta (Eq. 26), with beta on the far side of the imbalance.
-    """
-    start = random.uniform(-np.pi, np.pi, (2, _CASES))
-    phase = random.uniform(-np.pi, np.pi, _CASES)
-    half_angle = random.uniform(np.pi / 2, np.pi, _CASES)
-    return start, np.stack([phase + half_angle, phase - half_angle])
-
-
-def _assigned(start: FloatArray, goal: FloatArray) -> FloatArray:
-    """Targets by mass, of the least sum of squared travels. Source: Eqs. 27 and 28."""
-    straight = np.sum((start - goal) ** 2, axis=0)
-    crossed = np.sum((start - goal[::-1]) ** 2, axis=0)
-    return np.where(straight <= crossed, goal, goal[::-1])
-
-
-def _nearer(start: FloatArray, goal: FloatArray, *, faster: float) -> float:
+def _nearer(start: FloatArray, goal: FloatArray, *, pace_ratio: float) -> float:
     """Fraction of the cases in which the distance along the track falls below that at both ends.
 
-    Both masses approach their targets exponentially; the first one `faster` times as fast.
+    Both masses approach their targets exponentially; the first one `pace_ratio` times as fast.
     """
     left = np.exp(-np.linspace(0.0, 30.0, _INSTANTS))
     left[0], left[-1] = 1.0, 0.0
     least = np.full(_CASES, np.inf)
     for fraction in left:
         difference = (goal[1] + (start[1] - goal[1]) * fraction) - (
-            goal[0] + (start[0] - goal[0]) * fraction**faster
+            goal[0] + (start[0] - goal[0]) * fraction**pace_ratio
         )
         least = np.minimum(least, _distance(difference))
     ends = np.minimum(_distance(start[1] - start[0]), _distance(goal[1] - goal[0]))
-    return float(np.mean(least < ends - _ROUND_OFF))
+    return float(np.mean(least < ends - _ROUND_OFF_RAD))
 
 
 def _distance(difference: FloatArray) -> FloatArray:

@@ -1,5 +1,5 @@
-"""Finite elements: whether stated uncertainties hold (published and made-up sequences, random discs,
-extremes), balances of force, torque, flux and volume on solved meshes, and the same totals by three routes.
+"""Finite elements: reliability of stated uncertainties (published and made-up sequences, random discs,
+extremes), balances of force, torque, flux and volume on solved meshes, and totals by three routes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ringbalance.mesh.chamber import FREE_SURFACE, default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
-from ringbalance.physics.convergence import GridConvergence, GridVerdict, gci
+from ringbalance.physics.convergence import GridVerdict, gci
 from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
@@ -31,7 +31,7 @@ from ringbalance.verification.reference.chambers import exact_moment, exact_tota
 from ringbalance.verification.reference.pressure import tilted_liquid
 
 _FORMAL_ORDER: Final = 2.0
-_LAST_DIGIT: Final = {"order": 0.01, "limit": 0.0001, "error": 0.1, "index": 0.1}
+_LAST_DIGITS: Final = {"order": 0.01, "limit": 0.0001, "error": 0.1, "index": 0.1}
 _CELLS_OF_FIRST: Final = (18000, 8000, 4500)
 _PUBLISHED: Final = (GridVerdict.MONOTONE, GridVerdict.NOT_ASYMPTOTIC, GridVerdict.OSCILLATORY)
 _LIMIT: Final = 1.0
@@ -42,11 +42,11 @@ _QUANTITIES: Final = {
     "moment": "moment",
     "lambda": "moment_per_volume",
 }
-"""Totals of a ring by what the case calls them."""
+"""Totals of a ring by their names in the case."""
 _CHAMBERS: Final = (4, 6, 8, 10)
 _ROUND_OFF: Final = 1e-13
 """Relative errors below this are the exact value's own rounding."""
-_COUNT: Final = 240
+_RANDOM_DISCS: Final = 240
 _SEED: Final = 20
 _WIDTHS: Final = {None: 1.0, "half_widths_quartered": 0.25, "half_widths_padded": 100.0}
 _MUTATIONS: Final[Mapping[str | None, Mapping[str, float]]] = {
@@ -57,8 +57,6 @@ _MUTATIONS: Final[Mapping[str | None, Mapping[str, float]]] = {
 _FEW: Final = Size(points=40, sweep=2, fineness=1.0)
 """Enough for a mutation to show."""
 _WORKERS: Final = 2
-_KEPT: Final = "extremes"
-"""Folder from which an interrupted run resumes."""
 
 
 class _Example(NamedTuple):
@@ -73,36 +71,45 @@ def gci_celik2008(scene: Scene, level: Level, defect: str | None = None) -> Evid
     """Three-mesh grid convergence against the published worked examples."""
     examples = _published_examples()
     power, safety = 2.0 if defect == "sizes_by_count" else 1.0, 1.0 if defect == "safety_dropped" else 1.25
-    found = [
+    results = [
         gci(
-            values=one.values,
-            sizes=[size**power for size in one.sizes],
+            values=example.values,
+            sizes=[size**power for size in example.sizes],
             formal_order=_FORMAL_ORDER,
             safety=safety,
         )
-        for one in examples.values()
+        for example in examples.values()
+    ]
+    printed = [example.printed for example in examples.values()]
+    computed: list[Mapping[str, tuple[float, ...]]] = [
+        {
+            "order": (result.observed_order,),
+            "limit": (result.extrapolated,),
+            "error": (100 * result.approximate_error, 100 * result.extrapolated_error),
+            "index": (100 * result.index,),
+        }
+        for result in results
     ]
     digits = {
         f"{name}_digits": max(
             abs(mine - theirs) / unit
-            for one, result in zip(examples.values(), found, strict=True)
-            for mine, theirs in zip(_as_printed(result)[name], one.printed[name], strict=True)
+            for ours, published in zip(computed, printed, strict=True)
+            for mine, theirs in zip(ours[name], published[name], strict=True)
         )
-        for name, unit in _LAST_DIGIT.items()
+        for name, unit in _LAST_DIGITS.items()
     }
-    wrong = sum(result.verdict is not expected for result, expected in zip(found, _PUBLISHED, strict=True))
-    printed = [one.printed for one in examples.values()]
+    wrong = sum(result.verdict is not expected for result, expected in zip(results, _PUBLISHED, strict=True))
     table = CaseTable(
         name="published examples, printed and found",
         columns={
             "example": list(examples),
-            "p printed": [one["order"][0] for one in printed],
-            "p found": [result.observed_order for result in found],
-            "limit printed": [one["limit"][0] for one in printed],
-            "limit found": [result.extrapolated for result in found],
-            "GCI printed, %": [one["index"][0] for one in printed],
-            "GCI found, %": [100 * result.index for result in found],
-            "verdict": [result.verdict.value for result in found],
+            "p printed": [published["order"][0] for published in printed],
+            "p found": [result.observed_order for result in results],
+            "limit printed": [published["limit"][0] for published in printed],
+            "limit found": [result.extrapolated for result in results],
+            "GCI printed, %": [published["index"][0] for published in printed],
+            "GCI found, %": [100 * result.index for result in results],
+            "verdict": [result.verdict.value for result in results],
         },
     )
     return Evidence(
@@ -115,8 +122,8 @@ def gci_celik2008(scene: Scene, level: Level, defect: str | None = None) -> Evid
 @lru_cache(maxsize=1)
 def _published_examples() -> dict[str, _Example]:
     examples: dict[str, _Example] = {}
-    place = ("gci_celik2008", "data", "celik2008_examples.csv")
-    for row in packaged_rows("ringbalance.verification.cases", *place):
+    path = ("gci_celik2008", "data", "celik2008_examples.csv")
+    for row in packaged_rows("ringbalance.verification.cases", *path):
         number = {key: float(value) for key, value in row.items() if key != "case"}
         r21, r32 = number["r21"], number["r32"]
         if not examples:
@@ -136,18 +143,20 @@ def _published_examples() -> dict[str, _Example]:
     return examples
 
 
-def _as_printed(result: GridConvergence) -> Mapping[str, tuple[float, ...]]:
-    return {
-        "order": (result.observed_order,),
-        "limit": (result.extrapolated,),
-        "error": (100 * result.approximate_error, 100 * result.extrapolated_error),
-        "index": (100 * result.index,),
-    }
-
-
 def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Grid convergence judged on sequences that were made from their limit."""
-    sequences = _made_up_sequences()
+    h = _MESH_SIZES
+    monotone, oscillatory = (GridVerdict.MONOTONE,), (GridVerdict.OSCILLATORY,)
+    # Values on meshes of size 1, 2 and 4, with the verdicts that they allow.
+    sequences: Mapping[str, tuple[FloatArray, tuple[GridVerdict, ...]]] = {
+        "second order": (_LIMIT + 1e-3 * h**2, monotone),
+        "with a fourth-order part": (_LIMIT + 1e-3 * h**2 + 1e-5 * h**4, monotone),
+        "faster than formal": (_LIMIT + 1e-4 * h**4, (GridVerdict.NOT_ASYMPTOTIC,)),
+        "oscillatory": (_LIMIT + 1e-3 * h**2 * np.array([1.0, -1.0, 1.0]), oscillatory),
+        "slow": (_LIMIT + 1e-3 * h**0.6, (GridVerdict.NOT_ASYMPTOTIC, GridVerdict.DIVERGING)),
+        "growing": (_LIMIT + 1e-3 * h**-1.0, (GridVerdict.DIVERGING,)),
+        "round-off": (_LIMIT + np.array([0.0, 4e-16, -4e-16]), (GridVerdict.ROUND_OFF,)),
+    }
     judged = {}
     for name, (values, _) in sequences.items():
         if defect == "signs_ignored":
@@ -183,53 +192,38 @@ def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evid
     )
 
 
-def _made_up_sequences() -> Mapping[str, tuple[FloatArray, tuple[GridVerdict, ...]]]:
-    """Values on meshes of size 1, 2 and 4, with what must be said of them."""
-    h = _MESH_SIZES
-    monotone, oscillatory = (GridVerdict.MONOTONE,), (GridVerdict.OSCILLATORY,)
-    return {
-        "second order": (_LIMIT + 1e-3 * h**2, monotone),
-        "with a fourth-order part": (_LIMIT + 1e-3 * h**2 + 1e-5 * h**4, monotone),
-        "faster than formal": (_LIMIT + 1e-4 * h**4, (GridVerdict.NOT_ASYMPTOTIC,)),
-        "oscillatory": (_LIMIT + 1e-3 * h**2 * np.array([1.0, -1.0, 1.0]), oscillatory),
-        "slow": (_LIMIT + 1e-3 * h**0.6, (GridVerdict.NOT_ASYMPTOTIC, GridVerdict.DIVERGING)),
-        "growing": (_LIMIT + 1e-3 * h**-1.0, (GridVerdict.DIVERGING,)),
-        "round-off": (_LIMIT + np.array([0.0, 4e-16, -4e-16]), (GridVerdict.ROUND_OFF,)),
-    }
-
-
 def coverage(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Do the half-widths hold the truth as often as they say, and are they no wider than they need be?
+    """Coverage and tightness of the half-widths: they hold the truth as often as they say, and are no wider.
 
     Random discs and fills, finite elements against the closed form; the same discs every time.
     """
-    ratios = _error_ratios(_COUNT, _SEED) / _WIDTHS[defect]
-    fared = {name: _how_fared(column) for name, column in zip(_QUANTITIES, ratios.T, strict=True)}
+    ratios = _error_ratios(_RANDOM_DISCS, _SEED) / _WIDTHS[defect]
+    fared = {name: _fared(column) for name, column in zip(_QUANTITIES, ratios.T, strict=True)}
     table = CaseTable(
-        name=f"{_COUNT} random discs, seed {_SEED}",
+        name=f"{_RANDOM_DISCS} random discs, seed {_SEED}",
         columns={
             "quantity": [total.replace("_", " ") for total in _QUANTITIES.values()],
-            "held": [one.share for one in fared.values()],
-            "median error over half-width": [one.tightness for one in fared.values()],
-            "largest error over half-width": [one.worst for one in fared.values()],
-            "not at round-off": [float(one.judged) for one in fared.values()],
+            "held": [each.share for each in fared.values()],
+            "median error over half-width": [each.tightness for each in fared.values()],
+            "largest error over half-width": [each.worst for each in fared.values()],
+            "not at round-off": [float(each.judged) for each in fared.values()],
         },
     )
     return Evidence(
         quantities=as_found(
-            **{f"{name}_share": one.share for name, one in fared.items()},
-            **{f"{name}_tightness": one.tightness for name, one in fared.items()},
+            **{f"{name}_share": each.share for name, each in fared.items()},
+            **{f"{name}_tightness": each.tightness for name, each in fared.items()},
         ),
-        numbers={"samples": float(_COUNT), "worst": max(one.worst for one in fared.values())},
+        numbers={"samples": float(_RANDOM_DISCS), "worst": max(each.worst for each in fared.values())},
         tables=(table,),
     )
 
 
 class _Fared(NamedTuple):
-    """How the half-widths of one quantity fared over all samples."""
+    """Statistics of the half-widths of one quantity over all samples."""
 
     share: float
-    """Of the samples whose half-width holds the exact value."""
+    """Fraction of the samples whose half-width holds the exact value."""
     tightness: float
     """Median of |error| over half-width, samples at round-off left out."""
     judged: int
@@ -238,8 +232,8 @@ class _Fared(NamedTuple):
     """Largest |error| over half-width."""
 
 
-def _how_fared(ratios: FloatArray) -> _Fared:
-    """Args: `ratios`: |error| over half-width; nan where the error is at round-off, and so held."""
+def _fared(ratios: FloatArray) -> _Fared:
+    """Args: `ratios`: |error| over half-width; nan where the error is at round-off, and so within it."""
     judged = ratios[~np.isnan(ratios)]
     share = 1 - float(np.mean(ratios > 1))
     if not judged.size:
@@ -249,35 +243,33 @@ def _how_fared(ratios: FloatArray) -> _Fared:
 
 @lru_cache(maxsize=2)
 def _error_ratios(count: int, seed: int) -> FloatArray:
-    """|error| over half-width on random discs, shape (count, quantities); nan where it is at round-off."""
+    """|error| over half-width on random discs, shape (count, quantities); nan where it is at round-off.
+
+    Discs of all proportions that the program accepts, with fills from thin to the largest.
+    """
     generator = np.random.default_rng(seed)
-    return np.array([_ratios_of_one(generator) for _ in range(count)])
-
-
-def _ratios_of_one(generator: np.random.Generator) -> list[float]:
-    """Of all proportions that the program accepts, with fills from thin to the largest."""
-    disc = _random_disc(generator)
-    density, omega = generator.uniform(700, 6100), float(generator.uniform(80, 6000))
-    x = disc.max_fill_ratio * generator.uniform(0.02, 1.0)
-    ring = ring_quantities(disc=disc, density=density, angular_velocity=omega, fill_ratio=x)
-    if not ring.status.ok:
-        raise RuntimeError(ring.status.text)
-    a = surface_radius(disc=disc, fill_ratio=x)
-    alpha = half_angle(disc=disc, radius=a)
-    exact: dict[str, npt.ArrayLike] = {
-        "liquid_volume": x * chamber_volume(disc=disc),
-        "wall_pressure": exact_wall_pressure(
-            disc=disc, density=density, angular_velocity=omega, fill_ratio=x
-        ),
-        "moment": exact_moment(disc=disc, density=density, fill_ratio=x),
-        "moment_per_volume": density * a * np.sin(alpha) / alpha,
-    }
-    ratios = []
-    for name in _QUANTITIES.values():
-        estimate, true = getattr(ring, name), float(np.asarray(exact[name]))
-        error = abs(float(estimate.value[0]) - true)
-        at_round_off = error <= _ROUND_OFF * abs(true)
-        ratios.append(math.nan if at_round_off else error / float(estimate.uncertainty[0]))
+    ratios = np.full((count, len(_QUANTITIES)), np.nan)
+    for row in ratios:
+        disc = _random_disc(generator)
+        density, omega = generator.uniform(700, 6100), float(generator.uniform(80, 6000))
+        x = disc.max_fill_ratio * generator.uniform(0.02, 1.0)
+        ring = ring_quantities(disc=disc, density=density, angular_velocity=omega, fill_ratio=x)
+        if not ring.status.ok:
+            raise RuntimeError(ring.status.text)
+        a = surface_radius(disc=disc, fill_ratio=x)
+        alpha = half_angle(disc=disc, radius=a)
+        pressure = exact_wall_pressure(disc=disc, density=density, angular_velocity=omega, fill_ratio=x)
+        exact: dict[str, npt.ArrayLike] = {
+            "liquid_volume": x * chamber_volume(disc=disc),
+            "wall_pressure": pressure,
+            "moment": exact_moment(disc=disc, density=density, fill_ratio=x),
+            "moment_per_volume": density * a * np.sin(alpha) / alpha,
+        }
+        for index, name in enumerate(_QUANTITIES.values()):
+            estimate, true = getattr(ring, name), float(np.asarray(exact[name]))
+            error = abs(float(estimate.value[0]) - true)
+            if error > _ROUND_OFF * abs(true):
+                row[index] = error / float(estimate.uncertainty[0])
     return ratios
 
 
@@ -306,7 +298,7 @@ def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         scene,
         size=SIZES[level] if defect is None else _FEW,
         workers=_WORKERS,
-        folder=cache_folder() / _KEPT if level == "heavy" and defect is None else None,
+        folder=cache_folder() / "extremes" if level == "heavy" and defect is None else None,
         mutation=_MUTATIONS[defect],
     )
     document, named = result.to_dict(), (Ending.SOLVED, Ending.WIDE, Ending.STATUS, Ending.REFUSED)
@@ -324,21 +316,27 @@ def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-_FILL_SHARE: Final = 0.8
+_FILL_OF_MAX: Final = 0.8
 
 
 def conservation(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Balances on meshes with a free surface found under gravity."""
-    fill = _FILL_SHARE * scene.disc.max_fill_ratio
+    """Balances on meshes with a free surface located under gravity."""
+    fill = _FILL_OF_MAX * scene.disc.max_fill_ratio
     radial, angular = default_cells(disc=scene.disc)
     balances = [_section_balance(scene, fill, (radial // k, angular // k), defect) for k in (4, 2, 1)]
-    drawn = float(ring_of(scene, (fill,)).liquid_volume.value[0])
-    found = {
-        **{name: max(balance[name] for balance in balances) for name in balances[0]},
-        "weight_balance": _weight_balance(scene, fill, (radial // 2, angular // 2, 4)),
-        "volume_drawn": abs(drawn / (fill * chamber_volume(disc=scene.disc)) - 1),
-    }
-    return Evidence(quantities=as_found(**found))
+    volume = float(ring_of(scene, (fill,)).liquid_volume.value[0])
+    liquid = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="vertical")
+    solution = _solved(scene, liquid, fill, (radial // 2, angular // 2, 4))
+    loads = liquid_integrals(solution=solution, density=liquid.density, axial_width=scene.disc.axial_width)
+    weight = liquid.density * loads.volume * liquid.gravity[2]
+    axial: FloatArray = np.array([force[2] for force in loads.force.values()])
+    return Evidence(
+        quantities=as_found(
+            **{name: max(balance[name] for balance in balances) for name in balances[0]},
+            weight_balance=abs(float(axial.sum()) / weight - 1),
+            volume_drawn=abs(volume / (fill * chamber_volume(disc=scene.disc)) - 1),
+        )
+    )
 
 
 def _section_balance(
@@ -357,10 +355,19 @@ def _section_balance(
     turning = moment[0] * gravity[1] - moment[1] * gravity[0]
     size = float(np.linalg.norm(body))
     torque = sum(loads.torque.values()) - turning
+    # Flux out through the surface plus flux through the walls, less the source.
+    unit = solution.chamber.length_scale
+    source = unit * float(solution.basis.dx.sum()) * 2 * true.density * true.angular_velocity**2
+    surface = solution.side(FREE_SURFACE)
+    flux = float(np.sum(surface.weights * solution.surface_flux(surface)))
+    for name in solution.chamber.mesh.boundaries:
+        if name != FREE_SURFACE:
+            wall = solution.side(name)
+            flux += float(np.sum(true.body_force(unit * wall.points) * wall.area))
     return {
         "force_balance": float(np.linalg.norm(sum(forces.values()) - body)) / size,
         "torque_balance": abs(float(torque)) / (size * scene.disc.outer_radius),
-        "flux_balance": _flux_residual(solution, true),
+        "flux_balance": abs(flux / source - 1),
         "volume_found": abs(solution.statistics.extra["volume_error"]),
     }
 
@@ -372,29 +379,7 @@ def _solved(scene: Scene, liquid: RotatingLiquid, fill: float, cells: tuple[int,
     return solution
 
 
-def _flux_residual(solution: PressureSolution, liquid: RotatingLiquid) -> float:
-    """Flux out through the surface plus flux through the walls, less the source, relative to the source."""
-    unit = solution.chamber.length_scale
-    source = unit * float(solution.basis.dx.sum()) * 2 * liquid.density * liquid.angular_velocity**2
-    surface = solution.side(FREE_SURFACE)
-    total = float(np.sum(surface.weights * solution.surface_flux(surface)))
-    for name in solution.chamber.mesh.boundaries:
-        if name != FREE_SURFACE:
-            wall = solution.side(name)
-            total += float(np.sum(liquid.body_force(unit * wall.points) * wall.area))
-    return abs(total / source - 1)
-
-
-def _weight_balance(scene: Scene, fill: float, cells: tuple[int, ...]) -> float:
-    liquid = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="vertical")
-    solution = _solved(scene, liquid, fill, cells)
-    loads = liquid_integrals(solution=solution, density=liquid.density, axial_width=scene.disc.axial_width)
-    weight = liquid.density * loads.volume * liquid.gravity[2]
-    axial: FloatArray = np.array([force[2] for force in loads.force.values()])
-    return abs(float(axial.sum()) / weight - 1)
-
-
-_SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
+_UNITS: Final = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
 
 def independent_routes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -402,19 +387,19 @@ def independent_routes(scene: Scene, level: Level, defect: str | None = None) ->
     exact = exact_totals(scene)
     exact["volume"] *= scene.disc.max_fill_ratio
     rings = {dimension: _ring(scene, dimension, defect) for dimension in (2, 3)}
-    found = {
+    quantities = {
         f"{short}_{d}d": found_of(ring, name, 0).against(exact[short])
         for d, ring in rings.items()
-        for name in _SCALARS
+        for name in _UNITS
         for short in [name.removeprefix("liquid_")]
     }
     centre = found_of(_ring(scene, 2, defect, share=0.5), "moment_per_volume", 0)
-    found["lambda_2d"] = centre.scaled(2 / scene.liquid.density).against(exact["lambda"])
-    moment = found["moment_2d"]
+    quantities["lambda_2d"] = centre.scaled(2 / scene.liquid.density).against(exact["lambda"])
+    moment = quantities["moment_2d"]
     return Evidence(
-        quantities=found,
+        quantities=quantities,
         numbers={"moment_share": abs(moment.value - exact["moment"]) / (2 * moment.numerical)},
-        convergence=tuple(mesh_table(rings[2], name, unit, 0) for name, unit in _SCALARS.items()),
+        convergence=tuple(mesh_table(rings[2], name, unit, 0) for name, unit in _UNITS.items()),
         status=rings[2].status,
     )
 

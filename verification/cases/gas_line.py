@@ -34,24 +34,23 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Series,
     as_found,
     figure,
 )
 
 _GRIDS: Final = ((30, 45, 4), (60, 90, 8))
 """Radial and angular cells, and of an imported cell Gauss points along each direction; coarse and fine."""
-_ANGLES: Final = np.linspace(0.0, np.pi, 181)
-"""Of the shaft; the chamber is symmetric about its centre line."""
+_ANGLES_RAD: Final = np.linspace(0.0, np.pi, 181)
+"""Angles of the shaft; the chamber is symmetric about its centre line."""
 _HOLE: Final = "gas_hole"
 """Boundary of an imported chamber that is the mouth of its gas line."""
 _JUDGED: Final = ("stopped", "running", "any_speed")
 _OFFSETS: Final = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
 """g/omega^2 in units of R2: from a centred ring to almost a plane."""
 _FILE: Final = Path(__file__).parent / "gas_tube" / "data" / "scene.toml"
-_RADIUS, _TIP = 2e-3, 31e-3
-"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
-_DEEP: Final = 0.8
+_TUBE_RADIUS_M, _MOUTH_RADIUS_M = 2e-3, 31e-3
+"""Outer radius of the tube, and radius of its mouth, as tools/example_chambers.py draws them."""
+_DEEP_FILL: Final = 0.8
 """Fill ratio at which part of the tube is under the surface."""
 
 
@@ -59,16 +58,16 @@ _DEEP: Final = 0.8
 class _Cells:
     """The chamber cut into small cells."""
 
-    place: ComplexArray
-    """Their middles, m, centre line along the real axis."""
+    middle: ComplexArray
+    """Middles of the cells, m, centre line along the real axis."""
     share: FloatArray
-    """Of the chamber's area."""
+    """Fraction of the chamber's area in each cell."""
     width: FloatArray
     """Distance over which the surface passes a cell, m."""
 
 
 def gas_hole_ends(scene: Scene) -> Evidence:
-    """On the coarse grid."""
+    """Margins on the coarse grid."""
     disc, angles = scene.disc, _angles(scene.disc)
     cells = _cells(disc, *_GRIDS[0])
     safe = _safe_fills(scene, cells, _hole(disc, _safest_radius(disc, cells, angles)), angles)
@@ -85,12 +84,23 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
         raise NotRunError("the claim is about a horizontal shaft under gravity")
     disc = scene.disc
-    angles = _ANGLES[:1] if defect == "upright_only" else _angles(disc)
+    angles = _ANGLES_RAD[:1] if defect == "upright_only" else _angles(disc)
     coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
     best = _safest_radius(disc, fine, angles)
     hole = _hole(disc, best)
     rough, safe = (_safe_fills(scene, cells, hole, angles) for cells in (coarse, fine))
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
+    radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
+    points, all_angles = [_on_centre_line(r) for r in radius], _angles(disc)
+    rest = np.array([_safe_at_rest(fine, point, all_angles[::4]) for point in points])
+    running = np.array([_safe_turning(fine, point, _offset(scene), all_angles[::30]) for point in points])
+    over_radius = figure(
+        "largest fill that leaves the gas hole dry",
+        ("radius of the hole on the centre line", "m", radius),
+        Curve("running", "1", running),
+        Curve("stopped, worst angle", "1", rest),
+        Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
+    )
     return Evidence(
         quantities={
             f"margin_{state}": Found.within(
@@ -108,13 +118,13 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "safe_at_ring": _safe_at_rest(fine, _on_centre_line(ring), angles),
             "between_margin": safe["turning"] - safe["stopped"],
         },
-        series=(_over_radius(scene, fine),),
+        series=(over_radius,),
     )
 
 
 def _angles(disc: Disc) -> FloatArray:
-    """Of the shaft: an imported chamber need not be symmetric."""
-    return _ANGLES if disc.geometry is None else np.linspace(-np.pi, np.pi, _ANGLES.size)
+    """Angles of the shaft, rad: an imported chamber need not be symmetric."""
+    return _ANGLES_RAD if disc.geometry is None else np.linspace(-np.pi, np.pi, _ANGLES_RAD.size)
 
 
 def _hole(disc: Disc, best: float) -> ComplexArray:
@@ -122,8 +132,8 @@ def _hole(disc: Disc, best: float) -> ComplexArray:
     facets = {} if disc.geometry is None else disc.geometry.boundaries
     if disc.geometry is None or _HOLE not in facets:
         return _on_centre_line(best)
-    places = disc.geometry.points[np.unique(facets[_HOLE])]
-    return np.asarray(np.unique(np.round(places[:, 0] + 1j * places[:, 1], 6)), dtype=np.complex128)
+    points = disc.geometry.points[np.unique(facets[_HOLE])]
+    return np.asarray(np.unique(np.round(points[:, 0] + 1j * points[:, 1], 6)), dtype=np.complex128)
 
 
 def _on_centre_line(radius: float) -> ComplexArray:
@@ -154,33 +164,13 @@ def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
     alpha = half_angle(disc=disc, radius=radius)
     angle = np.outer(alpha, 2 * (np.arange(angular) + 0.5) / angular - 1)
     area = np.broadcast_to((radius * 2 * alpha * depth / (radial * angular))[:, None], angle.shape).ravel()
-    place = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128).ravel()
-    return _Cells(place=place, share=area / area.sum(), width=np.sqrt(area))
+    middle = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128).ravel()
+    return _Cells(middle=middle, share=area / area.sum(), width=np.sqrt(area))
 
 
 def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points: int) -> _Cells:
-    """What lies in each column along the shaft, at the middle of it."""
-    places, volumes = _columns(geometry, points)
-    place, volume = places.ravel(), volumes.ravel()
-    parts = []
-    for value, count in ((np.abs(place), radial), (np.angle(place), angular)):
-        step = np.ptp(value) / count
-        parts.append((np.minimum(((value - value.min()) / step).astype(np.int64), count - 1), step))
-    (ring, depth), (ray, angle) = parts
-    cell, size = ring * angular + ray, radial * angular
-    share = np.bincount(cell, volume, size)
-    sums = np.bincount(cell, volume * place.real, size) + 1j * np.bincount(cell, volume * place.imag, size)
-    filled = share > 0
-    middle = np.asarray(sums[filled] / share[filled], dtype=np.complex128)
-    return _Cells(
-        place=middle,
-        share=share[filled] / share.sum(),
-        width=np.sqrt(depth * angle * np.abs(middle)),
-    )
-
-
-def _columns(geometry: ChamberGeometry, points: int) -> tuple[ComplexArray, FloatArray]:
-    """Gauss points of all cells across the shaft, m, and the volume at each, m^3."""
+    """Cells that hold what lies in each column along the shaft, at the middle of it."""
+    # Gauss points of all cells across the shaft, m, and the volume at each, m^3.
     body = tetrahedra(geometry)
     line, weights = gauss(points)
     u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [line], indexing="ij"))
@@ -189,33 +179,49 @@ def _columns(geometry: ChamberGeometry, points: int) -> tuple[ComplexArray, Floa
     second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
     local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
     corners = body.nodes[body.cells]
-    volume = np.linalg.det(derivatives(corners, local)) * weight * (1 - v) * (1 - w) ** 2
-    places = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
-    return np.asarray(places[..., 0] + 1j * places[..., 1]), np.asarray(volume)
+    jacobians = np.linalg.det(derivatives(corners, local))
+    volume = np.asarray(jacobians * weight * (1 - v) * (1 - w) ** 2).ravel()
+    across = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
+    point = np.asarray(across[..., 0] + 1j * across[..., 1]).ravel()
+    parts = []
+    for value, count in ((np.abs(point), radial), (np.angle(point), angular)):
+        step = np.ptp(value) / count
+        parts.append((np.minimum(((value - value.min()) / step).astype(np.int64), count - 1), step))
+    (ring, depth), (ray, angle) = parts
+    cell, size = ring * angular + ray, radial * angular
+    share = np.bincount(cell, volume, size)
+    sums = np.bincount(cell, volume * point.real, size) + 1j * np.bincount(cell, volume * point.imag, size)
+    filled = share > 0
+    middle = np.asarray(sums[filled] / share[filled], dtype=np.complex128)
+    return _Cells(
+        middle=middle,
+        share=share[filled] / share.sum(),
+        width=np.sqrt(depth * angle * np.abs(middle)),
+    )
 
 
 def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:
-    """Share of the chamber below a level; height = distance of each cell beyond it, shape (states, cells)."""
+    """Fraction of the chamber below a level. Args: `height`: of the cells above it, (states, cells)."""
     inside = np.clip(0.5 + height / cells.width, 0.0, 1.0)
     return np.asarray(inside @ cells.share, dtype=np.float64)
 
 
 def _safe_at_rest(cells: _Cells, hole: ComplexArray, angles: FloatArray) -> float:
-    """Smallest share below the level through a point of the hole, over directions of gravity."""
+    """Smallest fraction below the level through a point of the hole, over directions of gravity."""
     down = np.exp(1j * angles)[:, None]
-    place = np.real(cells.place * np.conj(down))
+    depth = np.real(cells.middle * np.conj(down))
     # The lowest point is reached first.
     level = np.real(hole * np.conj(down)).max(axis=1, keepdims=True)
-    return float(_liquid_share(cells, place - level).min())
+    return float(_liquid_share(cells, depth - level).min())
 
 
 def _safe_turning(cells: _Cells, hole: ComplexArray, offsets: FloatArray, angles: FloatArray) -> float:
-    """The same with the surface a circle about -g/omega^2."""
+    """Smallest fraction below a surface through the hole that is a circle about -g/omega^2."""
     shares = []
     for offset in offsets:
         centre = -offset * np.exp(1j * angles)[:, None]
         level = np.abs(hole - centre).max(axis=1, keepdims=True)
-        shares.append(_liquid_share(cells, np.abs(cells.place - centre) - level).min())
+        shares.append(_liquid_share(cells, np.abs(cells.middle - centre) - level).min())
     return float(min(shares))
 
 
@@ -233,39 +239,30 @@ def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
     return float(result.x)
 
 
-def _over_radius(scene: Scene, cells: _Cells) -> Series:
-    disc = scene.disc
-    radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
-    points, angles = [_on_centre_line(r) for r in radius], _angles(disc)
-    rest = np.array([_safe_at_rest(cells, point, angles[::4]) for point in points])
-    running = np.array([_safe_turning(cells, point, _offset(scene), angles[::30]) for point in points])
-    return figure(
-        "largest fill that leaves the gas hole dry",
-        ("radius of the hole on the centre line", "m", radius),
-        Curve("running", "1", running),
-        Curve("stopped, worst angle", "1", rest),
-        Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
-    )
-
-
 def _outside(scene: Scene, radius: float, a: float) -> FloatArray:
-    """Of the sector between plates less a cylinder of a radius along x, outside a surface at a: volume, m^3,
-    moment along x, kg m, and lambda, twice the mean of x over the surface, m.
+    """Totals of the sector between plates less a cylinder of a radius along x, outside a surface at a.
 
-    By quadrature over y = radius sin(angle), which takes the root at the cylinder's sides away; no mesh.
+    Volume, m^3, moment along x, kg m, and lambda, twice the mean of x over the surface, m. By quadrature over
+    y = radius sin(angle), which takes the root at the cylinder's sides away; no mesh.
     """
     disc, alpha = scene.disc, float(half_angle(disc=scene.disc, radius=a))
 
     def tube(angle: float) -> FloatArray:
         surface = math.sqrt(a * a - (radius * math.sin(angle)) ** 2)
-        parts = [_TIP - surface, (_TIP**2 - surface**2) / 2, a / surface, a]
-        return 2 * (radius * math.cos(angle)) ** 2 * np.array(parts) * (surface < _TIP)
+        parts = [
+            _MOUTH_RADIUS_M - surface,
+            (_MOUTH_RADIUS_M**2 - surface**2) / 2,
+            a / surface,
+            a,
+        ]
+        return 2 * (radius * math.cos(angle)) ** 2 * np.array(parts) * (surface < _MOUTH_RADIUS_M)
 
     arc = 2 * a * np.array([alpha, a * math.sin(alpha)])
     areas = [liquid_area(disc=disc, surface_radius=a), liquid_first_moment(disc=disc, surface_radius=a)]
     sector = disc.axial_width * np.array([*areas, *arc])
-    volume, first, area, along = sector - quad_vec(tube, -math.pi / 2, math.pi / 2, epsrel=1e-12)[0]
-    return np.array([volume, scene.liquid.density * first, 2 * along / area])
+    totals = sector - quad_vec(tube, -math.pi / 2, math.pi / 2, epsrel=1e-12)[0]
+    volume, moment_area, surface_area, surface_moment = totals
+    return np.array([volume, scene.liquid.density * moment_area, 2 * surface_moment / surface_area])
 
 
 def _exact(scene: Scene, radius: float, fills: FloatArray) -> dict[str, float]:
@@ -291,7 +288,7 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if defect == "drawn_too_wide":
         meshed = with_value(scene=meshed, quantity="axial_width", value=1.001 * meshed.disc.axial_width)
     largest = scene.disc.max_fill_ratio
-    fills = np.array([largest / 2, largest, _DEEP])
+    fills = np.array([largest / 2, largest, _DEEP_FILL])
     _, moment, ratio = chamber_closed_forms(scene=meshed, fill_ratio=fills)
     shares = drawing_shares(meshed.disc, fills)
     values = {
@@ -300,7 +297,7 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "moment_deep": (moment[2], shares.moment[2]),
         "lever": (ratio[0], shares.moment[0]),
     }
-    bare, exact = (_exact(scene, radius, fills) for radius in (0.0, _RADIUS))
+    bare, exact = (_exact(scene, radius, fills) for radius in (0.0, _TUBE_RADIUS_M))
     hole = gas_hole(with_tube, level).numbers
     return Evidence(
         quantities={
@@ -309,8 +306,8 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         numbers={
             **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
-            "thickness": 2 * _RADIUS,
-            "tip": _TIP,
+            "thickness": 2 * _TUBE_RADIUS_M,
+            "tip": _MOUTH_RADIUS_M,
             "ring_radius": surface_radius(disc=scene.disc, fill_ratio=largest),
             "safe_stopped": hole["safe_stopped"],
             "safe_running": hole["safe_running"],

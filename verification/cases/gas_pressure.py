@@ -1,4 +1,4 @@
-"""Claims on what the gas pressure achieves: the least that starts a flow, how far a denser liquid goes."""
+"""Claims on the gas pressure: the least that starts a flow, and the reach with a denser liquid."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Series,
     as_found,
     figure,
 )
@@ -28,11 +27,11 @@ from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.papers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
 from ringbalance.verification.reference.chambers import exact_moment, wall_pressure_of
 
-_POINTS: Final = 101
-_STANDARD: Final = 1e-6
-"""Standard uncertainty of a gain: the fill at which the flow ends is found to a millionth of the largest."""
+_SCAN_POINTS: Final = 101
+_GAIN_STANDARD_UNCERTAINTY: Final = 1e-6
+"""The fill at which the flow ends is located to a millionth of the largest."""
 _REFINEMENTS: Final = 3
-"""Each finds the fill at which the flow ends a hundred times more closely; a figure needs one less."""
+"""Scans for the fill at which the flow ends, each a hundred times finer; a figure needs one less."""
 
 
 def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -83,22 +82,37 @@ def denser_liquid_ends(scene: Scene) -> Evidence:
 
 
 def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """What the same gas pressure achieves with a liquid of twice the density."""
+    """Gain in ability at one gas pressure with a liquid of twice the density."""
     light, full = scene.liquid.density, scene.disc.max_fill_ratio
-    felt = light if defect == "weightless" else 2 * light
+    dense = light if defect == "weightless" else 2 * light
     # What the gas has to overcome when the driven chamber is empty: the wall pressure of a full opposite one.
-    stalls = [found_of(ring_of(scene, (full,), density=d), "wall_pressure", 0).value for d in (light, felt)]
-    laws = [_law(scene, density) for density in (light, felt)]
+    stalls = [found_of(ring_of(scene, (full,), density=d), "wall_pressure", 0).value for d in (light, dense)]
+    laws = [_law(scene, density) for density in (light, dense)]
     reach = [_reach(law, scene.gas.pressure) for law in laws]
     raised = _gain(scene, laws, raised=2 if defect is None else 1)
     usable = [
-        min(own, full - residual_fill_ratio(scene, law=law)) for law, own in zip(laws, reach, strict=True)
+        min(reached, full - residual_fill_ratio(scene, law=law))
+        for law, reached in zip(laws, reach, strict=True)
     ]
+    pressure = np.linspace(0.02, 2.5, 60) * wall_pressure_of(scene, full)
+    refinements = _REFINEMENTS - 1
+    abilities = [
+        np.array([_ability(scene, density, _reach(law, float(p), refinements=refinements)) for p in pressure])
+        for law, density in zip(laws, (light, 2 * light), strict=True)
+    ]
+    shown = figure(
+        "ability of a pair against the gas pressure, by the calibrated law",
+        ("gas pressure", "Pa", pressure),
+        Curve("the scene's liquid", "kg m", abilities[0]),
+        Curve("twice as dense", "kg m", abilities[1]),
+    )
     return Evidence(
         # Twice the density, twice the ability.
         quantities={
-            "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised).against(2.0),
-            "gain_raised": Found(value=raised, numerical=_STANDARD).against(2.0),
+            "gain": Found(
+                value=_gain(scene, laws), numerical=_GAIN_STANDARD_UNCERTAINTY, corrected=raised
+            ).against(2.0),
+            "gain_raised": Found(value=raised, numerical=_GAIN_STANDARD_UNCERTAINTY).against(2.0),
         },
         numbers={
             "stall_light": stalls[0],
@@ -112,31 +126,31 @@ def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evid
             "gain_vapour": _gain(scene, [laws[0], _law(scene, 2 * light, degassed=True)], full=True),
             "push": scene.gas.ambient_pressure - scene.liquid.vapour_pressure,
             "prime_light": _priming(scene, light),
-            "prime_dense": _priming(scene, felt),
+            "prime_dense": _priming(scene, dense),
         },
-        series=(_over_gas_pressure(scene, laws),),
+        series=(shown,),
     )
 
 
 def _gain(scene: Scene, laws: Sequence[FlowLaw], *, raised: int = 1, full: bool = False) -> float:
     """Ability on hand with the second law's liquid of twice the density, over that with the first law's.
 
-    Args: `raised`: factor of the gas pressure under the second law. `full`: whether its tube stays full.
+    Args: `raised`: factor of the gas pressure under the second law. `full`: True if its tube stays full.
     Raises: NotRunError: the gas does not start the flow of the scene's own liquid.
     """
     gas, light = scene.gas.pressure, scene.liquid.density
-    own = _reach(laws[0], gas)
-    if own <= scene.disc.max_fill_ratio / 2:
+    reach = _reach(laws[0], gas)
+    if reach <= scene.disc.max_fill_ratio / 2:
         raise NotRunError(
             "the gas pressure of this scene does not start the flow from equal fills at every radius that "
             "the siphon crest may have"
         )
     dense = _reach(laws[1], raised * gas, full=full)
-    return _ability(scene, 2 * light, dense) / _ability(scene, light, own)
+    return _ability(scene, 2 * light, dense) / _ability(scene, light, reach)
 
 
 def _law(scene: Scene, density: float, *, degassed: bool = False) -> FlowLaw:
-    """Args: `degassed`: whether the liquid holds no gas, so that its cavity is at vapour pressure."""
+    """Args: `degassed`: True if the liquid holds no gas, so that its cavity is at vapour pressure."""
     liquid = dataclasses.replace(scene.liquid, density=density)
     if degassed:
         liquid = dataclasses.replace(liquid, dissolved_gas="none")
@@ -151,7 +165,7 @@ def _reach(
     start = law.evaluate(fill_ratio=largest / 2, gas_pressure=gas_pressure, primed=full)
     low, high = 0.0, largest / 2
     for _ in range(refinements):
-        fill = np.linspace(high, low, _POINTS)
+        fill = np.linspace(high, low, _SCAN_POINTS)
         flow = law.evaluate(fill_ratio=fill, gas_pressure=gas_pressure, primed=full or bool(start.primed))
         stopped = np.flatnonzero(flow.velocity <= 0)
         if not stopped.size:
@@ -175,19 +189,3 @@ def _priming(scene: Scene, density: float) -> float:
         return 0.0
     level = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
     return max(density * omega**2 * (level**2 - crest**2) / 2, 0.0)
-
-
-def _over_gas_pressure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:
-    pressure = np.linspace(0.02, 2.5, 60) * wall_pressure_of(scene, scene.disc.max_fill_ratio)
-    light, dense = (
-        np.array(
-            [_ability(scene, density, _reach(law, float(p), refinements=_REFINEMENTS - 1)) for p in pressure]
-        )
-        for law, density in zip(laws, (scene.liquid.density, 2 * scene.liquid.density), strict=True)
-    )
-    return figure(
-        "ability of a pair against the gas pressure, by the calibrated law",
-        ("gas pressure", "Pa", pressure),
-        Curve("the scene's liquid", "kg m", light),
-        Curve("twice as dense", "kg m", dense),
-    )

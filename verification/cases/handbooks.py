@@ -1,7 +1,7 @@
 """k of the tube by the library `fluids` alone: what a designer without this program would add up.
 
-k = f L/d + K_entrance + sum of K_bend + extra + (K_exit - 1), each part by every method of `fluids` that
-holds there, the tube at rest. The library knows no rotation, and no laminar loss of an entrance or a bend.
+k = f L/d + K_entrance + sum of K_bend + extra + (K_exit - 1), each part by every method of `fluids` in its
+range, the tube at rest. The library knows no rotation, and no laminar loss of an entrance or a bend.
 
 A method's range is what its source claims. It is held to that by rules that stood before the numbers:
 
@@ -54,12 +54,11 @@ from ringbalance.verification.evidence import (
     from_range,
 )
 
-_JUDGED_FROM: Final = 1e4
-"""Re."""
-_TURBULENT: Final = 4000.0
-_COLEBROOK: Final = 0.05
-"""Largest departure from it, relative."""
-_EDGES: Final = (0.0, 0.05)
+_JUDGED_FROM_RE: Final = 1e4
+_TURBULENT_FROM_RE: Final = 4000.0
+_MAX_FROM_COLEBROOK: Final = 0.05
+"""Largest relative departure from Colebrook's equation."""
+_EDGES_OF_BORE: Final = (0.0, 0.05)
 """Thickness of the wall over the bore."""
 _BENDS: Final[Mapping[str, tuple[float, float, float, float, float]]] = {
     "Rennels": (0.0, 0.0, 180.0, 0.5, math.inf),
@@ -68,19 +67,19 @@ _BENDS: Final[Mapping[str, tuple[float, float, float, float, float]]] = {
     "Swamee": (0.0, 0.0, 180.0, 1.0, math.inf),
 }
 """Smallest Re, angles in degrees from and to, r/d from and to; those of Crane's are for steel pipes alone."""
-_OWN: Final = {
+_PROGRAM_METHODS: Final = {
     "friction": ("Churchill_1977",),
     "bends": ("Rennels",),
     "entrance": ("Rennels", "Crane, any edge"),
 }
-"""What the program calculates with itself."""
+"""Methods that the program itself calculates with."""
 _CAUSES: Final[Mapping[str, tuple[str, ...]]] = {"friction": ("friction correlation",), "bends": ("bends",)}
-"""Of `model_parts`, by part of k."""
-_SHOWN: Final = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-"""m/s."""
-_POINTS: Final = 33
+"""Keys of `model_parts`, by part of k."""
+_SHOWN_VELOCITIES: Final = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+"""Velocities of the table, m/s."""
+_CURVE_POINTS: Final = 33
 Parts = dict[str, dict[str, float]]
-"""What each method makes of each part of k, by part and method."""
+"""Parts of k by every method, by part and method."""
 
 
 def by_fluids(tube: Tube, reynolds: float, *, without: frozenset[str] = frozenset()) -> Parts:
@@ -89,35 +88,53 @@ def by_fluids(tube: Tube, reynolds: float, *, without: frozenset[str] = frozense
     Args: `without`: methods for friction that depart from Colebrook's equation.
     Raises: ValueError: arcs longer than the tube.
     """
-    rough = tube.roughness / tube.bore
+    rough, bore = tube.roughness / tube.bore, tube.bore
+    slenderness = straight_length(tube=tube) / bore
     friction = {
-        name: straight_length(tube=tube) / tube.bore * friction_factor(reynolds, rough, Method=name)
+        name: slenderness * friction_factor(reynolds, rough, Method=name)
         for name in friction_factor_methods(reynolds, rough)
         if name not in without and name != "laminar"
     }
     if not friction:
-        friction = {"laminar": straight_length(tube=tube) / tube.bore * friction_factor(reynolds, rough)}
-    bends = {
-        name: float(sum(_bend(tube, bend, reynolds, name) for bend in tube.bends))
-        for name in fittings.bend_rounded_methods
-        if all(_bend_holds(tube, bend, reynolds, name) for bend in tube.bends)
-    }
+        friction = {"laminar": slenderness * friction_factor(reynolds, rough)}
+    bends = {}
+    for name in fittings.bend_rounded_methods:
+        if all(_bend_holds(tube, bend, reynolds, name) for bend in tube.bends):
+            losses = (
+                fittings.bend_rounded(
+                    Di=bore,
+                    angle=math.degrees(bend.angle),
+                    rc=bend.radius,
+                    Re=reynolds,
+                    roughness=tube.roughness,
+                    method=name,
+                )
+                for bend in tube.bends
+            )
+            bends[name] = float(sum(losses))
+    if tube.entrance == "sharp":
+        entrance = {name: fittings.entrance_sharp(method=name) for name in fittings.entrance_sharp_methods}
+    elif tube.entrance == "rounded":
+        entrance = {
+            name: fittings.entrance_rounded(bore, tube.entrance_radius, method=name)
+            for name in fittings.entrance_rounded_methods
+        }
+    else:
+        entrance = {
+            f"{name}, edge {edge:g} d": fittings.entrance_distance(bore, edge * bore, method=name)
+            for name in fittings.entrance_distance_methods
+            for edge in _EDGES_OF_BORE
+            if name != "Crane"
+        }
+        entrance["Crane, any edge"] = fittings.entrance_distance(bore, method="Crane")
     # The "+1" of k + 1 is the exit of turbulent flow.
     return {
         "friction": friction,
         "bends": bends,
-        "entrance": _entrances(tube),
+        "entrance": entrance,
         "exit": {"normal": fittings.exit_normal() - 1},
         "extra": {"scene": tube.extra_loss},
     }
-
-
-def _bend(tube: Tube, bend: Bend, reynolds: float, method: str) -> float:
-    angle = math.degrees(bend.angle)
-    k: float = fittings.bend_rounded(
-        Di=tube.bore, angle=angle, rc=bend.radius, Re=reynolds, roughness=tube.roughness, method=method
-    )
-    return k
 
 
 def _bend_holds(tube: Tube, bend: Bend, reynolds: float, method: str) -> bool:
@@ -128,72 +145,48 @@ def _bend_holds(tube: Tube, bend: Bend, reynolds: float, method: str) -> bool:
     return reynolds >= least and first <= angle <= last and tightest <= radius <= widest
 
 
-def _entrances(tube: Tube) -> dict[str, float]:
-    bore = tube.bore
-    if tube.entrance == "sharp":
-        return {name: fittings.entrance_sharp(method=name) for name in fittings.entrance_sharp_methods}
-    if tube.entrance == "rounded":
-        radius = tube.entrance_radius
-        return {
-            name: fittings.entrance_rounded(bore, radius, method=name)
-            for name in fittings.entrance_rounded_methods
-        }
-    thick = {
-        f"{name}, edge {edge:g} d": fittings.entrance_distance(bore, edge * bore, method=name)
-        for name in fittings.entrance_distance_methods
-        for edge in _EDGES
-        if name != "Crane"
-    }
-    return {**thick, "Crane, any edge": fittings.entrance_distance(bore, method="Crane")}
-
-
-def _departs(tube: Tube, reynolds: FloatArray) -> dict[str, float]:
-    """Methods for friction that leave Colebrook's equation in the range they state, and how far at worst."""
-    rough, worst = tube.roughness / tube.bore, dict[str, float]()
-    for re in map(float, reynolds[reynolds >= _TURBULENT]):
-        exact = friction_factor(re, rough, Method="Clamond")
-        for name in friction_factor_methods(re, rough):
-            away = abs(friction_factor(re, rough, Method=name) / exact - 1)
-            worst[name] = max(away, worst.get(name, 0.0))
-    return {name: away for name, away in worst.items() if away > _COLEBROOK}
-
-
 def _range(parts: Parts, *names: str, others: bool = False) -> tuple[float, float]:
-    """Smallest and largest sum of some parts. Args: `others`: without what the program calculates with."""
+    """Smallest and largest sum of some parts. Args: `others`: True without the program's own methods."""
     ends = np.zeros(2)
     for part in names or parts:
-        known = parts[part]
-        kept = [k for name, k in known.items() if not others or name not in _OWN.get(part, ())]
-        ends += (min(kept), max(kept))
+        excluded = _PROGRAM_METHODS.get(part, ()) if others else ()
+        values = [k for name, k in parts[part].items() if name not in excluded]
+        ends += (min(values), max(values))
     return float(ends[0]), float(ends[1])
 
 
 def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """k by `fluids` alone beside the program's, at rest and turning."""
+    """k by `fluids` alone and by the program, at rest and turning."""
     tube = replace(scene.tube, drag_coefficient=None)
     per_velocity = tube.bore / scene.liquid.kinematic_viscosity
-    slowest = max(VELOCITIES[0], _JUDGED_FROM / per_velocity * (1 + 1e-9))
+    slowest = max(VELOCITIES[0], _JUDGED_FROM_RE / per_velocity * (1 + 1e-9))
     if slowest >= VELOCITIES[1]:
         raise NotRunError(
-            f"up to {VELOCITIES[1]:g} m/s this tube stays below Re = {_JUDGED_FROM:,.0f}, "
+            f"up to {VELOCITIES[1]:g} m/s this tube stays below Re = {_JUDGED_FROM_RE:,.0f}, "
             "from which on methods of fluids for bends hold"
         )
-    if not all(_bend_holds(tube, bend, _JUDGED_FROM, "Miller") for bend in tube.bends):
+    if not all(_bend_holds(tube, bend, _JUDGED_FROM_RE, "Miller") for bend in tube.bends):
         raise NotRunError("a bend lies outside 10 to 180 degrees or 0.5 to 10 bores, where methods hold")
-    velocity = np.geomspace(slowest, VELOCITIES[1], _POINTS)
-    departs = _departs(tube, velocity * per_velocity)
+    reynolds = np.geomspace(slowest, VELOCITIES[1], _CURVE_POINTS) * per_velocity
+    # Methods for friction that leave Colebrook's equation in the range they state, and how far at worst.
+    rough, worst = tube.roughness / tube.bore, dict[str, float]()
+    for re in map(float, reynolds[reynolds >= _TURBULENT_FROM_RE]):
+        exact = friction_factor(re, rough, Method="Clamond")
+        for name in friction_factor_methods(re, rough):
+            away = abs(friction_factor(re, rough, Method=name) / exact - 1)
+            worst[name] = max(away, worst.get(name, 0.0))
+    departs = {name: away for name, away in worst.items() if away > _MAX_FROM_COLEBROOK}
     without = frozenset(departs)
-    at_rest = _program(tube, velocity * per_velocity, defect)
+    at_rest = _program(tube, reynolds, defect)
     library = [by_fluids(tube, float(re), without=without) for re in at_rest.reynolds]
-    found = {
-        "friction": _worst(tube, at_rest, library, "friction"),
-        "bends": _worst(tube, at_rest, library, "bends"),
-        "k": _worst(tube, at_rest, library),
-    }
     turning = replace(scene, tube=tube)
     return Evidence(
-        quantities=found,
-        numbers=_numbers(turning, slowest, without),
+        quantities={
+            "friction": _worst(tube, at_rest, library, "friction"),
+            "bends": _worst(tube, at_rest, library, "bends"),
+            "k": _worst(tube, at_rest, library),
+        },
+        numbers=_at_equal_fills(turning, slowest, without),
         series=(_figure(turning, without),),
         tables=(_over_velocity(turning, without), _methods(tube, float(at_rest.reynolds[-1]), departs)),
     )
@@ -220,38 +213,29 @@ def _half_width(tube: Tube, state: TubeState, *causes: str) -> FloatArray:
 
 def _worst(tube: Tube, state: TubeState, library: list[Parts], part: str = "") -> Found:
     """The program's number where it departs most from the library's, in units of what both leave open."""
-    number = state.terms[part] if part else state.k
-    width = _half_width(tube, state, *_CAUSES.get(part, ()))
+    values = state.terms[part] if part else state.k
+    widths = _half_width(tube, state, *_CAUSES.get(part, ()))
     names = (part,) if part else ()
-    found = [
-        Found.within(value, half).against(Reference(value=sum(ends) / 2, uncertainty=from_range(ends)))
-        for value, half, ends in zip(
-            number, width, (_range(each, *names, others=True) for each in library), strict=True
-        )
-    ]
-    return max(found, key=_departure)
+    numbers, departures = [], []
+    for value, half_width, parts in zip(values, widths, library, strict=True):
+        ends = _range(parts, *names, others=True)
+        reference = Reference(value=sum(ends) / 2, uncertainty=from_range(ends))
+        number = Found.within(value, half_width).against(reference)
+        deviation = number.compared(reference)
+        numbers.append(number)
+        departures.append(abs(deviation.error) / deviation.half_width)
+    return numbers[departures.index(max(departures))]
 
 
-def _departure(found: Found) -> float:
-    reference = found.reference or Reference(value=0.0)
-    both = found.compared(reference)
-    return abs(both.error) / both.half_width
-
-
-def _running(scene: Scene, slowest: float) -> float:
-    """Velocity at equal fills under the scene's gas, m/s, within what is judged."""
+def _at_equal_fills(scene: Scene, slowest: float, without: frozenset[str]) -> dict[str, float]:
+    """Numbers for the text at the velocity of equal fills under the scene's gas, within what is judged."""
     tube = TubeFlow.of(Designs(scene=scene, size=1))
-    level = chamber_pressure(scene=scene, fill_ratio=np.array([scene.disc.max_fill_ratio / 2]))
-    flow = tube.flow(tube.ends(level, level), primed=True)
-    return float(np.clip(flow.velocity[0], slowest, VELOCITIES[1]))
-
-
-def _numbers(scene: Scene, slowest: float, without: frozenset[str]) -> dict[str, float]:
-    """At the velocity of equal fills, for the text."""
-    tube, velocity = scene.tube, _running(scene, slowest)
+    wall = chamber_pressure(scene=scene, fill_ratio=np.array([scene.disc.max_fill_ratio / 2]))
+    flow = tube.flow(tube.ends(wall, wall), primed=True)
+    velocity = float(np.clip(flow.velocity[0], slowest, VELOCITIES[1]))
     loss = tube_loss(scene, np.array([velocity]))
-    at_rest = _program(tube, loss.reynolds, None)
-    parts = by_fluids(tube, float(loss.reynolds[0]), without=without)
+    at_rest = _program(scene.tube, loss.reynolds, None)
+    parts = by_fluids(scene.tube, float(loss.reynolds[0]), without=without)
     low, high = _range(parts)
     return {
         "velocity": velocity,
@@ -259,7 +243,7 @@ def _numbers(scene: Scene, slowest: float, without: frozenset[str]) -> dict[str,
         "k_low": low,
         "k_high": high,
         "k_rest": at_rest.k[0],
-        "k_rest_half_width": _half_width(tube, at_rest)[0],
+        "k_rest_half_width": _half_width(scene.tube, at_rest)[0],
         "k": loss.k.value[0],
         "k_half_width": loss.k.uncertainty[0],
         "rotation": loss.k.value[0] - at_rest.k[0],
@@ -278,7 +262,7 @@ def _spread(scene: Scene, reynolds: FloatArray, without: frozenset[str]) -> Floa
 
 
 def _figure(scene: Scene, without: frozenset[str]) -> Series:
-    loss = tube_loss(scene, np.geomspace(*VELOCITIES, _POINTS))
+    loss = tube_loss(scene, np.geomspace(*VELOCITIES, _CURVE_POINTS))
     low, high = _spread(scene, loss.reynolds, without)
     fifty = np.full(low.shape, PAPER_DRAG_COEFFICIENT)
     return figure(
@@ -293,7 +277,7 @@ def _figure(scene: Scene, without: frozenset[str]) -> Series:
 
 
 def _over_velocity(scene: Scene, without: frozenset[str]) -> CaseTable:
-    loss = tube_loss(scene, np.array(_SHOWN))
+    loss = tube_loss(scene, np.array(_SHOWN_VELOCITIES))
     low, high = _spread(scene, loss.reynolds, without)
     columns = {
         "velocity": loss.velocity,
@@ -319,7 +303,7 @@ def _methods(tube: Tube, reynolds: float, departs: Mapping[str, float]) -> CaseT
     """Every method of the library at one Re, those left out with the reason."""
     parts, rough = by_fluids(tube, reynolds, without=frozenset(departs)), tube.roughness / tube.bore
     rows: list[tuple[str, str, float | str, str]] = [
-        (part, name, k, "the program’s own" if name in _OWN.get(part, ()) else "")
+        (part, name, k, "the program’s own" if name in _PROGRAM_METHODS.get(part, ()) else "")
         for part in ("friction", "bends", "entrance")
         for name, k in parts[part].items()
     ]

@@ -13,7 +13,6 @@ from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.mesh.wall_integrals import (
     LONGEST,
-    Walls,
     integrals,
     split_patches,
     wall_patches,
@@ -24,7 +23,7 @@ from ringbalance.physics.pressure.loads import ImportedRing, solved_ring
 from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
     Convergence,
@@ -42,8 +41,8 @@ from ringbalance.verification.reference.pressure import Manufactured
 _CELLS: Final = ((8, 32, 2), (4, 16, 1), (2, 8, 1))
 """Finest first; the arcs alone are approximated, so the cells along the angle decide."""
 _SIZES: Final = (1.0, 2.0, 4.0)
-_ORDER: Final = 4.0
-"""Of what an arc drawn by quadratic edges encloses."""
+_ARC_ORDER: Final = 4.0
+"""Order of the area that an arc of quadratic edges encloses."""
 _MANUFACTURED: Final = ("force_off_by_a_percent", "force_across_dropped", "surface_pressure_shifted")
 """Mutations of the manufactured problem; the others are those of the physical one."""
 _LEVELS: Final = {"light": (3, 6, 12), "heavy": (4, 8, 16, 24)}
@@ -52,18 +51,27 @@ _FILL: Final = 0.4
 _SQUARES: Final = {"light": (2, 4, 8, 16), "heavy": (2, 4, 8, 16, 32)}
 """Cells along each side of the square that becomes the cylinder: a quarter of the facets around it."""
 _DEPTHS: Final = np.array([0.07, 0.31, 0.52, 0.77, 0.96])
-"""Of the free surface, from where it touches the cylinder to where it leaves it."""
+"""Depths of the free surface, from 0 at its first contact with the cylinder to 1 at its last."""
 _TILT: Final = 0.05
 """g/(omega^2 R2), far above that of the running disc."""
-_TURN: Final = 4
+_TILT_DIRECTIONS: Final = 4
 
 
 def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The built-in chamber as a mesh file would give it, against closed forms."""
     records = [disc_chamber(scene.disc, cells) for cells in _CELLS]
     if defect == "drawn_too_large":
-        records = [replace(one, points=one.points * 1.0001, digest=f"large {one.digest}") for one in records]
-    rows = np.transpose([_by_walls(scene, record) for record in records])
+        records = [
+            replace(record, points=record.points * 1.0001, digest=f"large {record.digest}")
+            for record in records
+        ]
+    # Volume, moment at the largest fill, and lambda at equal fills, by integrals over the walls.
+    by_walls = []
+    for record in records:
+        disc = replace(scene.disc, geometry=record)
+        fills = np.array([disc.max_fill_ratio, disc.max_fill_ratio / 2])
+        _, moment, ratio = chamber_closed_forms(scene=replace(scene, disc=disc), fill_ratio=fills)
+        by_walls.append((chamber_volume(disc=disc), float(moment[0]), float(ratio[1])))
     ring = solved_ring(
         geometry=records[0],
         density=scene.liquid.density,
@@ -72,28 +80,18 @@ def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     exact = exact_totals(scene)
     exact["lever"] = exact.pop("lambda")
-    found = {name: _converged(row) for name, row in zip(("volume", "moment", "lever"), rows, strict=True)}
-    found["wall_pressure"] = Found.within(
+    numbers = {}
+    for name, values in zip(("volume", "moment", "lever"), np.transpose(by_walls), strict=True):
+        study = gci(values=values.tolist(), sizes=_SIZES, formal_order=_ARC_ORDER)
+        # The error of a table of integrals, besides.
+        numbers[name] = Found.within(values[0], study.uncertainty + 1e-8 * abs(values[0]))
+    numbers["wall_pressure"] = Found.within(
         ring.wall_pressure.value, ring.wall_pressure.uncertainty, conclusive=ring.status.ok
     )
     return Evidence(
-        quantities={name: each.against(exact[name]) for name, each in found.items()},
+        quantities={name: number.against(exact[name]) for name, number in numbers.items()},
         numbers={"cells": float(len(records[0].cells))},
     )
-
-
-def _by_walls(scene: Scene, record: ChamberGeometry) -> tuple[float, float, float]:
-    """Volume, moment at the largest fill, and lambda at equal fills, by integrals over the walls."""
-    disc = replace(scene.disc, geometry=record)
-    fills = np.array([disc.max_fill_ratio, disc.max_fill_ratio / 2])
-    _, moment, ratio = chamber_closed_forms(scene=replace(scene, disc=disc), fill_ratio=fills)
-    return chamber_volume(disc=disc), float(moment[0]), float(ratio[1])
-
-
-def _converged(values: FloatArray) -> Found:
-    study = gci(values=values.tolist(), sizes=_SIZES, formal_order=_ORDER)
-    # What a table of integrals is good to, besides.
-    return Found.within(values[0], study.uncertainty + 1e-8 * abs(values[0]))
 
 
 def pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -138,7 +136,7 @@ def _ring(scene: Scene, size: int, kind: CellKind, a: float) -> ImportedRing:
 
 @lru_cache(maxsize=8)
 def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[Convergence, Convergence]:
-    """Of the manufactured field, root mean square, and of its force on the outer wall."""
+    """Errors of the manufactured field, root mean square, and of its force on the outer wall."""
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
     radius = float(surface_radius(disc=disc, fill_ratio=_FILL))
     errors = []
@@ -176,10 +174,10 @@ class _Round:
         near, first = _segment(b, chord)
         far, second = _segment(self.radius, distance - chord)
         area = np.pi * self.radius**2 - near - far
-        along = np.pi * self.radius**2 * distance - first - (distance * far - second)
+        first_moment = np.pi * self.radius**2 * distance - first - (distance * far - second)
         half = np.arccos(chord / b)
         unit, slope = away / distance, np.array([-half, -b * np.sin(half)])
-        moments = centre[:, None] * area + unit[:, None] * along
+        moments = centre[:, None] * area + unit[:, None] * first_moment
         slopes = centre[:, None] * slope[0] + unit[:, None] * slope[1]
         return self.width * np.stack([area, *moments, slope[0], *slopes])
 
@@ -226,28 +224,8 @@ def _round_chamber_errors(
         radius=(disc.outer_radius - disc.inner_radius) / 2,
         width=disc.axial_width,
     )
-    patches, outer = _walls(true, cells, kind)
-    whole = np.pi * true.radius**2 * true.width * np.array([1.0, true.centre, true.centre])
 
-    def found(centre: FloatArray) -> tuple[float, float]:
-        distance = float(np.hypot(true.centre - centre[0], centre[1]))
-        radii = distance + (2 * _DEPTHS - 1) * true.radius
-        walls = _with_defect(walls_about(patches, outer, centre=centre), defect)
-        result = integrals(walls, radii**2)[[0, 1, 2, 4, 5, 6]]
-        expected = true.outside(radii**2, centre)
-        # As the quotient of the ratios, where a coarse mesh has no surface left to divide by.
-        lever = (result[4] * expected[3] - expected[4] * result[3]) / (expected[4] * expected[3])
-        return float(np.max(np.abs(result - expected)[:3].T / whole)), float(np.max(np.abs(lever)))
-
-    plain, lever = found(np.zeros(2))
-    angles = 2 * np.pi * (np.arange(_TURN) + 0.2) / _TURN
-    length = _TILT * disc.outer_radius
-    tilted = max(found(-length * np.array([np.cos(p), np.sin(p)]))[0] for p in angles)
-    return plain, lever, tilted
-
-
-def _walls(true: _Round, cells: int, kind: CellKind) -> tuple[FloatArray, np.ndarray]:
-    def place(cube: FloatArray) -> FloatArray:
+    def mapping(cube: FloatArray) -> FloatArray:
         # Squares become circles; along each the angle is even, so that middle nodes halve their arcs.
         u, v = 2 * cube[..., 0] - 1, 2 * cube[..., 1] - 1
         size, flat = np.maximum(np.abs(u), np.abs(v)), np.abs(u) >= np.abs(v)
@@ -257,13 +235,27 @@ def _walls(true: _Round, cells: int, kind: CellKind) -> tuple[FloatArray, np.nda
         x, y = sign * np.where(flat, long, short), sign * np.where(flat, short, long)
         return np.stack([true.centre + x, y, true.width * (cube[..., 2] - 0.5)], axis=-1)
 
-    return split_patches(*wall_patches(block_chamber((cells, cells, 1), place, kind=kind)), longest=LONGEST)
+    block = block_chamber((cells, cells, 1), mapping, kind=kind)
+    patches, outer = split_patches(*wall_patches(block), longest=LONGEST)
+    full = np.pi * true.radius**2 * true.width * np.array([1.0, true.centre, true.centre])
 
+    def errors(centre: FloatArray) -> tuple[float, float]:
+        distance = float(np.hypot(true.centre - centre[0], centre[1]))
+        radii = distance + (2 * _DEPTHS - 1) * true.radius
+        walls = walls_about(patches, outer, centre=centre)
+        if defect == "crossed_walls_not_cut":
+            middle = (walls.lowest + walls.highest) / 2
+            walls = replace(walls, lowest=middle, highest=middle)
+        elif defect == "moment_about_the_shifted_axis":
+            walls = replace(walls, centre=np.zeros(2))
+        result = integrals(walls, radii**2)[[0, 1, 2, 4, 5, 6]]
+        expected = true.outside(radii**2, centre)
+        # As the quotient of the ratios, where a coarse mesh has no surface left to divide by.
+        lever = (result[4] * expected[3] - expected[4] * result[3]) / (expected[4] * expected[3])
+        return float(np.max(np.abs(result - expected)[:3].T / full)), float(np.max(np.abs(lever)))
 
-def _with_defect(walls: Walls, defect: str | None) -> Walls:
-    if defect == "crossed_walls_not_cut":
-        middle = (walls.lowest + walls.highest) / 2
-        return replace(walls, lowest=middle, highest=middle)
-    if defect == "moment_about_the_shifted_axis":
-        return replace(walls, centre=np.zeros(2))
-    return walls
+    plain, lever = errors(np.zeros(2))
+    angles = 2 * np.pi * (np.arange(_TILT_DIRECTIONS) + 0.2) / _TILT_DIRECTIONS
+    length = _TILT * disc.outer_radius
+    tilted = max(errors(-length * np.array([np.cos(p), np.sin(p)]))[0] for p in angles)
+    return plain, lever, tilted

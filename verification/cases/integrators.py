@@ -41,10 +41,10 @@ from ringbalance.verification.evidence import (
     figure,
 )
 
-_SHARE: Final = 0.9
-"""Of the time until the chamber is empty or the flow stalls; at a stall itself no scheme has its order."""
-_SHORT: Final = 0.1
-"""Share of the long operation that a controller's usual command lasts."""
+_LONG_FRACTION: Final = 0.9
+"""Fraction of the time until the chamber is empty or the flow stalls, where no scheme has its order."""
+_SHORT_FRACTION: Final = 0.1
+"""Fraction of the long operation that a controller's usual command lasts."""
 _COUNTS: Final = (4, 8, 16, 32, 64, 128, 256, 512)
 _INSTANTS: Final = 200
 _ABOVE_STALL: Final = 1.8
@@ -57,8 +57,8 @@ _PHASES: Final = np.linspace(1.0, 1.3, 31)
 """Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
 _STARTS: Final = (0.02, 0.05, 0.1)
 _BISECTIONS: Final = 40
-_CYCLES: Final = 5
-"""Times to the stall after which a tube that stays full has found its cycle."""
+_STALL_TIMES: Final = 5
+"""Times to the stall after which a tube that stays full is in its cycle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,12 +77,12 @@ class _Operation:
 
     @classmethod
     def from_full(cls, law: PaperLaw, gas_pressure: float) -> _Operation:
-        """From the largest fill."""
+        """Operation that begins at the largest fill."""
         rate = law.tube_area / law.chamber_volume
         return cls(law=law, fill=law.max_fill_ratio, exchange_rate=rate, gas_pressure=gas_pressure)
 
     def velocity(self, fill: npt.ArrayLike) -> FloatArray:
-        """m/s."""
+        """Velocity at fills of the driven chamber, m/s."""
         largest = self.law.max_fill_ratio
         x, pressure = np.clip(fill, 0.0, largest), self.gas_pressure
         flow = self.law.evaluate(
@@ -91,7 +91,7 @@ class _Operation:
         return flow.velocity
 
     def _parabola(self) -> tuple[float, float, float]:
-        """By the paper's law u^2 = a (p + b (2 x - x_max)), so that u falls evenly in time.
+        """Flow by the paper's law u^2 = a (p + b (2 x - x_max)), so that u falls evenly in time.
 
         Returns: u at the start, m/s; its fall, m/s^2; time until u or the fill is zero, s, or nan.
         """
@@ -163,7 +163,7 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     Raises: NotRunError: the gas pressure does not start the flow.
     """
     operation = _Operation.from_full(paper_law(scene), scene.gas.pressure)
-    duration, exact = _SHARE * operation.end, _moved(operation, _SHARE * operation.end)
+    duration, exact = _LONG_FRACTION * operation.end, _moved(operation, _LONG_FRACTION * operation.end)
     if math.isnan(duration):
         raise NotRunError("the gas pressure of this scene does not start the flow by Eq. 19: raise it")
     moved = [_moved(operation, duration, count) for count in _COUNTS]
@@ -174,7 +174,7 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "moved fill ratio, relative",
         1.0,
         size=[_COUNTS[0] / count for count in _COUNTS],
-        error=[abs(one / exact - 1) for one in moved],
+        error=[abs(fill / exact - 1) for fill in moved],
     )
     # Richardson's extrapolation at first order; half of the last correction bounds what it has left.
     limit = moved[-1] + (moved[-1] - moved[-2])
@@ -198,8 +198,8 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "single": abs(_moved(operation, duration, 1) / exact - 1),
             "segments_percent": _segments_for(operation, duration, 1e-2),
             "segments_per_mille": _segments_for(operation, duration, 1e-3),
-            "short": _SHORT * duration,
-            "short_segments": _segments_for(operation, _SHORT * duration, 1e-3),
+            "short": _SHORT_FRACTION * duration,
+            "short_segments": _segments_for(operation, _SHORT_FRACTION * duration, 1e-3),
         },
         series=(shown,),
         convergence=(study,),
@@ -227,39 +227,35 @@ def orders(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     long, low = (_Operation.from_full(law, share * empties) for share in (_ABOVE_STALL, _BELOW_STALL))
     spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
-    used, used_low = (replace(one, exchange_rate=one.exchange_rate * spoiled) for one in (long, low))
-    duration = _SHARE * long.end
+    used, used_low = (replace(each, exchange_rate=each.exchange_rate * spoiled) for each in (long, low))
+    duration = _LONG_FRACTION * long.end
     t, fine = (np.linspace(0, duration, count + 1)[1:] for count in (20, _INSTANTS))
     _, stalls = used_low.marched(tube, np.array([2 * low.end]))
     kinked = _KinkedLaw(law)
     path, _ = replace(used, law=kinked).marched(tube, t)
-    stalled, longest, drawn = _stall_study(low, law, spoiled=defect == "stall_rate_off")
+    # Exact time (V/S) int dx/u to each fill of the march under the kinked law.
+    exact = replace(long, law=kinked)
+    kink = _KINK * law.max_fill_ratio
+
+    def slowness(x: float) -> float:
+        return 1 / (exact.exchange_rate * float(exact.velocity(x)))
+
+    steps = [
+        quad(slowness, end, start, points=[kink] if end < kink < start else None, epsabs=0, epsrel=1e-12)[0]
+        for start, end in pairwise([exact.fill, *path.tolist()])
+    ]
+    late_fill = (np.cumsum(steps) - t) * (exact.exchange_rate * exact.velocity(path))
+    stalled, longest, stall_figure = _stall_study(low, law, spoiled=defect == "stall_rate_off")
     return Evidence(
         quantities=as_found(
             march_error=np.max(np.abs(used.marched(tube, fine)[0] - long.exact(fine))),
             stall_error=1.0 if stalls is None else abs(stalls / low.end - 1),
-            kinked_difference=_off_in_fill(replace(long, law=kinked), t, path),
+            kinked_difference=np.max(np.abs(late_fill)),
             **stalled,
         ),
         numbers={"longest_for_per_mille": longest, "time_to_stall": low.end},
-        series=(drawn,),
+        series=(stall_figure,),
     )
-
-
-def _off_in_fill(operation: _Operation, time: FloatArray, fill: FloatArray) -> float:
-    """Largest error of falling fills at instants, by the exact time (V/S) int dx/u to each."""
-
-    def slowness(x: float) -> float:
-        return 1 / (operation.exchange_rate * float(operation.velocity(x)))
-
-    cuts = [operation.fill, *fill.tolist()]
-    kink = [_KINK * operation.law.max_fill_ratio]
-    steps = [
-        quad(slowness, low, high, points=kink if low < kink[0] < high else None, epsabs=0, epsrel=1e-12)[0]
-        for high, low in pairwise(cuts)
-    ]
-    speed = operation.exchange_rate * operation.velocity(fill)
-    return float(np.max(np.abs((np.cumsum(steps) - time) * speed)))
 
 
 @dataclass(frozen=True)
@@ -271,13 +267,13 @@ class _KinkedLaw:
 
     @property
     def max_fill_ratio(self) -> float:
-        """Of the paper's law."""
+        """Largest fill ratio of the paper's law."""
         return self.base.max_fill_ratio
 
-    def evaluate(self, **asked: Any) -> Flow:
-        """As the paper's law, slowed."""
-        flow = self.base.evaluate(**asked)
-        share = np.asarray(asked["fill_ratio"]) / (_KINK * self.max_fill_ratio)
+    def evaluate(self, **arguments: Any) -> Flow:
+        """Evaluate the paper's law, slowed."""
+        flow = self.base.evaluate(**arguments)
+        share = np.asarray(arguments["fill_ratio"]) / (_KINK * self.max_fill_ratio)
         return replace(flow, velocity=flow.velocity * np.minimum(1.0, 0.5 + 0.5 * share))
 
 
@@ -286,8 +282,8 @@ def _stall_study(
 ) -> tuple[dict[str, float], float, Series]:
     """Run the segments into the stall; `spoiled`: with the derivation's rate off by a tenth on purpose.
 
-    Returns: What the runs show beside what the derivation says; the length of a segment that steps over by a
-        thousandth of the fill at the most, s; and both over the number of segments.
+    Returns: The runs compared with the derivation; the length of a segment that steps over by a thousandth of
+        the fill at the most, s; and both over the number of segments.
     """
     a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
     stall = (law.max_fill_ratio - operation.gas_pressure / b) / 2
@@ -296,8 +292,20 @@ def _stall_study(
     end = 2 * math.sqrt(operation.fill - stall) / per_root
     counts = np.array(_SEGMENTS, dtype=np.float64)
     bound = (rate * end / counts) ** 2 / 4
-    over = np.array([_overshoots(operation, stall, end, n) for n in _SEGMENTS])
-    cycle = np.array([_cycle(per_root, operation.fill - stall, end, n) for n in _SEGMENTS])
+    durations = (end * _PHASES).tolist()
+    over = np.array(
+        [
+            [max(stall - operation.by_segments(duration, count), 0.0) for duration in durations]
+            for count in _SEGMENTS
+        ]
+    )
+    cycle = np.zeros(counts.size)
+    for index, count in enumerate(_SEGMENTS):
+        # Segments of a tube that stays full: u = sign(d) c sqrt(|d|).
+        distance = operation.fill - stall
+        for _ in range(_STALL_TIMES * count):
+            distance -= per_root * end / count * math.copysign(math.sqrt(abs(distance)), distance)
+        cycle[index] = abs(distance)
     # Durations differ a little between the runs of one count, so each is compared with its own bound.
     share = over / (bound[:, None] * _PHASES**2)
     judged = {
@@ -307,7 +315,7 @@ def _stall_study(
         "cycle_error": np.max(np.abs(cycle / bound - 1)),
         "limit_error": max(abs(_longest(operation, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
     }
-    drawn = figure(
+    shown = figure(
         "fill beyond the stall against the length of a segment",
         ("segment over the time to the stall", "1", 1 / counts),
         Curve("largest step over the stall, Eq. 20", "1", over.max(axis=1), style="paper"),
@@ -315,20 +323,7 @@ def _stall_study(
         Curve("kappa^2/4", "1", bound, style="reference"),
         log=True,
     )
-    return judged, 2 * math.sqrt(1e-3) / rate, drawn
-
-
-def _overshoots(operation: _Operation, stall: float, end: float, count: int) -> FloatArray:
-    """How far beyond the stall segments land, for durations that are a little different."""
-    landed = [operation.by_segments(duration, count) for duration in (end * _PHASES).tolist()]
-    return np.maximum(stall - np.array(landed), 0.0)
-
-
-def _cycle(per_root: float, distance: float, end: float, count: int) -> float:
-    """Distance from the stall in which segments of a tube that stays full end, u = sign(d) c sqrt(|d|)."""
-    for _ in range(_CYCLES * count):
-        distance -= per_root * end / count * math.copysign(math.sqrt(abs(distance)), distance)
-    return abs(distance)
+    return judged, 2 * math.sqrt(1e-3) / rate, shown
 
 
 def _longest(operation: _Operation, stall: float, distance: float) -> float:

@@ -12,7 +12,6 @@ from ringbalance.identification.kinds.bench import tube_numbers
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, as_found, figure
 from ringbalance.verification.navier_stokes.flow import FlowSystem
@@ -24,17 +23,17 @@ from ringbalance.verification.navier_stokes.tube import (
 )
 from ringbalance.verification.validation.comparison import (
     MUTATIONS,
-    beside_judged,
     compare,
     data_evidence,
     friction,
     measurements,
+    with_left_out,
 )
 
-_LAMINAR: Final = 1800.0
-_TURBULENT: Final = 4000.0
-_CRITICAL: Final = 2300.0
-"""Up to which McKeon's readings go on as in laminar flow."""
+_LAMINAR_TO_RE: Final = 1800.0
+_TURBULENT_FROM_RE: Final = 4000.0
+_CRITICAL_RE: Final = 2300.0
+"""Reynolds number up to which McKeon's readings go on as in laminar flow."""
 _SMOOTH: Final = ("stanton_pannell_1914", "stanton_pannell_1914_oil", "huebscher_1947_round", "senecal_1951")
 _FULLY_ROUGH: Final = 70.0
 """ks+ above which the wall is fully rough."""
@@ -42,8 +41,8 @@ CALIBRATING: Final = (*(f"tube {number} (bore)" for number in range(1, 6)), "cut
 """Points of Eisenklam that gave the bore of their tube, and are not judged."""
 _DEVELOPED: Final = 0.0125
 """L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""
-_CONTRADICTED: Final = 1.5e5
-"""Pressure, Pa, below which the cut tube contradicts the others."""
+_CONTRADICTED_PA: Final = 1.5e5
+"""Pressure below which the cut tube contradicts the others."""
 _SQUARE: Final = ((0.5, 2000.0, 8e-6, 0.06), (1.0, 1000.0, 1e-5, 0.06), (1.0, 2000.0, 4e-6, 0.04))
 _FAST: Final = (3.3, 1810.0, 4e-6, 0.03)
 """S = omega d/U, Re, step and time over d^2/nu; the last is the end of the correlated simulations."""
@@ -55,10 +54,10 @@ _CELLS: Final = {
 _WASHER: Final = 12.4e-6
 """Unbalance of a washer, kg m."""
 _WASHER_UNCERTAINTY: Final = 0.5e-6
-"""Of each, 95 %, kg m."""
-_TAUGHT: Final = (0, 1, 2)
+"""Expanded uncertainty (95 %) of a washer's unbalance, kg m."""
+_TAUGHT_COUNTS: Final = (0, 1, 2)
 """Numbers of washers that gave the coefficient."""
-_PREDICTED: Final = (3, 4)
+_PREDICTED_COUNTS: Final = (3, 4)
 
 
 def smooth_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -66,22 +65,22 @@ def smooth_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evide
 
     McKeon's readings below Re 4000 are not judged: the laminar ones their own authors found up to 14 % high.
     """
-    points = friction(*map(measurements, _SMOOTH), _mckeon(_TURBULENT, np.inf), mutation=defect)
+    points = friction(*map(measurements, _SMOOTH), _mckeon(_TURBULENT_FROM_RE, np.inf), mutation=defect)
     left_out = {
-        "mckeon_laminar": friction(_mckeon(0.0, _CRITICAL)),
-        "mckeon_transition": friction(_mckeon(_CRITICAL, _TURBULENT)),
+        "mckeon_laminar": friction(_mckeon(0.0, _CRITICAL_RE)),
+        "mckeon_transition": friction(_mckeon(_CRITICAL_RE, _TURBULENT_FROM_RE)),
     }
-    reynolds, whole = points.columns["reynolds"], points.statistics
+    reynolds, statistics = points.columns["reynolds"], points.statistics
     parts = {
-        "laminar": points.where(reynolds < _LAMINAR),
-        "transitional": points.where((reynolds >= _LAMINAR) & (reynolds < _TURBULENT)),
-        "turbulent": points.where(reynolds >= _TURBULENT),
+        "laminar": points.where(reynolds < _LAMINAR_TO_RE),
+        "transitional": points.where((reynolds >= _LAMINAR_TO_RE) & (reynolds < _TURBULENT_FROM_RE)),
+        "turbulent": points.where(reynolds >= _TURBULENT_FROM_RE),
     }
-    numbers = whole.numbers() | beside_judged(points, left_out)
+    numbers = statistics.numbers() | with_left_out(points, left_out)
     for name, part in parts.items():
         numbers |= {f"{name}_{key}": value for key, value in part.statistics.numbers().items()}
     return Evidence(
-        quantities=as_found(share_within=whole.share_within, bias=abs(numbers["turbulent_bias"])),
+        quantities=as_found(share_within=statistics.share_within, bias=abs(numbers["turbulent_bias"])),
         numbers=numbers,
         series=(parts["turbulent"].over_reynolds("smooth tubes"),),
     )
@@ -107,15 +106,15 @@ def rough_tubes(scene: Scene, level: Level, defect: str | None = None) -> Eviden
         quantities=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
             **statistics.numbers(),
-            **beside_judged(points),
+            **with_left_out(points),
             "worst": np.max(points.predicted / points.measured - 1),
             "rough_points": rough.points,
             "rough_bias": rough.bias,
             "rough_standard_deviation": rough.standard_deviation,
         },
         series=tuple(
-            points.where(wall == one).over_reynolds(f"a tube with ks/d = {one:.2g}")
-            for one in np.unique(wall)[[0, -1]]
+            points.where(wall == roughness).over_reynolds(f"a tube with ks/d = {roughness:.2g}")
+            for roughness in np.unique(wall)[[0, -1]]
         ),
     )
 
@@ -130,20 +129,24 @@ def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     points = friction(*sets, mutation=mutation)
     wide = np.char.find(points.series, "8:1") >= 0
     narrow, reynolds = points.where(~wide), points.columns["reynolds"][~wide]
-    whole, laminar, turbulent = (
+    every, laminar, turbulent = (
         part.statistics
-        for part in (narrow, narrow.where(reynolds < _LAMINAR), narrow.where(reynolds >= _TURBULENT))
+        for part in (
+            narrow,
+            narrow.where(reynolds < _LAMINAR_TO_RE),
+            narrow.where(reynolds >= _TURBULENT_FROM_RE),
+        )
     )
     return Evidence(
-        quantities=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
+        quantities=as_found(share_within=every.share_within, laminar=abs(laminar.bias)),
         numbers={
-            **whole.numbers(),
+            **every.numbers(),
             "laminar_points": laminar.points,
             "laminar_bias": laminar.bias,
             "turbulent_points": turbulent.points,
             "turbulent_bias": turbulent.bias,
             "turbulent_standard_deviation": turbulent.standard_deviation,
-            **beside_judged(narrow, {"wide": points.where(wide)}),
+            **with_left_out(narrow, {"wide": points.where(wide)}),
         },
         series=(friction(sets[0], mutation=mutation).over_reynolds("a rectangular duct (2.9 to 1)"),),
     )
@@ -157,21 +160,21 @@ def laminar_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evid
     data = measurements("eisenklam_1958")
     reynolds, slenderness = tube_numbers(data)
     taught, cut = np.isin(data.series, CALIBRATING), np.char.startswith(data.series, "cut")
-    contradicted = cut & (data.columns["pressure"] < _CONTRADICTED) & ~taught
+    contradicted = cut & (data.columns["pressure"] < _CONTRADICTED_PA) & ~taught
     usable, developed = ~taught & ~contradicted, slenderness >= _DEVELOPED * reynolds
     judged = data.where(usable & developed)
-    found = data_evidence(judged, unit="Pa", mutation=defect)
+    evidence = data_evidence(judged, unit="Pa", mutation=defect)
     left_out = {
         "contradicted": compare(data.where(contradicted)),
         "short": compare(data.where(usable & ~developed)),
     }
     uncut = compare(data.where(usable & np.char.startswith(data.series, "tube")))
     more = {
-        **beside_judged(compare(judged, mutation=defect), left_out, taught=int(taught.sum())),
-        "laminar_points": found.numbers["points"],
+        **with_left_out(compare(judged, mutation=defect), left_out, taught=int(taught.sum())),
+        "laminar_points": evidence.numbers["points"],
         "long_worst": np.max(np.abs(uncut.predicted / uncut.measured - 1)),
     }
-    return dataclasses.replace(found, numbers={**found.numbers, **more})
+    return dataclasses.replace(evidence, numbers={**evidence.numbers, **more})
 
 
 def rotating_duct(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -190,15 +193,22 @@ def rotating_duct(scene: Scene, level: Level, defect: str | None = None) -> Evid
         Curve("correlation of measurements", "1", measured, style="reference"),
         log=True,
     )
+    numbers = {"signed_bias": float(np.mean(deviation))}
+    if defect is None:
+        # Friction of the circular tube, solved in time as well, over the table's steady one, less one.
+        tube = SectionMesh(around=7, across=11, wall_ratio=15.0).system()
+        tube_s, tube_re, _, _ = _TUBE
+        steady = float(laminar_ratio(reynolds=tube_re, rotation_reynolds=tube_s * tube_re))
+        numbers["tube"] = _mean_gradient(tube, _TUBE) / POISEUILLE_GRADIENT / steady - 1
     return Evidence(
         quantities=as_found(bias=abs(np.mean(deviation)), worst=np.max(np.abs(deviation))),
-        numbers={"signed_bias": float(np.mean(deviation))} | ({} if defect else _tube()),
+        numbers=numbers,
         series=(shown,),
     )
 
 
 def _mean_gradient(system: FlowSystem, point: tuple[float, ...], rotation: float = 1.0) -> float:
-    """Over the second half of the time."""
+    """Mean driving gradient over the second half of the time."""
     s, re, step, time = point
     gradients = march_section(
         system=system, kl=rotation * s * re**2, s=rotation * s, step=step, steps=round(time / step)
@@ -206,24 +216,38 @@ def _mean_gradient(system: FlowSystem, point: tuple[float, ...], rotation: float
     return float(np.mean(gradients[-round(gradients.size / 2) :]))
 
 
-def _tube() -> dict[str, float]:
-    """Friction of the circular tube, solved in time as well, over the table's steady one, less one."""
-    tube = SectionMesh(around=7, across=11, wall_ratio=15.0).system()
-    s, re, _, _ = _TUBE
-    steady = float(laminar_ratio(reynolds=re, rotation_reynolds=s * re))
-    return {"tube": _mean_gradient(tube, _TUBE) / POISEUILLE_GRADIENT / steady - 1}
-
-
 def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Vibration of a rotor with known unbalances: what small ones teach, compared with larger ones."""
     run = measurements("rodrigues_2011")
     readings = {count: _readings(run, "plain", count) for count in range(5)}
     amplitudes = [float(np.mean(reading)) for reading in readings.values()]
-    taught = _calibrated(scene.rotor, amplitudes[:3])
-    kappa = MUTATIONS[defect] * taught.influence_coefficient
+    # The amplitudes with none, one and two washers give the rotor: |V0 + n K u|^2 = |V0|^2 + 2 n Re(V0* K u)
+    # + n^2 |K u|^2 for n = 0, 1, 2 is solved for |V0|, |K u| and the angle between them.
+    none, first, second = (a**2 for a in amplitudes[:3])
+    square = (second - 2 * first + none) / 2
+    cosine = (first - none - square) / (2 * math.sqrt(square * none))
+    kappa = MUTATIONS[defect] * (math.sqrt(square) / _WASHER)
+    calibrated = dataclasses.replace(
+        scene.rotor,
+        influence_coefficient=kappa,
+        lag_angle=0.0,
+        initial_amplitude=amplitudes[0],
+        initial_phase=math.acos(cosine),
+    )
     unbalance = _WASHER * np.arange(5)
-    predicted = np.abs(dataclasses.replace(taught, influence_coefficient=kappa).vibration(unbalance))
-    spread = kappa * _WASHER_UNCERTAINTY / 2
+    predicted = np.abs(calibrated.vibration(unbalance))
+    standard_uncertainty = kappa * _WASHER_UNCERTAINTY / 2
+    quantities = {}
+    for count in _PREDICTED_COUNTS:
+        # The mean over all speeds; u_D of the scatter over these and of the washers on the disc.
+        mean, scatter = amplitudes[count], float(np.std(readings[count], ddof=1))
+        washers = mean * _WASHER_UNCERTAINTY / (2 * _WASHER * math.sqrt(count))
+        quantities[f"washers_{count}"] = Found(
+            value=float(predicted[count]),
+            # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
+            input=standard_uncertainty * count / math.sqrt(2),
+            reference=Reference(value=mean, uncertainty=math.hypot(washers, scatter)),
+        )
     shown = figure(
         "vibration of a rotor, measured and predicted",
         ("unbalance", "kg*m", unbalance),
@@ -231,19 +255,11 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         Curve("measured", "m", np.array(amplitudes), style="points"),
     )
     return Evidence(
-        quantities={
-            # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
-            f"washers_{count}": Found(
-                value=float(predicted[count]),
-                input=spread * count / math.sqrt(2),
-                reference=_amplitude(readings[count], count),
-            )
-            for count in _PREDICTED
-        },
+        quantities=quantities,
         numbers={
-            "points": sum(readings[count].size for count in _PREDICTED),
-            "taught_points": sum(readings[count].size for count in _TAUGHT),
-            "worst_mean": max((predicted[n] / amplitudes[n] - 1 for n in _PREDICTED), key=abs),
+            "points": sum(readings[count].size for count in _PREDICTED_COUNTS),
+            "taught_points": sum(readings[count].size for count in _TAUGHT_COUNTS),
+            "worst_mean": max((predicted[n] / amplitudes[n] - 1 for n in _PREDICTED_COUNTS), key=abs),
             "influence_coefficient": kappa,
             "balls_up": np.mean(_readings(run, "abb_runup", 4)),
             "balls_down": np.mean(_readings(run, "abb_rundown", 4)),
@@ -252,31 +268,6 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _amplitude(readings: FloatArray, count: int) -> Reference:
-    """Mean over all speeds; u_D of the scatter over these and of the washers on the disc."""
-    mean, scatter = float(np.mean(readings)), float(np.std(readings, ddof=1))
-    washers = mean * _WASHER_UNCERTAINTY / (2 * _WASHER * math.sqrt(count))
-    return Reference(value=mean, uncertainty=math.hypot(washers, scatter))
-
-
 def _readings(run: Observations, series: str, washers: int) -> FloatArray:
-    here = (run.series == series) & (run.columns["washers"] == washers)
-    return np.asarray(run.columns["amplitude"][here], dtype=np.float64)
-
-
-def _calibrated(given: Rotor, amplitudes: list[float]) -> Rotor:
-    """The rotor whose amplitudes with none, one and two washers are the measured ones.
-
-    |V0 + n K u|^2 = |V0|^2 + 2 n Re(V0* K u) + n^2 |K u|^2 for n = 0, 1, 2 gives |V0|, |K u| and the angle
-    between them.
-    """
-    none, one, two = (a**2 for a in amplitudes)
-    square = (two - 2 * one + none) / 2
-    cosine = (one - none - square) / (2 * math.sqrt(square * none))
-    return dataclasses.replace(
-        given,
-        influence_coefficient=math.sqrt(square) / _WASHER,
-        lag_angle=0.0,
-        initial_amplitude=amplitudes[0],
-        initial_phase=math.acos(cosine),
-    )
+    chosen = (run.series == series) & (run.columns["washers"] == washers)
+    return np.asarray(run.columns["amplitude"][chosen], dtype=np.float64)

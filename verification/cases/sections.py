@@ -1,5 +1,5 @@
-"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along it; and the
-friction formula's blend of laminar and turbulent flow.
+"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along the tube;
+and the friction formula's blend of laminar and turbulent flow.
 
 The manufactured flow on the curved half section, every term of the equation at work: in the plane
 u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the tube
@@ -83,8 +83,8 @@ _SPOILED: Final = {
     "viscosity_off_by_a_percent": replace(_TRUE, viscosity=1.01 * _TRUE.viscosity),
 }
 _A, _B, _C, _D, _E, _F = 2.1, 1.2, 2.7, 3.1, 1.7, 1.3
-_CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
-"""Per diameter: root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""
+_CREEPING_PER_DIAMETER: Final = 2 * (4.46629832 + 1.46746761j)
+"""Root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""
 _GEOSTROPHIC: Final = 47.211
 """lambda sqrt(R), least eigenvalue of geostrophic flow over the section's depth with Ekman friction."""
 _FAST: Final = (1e3, 1e4)
@@ -103,12 +103,12 @@ _MESHES: Final = {
     ),
 }
 _SHIFTS: Final = (1.0, 0.35, 0.12)
-"""Of the expected rate, about which modes are looked for."""
-_TOLERANCE: Final = 1e-8
-"""Of the eigenvalues: rates are told apart at 1e-4 of the expected one."""
+"""Shifts over the expected rate, about which modes are looked for."""
+_EIGENVALUE_TOLERANCE: Final = 1e-8
+"""Rates are distinct from 1e-4 of the expected one on."""
 _NOT_A_MODE: Final = 0.03
-"""Times the expected rate: below, only the flow rate and the pressure level are found, at zero."""
-_LEFT: Final = 1e-6
+"""Rate over the expected one below which only the flow rate and the pressure level are modes, at zero."""
+_MAX_RESIDUAL: Final = 1e-6
 """Largest relative residual of a mode."""
 
 
@@ -151,9 +151,9 @@ def _without_inertia(system: FlowSystem, rotation: float) -> float:
     return friction_ratio(flow)
 
 
-def velocity(places: FloatArray) -> FloatArray:
-    """The manufactured velocity along (y, z, x), shape (3, ...), at places (y, z) over the bore."""
-    y, z = places
+def velocity(points: FloatArray) -> FloatArray:
+    """The manufactured velocity along (y, z, x), shape (3, ...), at points (y, z) over the bore."""
+    y, z = points
     growth = np.exp(_B * z) / 5
     return np.stack(
         [
@@ -164,41 +164,61 @@ def velocity(places: FloatArray) -> FloatArray:
     )
 
 
-def _laplacian(places: FloatArray) -> FloatArray:
-    u, v, w = velocity(places)
-    plane = _B**2 - _A**2
-    return np.stack([plane * u, plane * v, -(_C**2 + _D**2) * (w - 1)])
-
-
-def pressure(places: FloatArray) -> FloatArray:
+def pressure(points: FloatArray) -> FloatArray:
     """The manufactured pressure, up to a constant."""
-    return np.asarray(np.sin(_E * places[0]) * np.cos(_F * places[1] + 0.2))
+    return np.asarray(np.sin(_E * points[0]) * np.cos(_F * points[1] + 0.2))
 
 
-def body_force(places: FloatArray) -> FloatArray:
+def body_force(points: FloatArray) -> FloatArray:
     """The body force along (y, z, x) that makes this flow the solution."""
-    u = velocity(places)
-    carried = np.einsum("d...,cd...->c...", u[:2], slopes(velocity, places))
+    u = velocity(points)
+    plane = _B**2 - _A**2
+    laplacian = np.stack([plane * u[0], plane * u[1], -(_C**2 + _D**2) * (u[2] - 1)])
+    carried = np.einsum("d...,cd...->c...", u[:2], slopes(velocity, points))
     turning = np.einsum("cd,d...->c...", np.array(_TURNING), u)
-    slope = np.concatenate([slopes(pressure, places), np.zeros_like(places[:1])])
-    return np.asarray(_TRUE.inertia * carried + turning - _TRUE.viscosity * _laplacian(places) + slope)
+    slope = np.concatenate([slopes(pressure, points), np.zeros_like(points[:1])])
+    return np.asarray(_TRUE.inertia * carried + turning - _TRUE.viscosity * laplacian + slope)
 
 
 def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Orders and finest errors of the manufactured flow on ever finer meshes."""
     around = _AROUND[level]
-    solved = [_solve(count, _SPOILED[defect]) for count in around]
-    unknowns = [system.unknowns for system, _ in solved]
+    conditions = [
+        Dirichlet(boundary=name, component=c, value=partial(_component, c))
+        for name in ("symmetry", "wall")
+        for c in range(3)
+    ]
+    velocity_errors, pressure_errors, unknowns = [], [], []
+    for count in around:
+        across = max(1, round(_ACROSS * count))
+        system = FlowSystem.of(
+            mesh=SectionMesh(around=count, across=across, wall_ratio=_WALL_RATIO).mesh(),
+            conditions=conditions,
+            components=3,
+            enclosed=True,
+            body_force=body_force,
+        )
+        solution = solve_flow(system=system, coefficients=_SPOILED[defect])
+        if not solution.status.ok:
+            raise ValueError(solution.status.text)
+        weights = system.weights
+        computed = system.at_points(solution.velocity)[0]
+        velocity_errors.append(relative_rms(computed, velocity(system.points), weights))
+        # The pressure is determined up to a constant.
+        fields = (np.asarray(system.pressure.interpolate(solution.pressure)), pressure(system.points))
+        centred, true = (field - np.sum(weights * field) / weights.sum() for field in fields)
+        pressure_errors.append(relative_rms(centred, true, weights))
+        unknowns.append(system.unknowns)
     studies = {
         name: Convergence.of_errors(
             f"{name}, relative error",
             order,
             size=[around[0] / count for count in around],
-            error=[error(*pair) for pair in solved],
+            error=errors,
             geometry="quadratic",
             note=f"unknowns {', '.join(map(str, unknowns))}",
         )
-        for name, order, error in (("velocity", 3.0, _velocity_error), ("pressure", 2.0, _pressure_error))
+        for name, order, errors in (("velocity", 3.0, velocity_errors), ("pressure", 2.0, pressure_errors))
     }
     return Evidence(
         quantities=orders_found(studies),
@@ -208,36 +228,8 @@ def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> 
     )
 
 
-def _solve(around: int, coefficients: Coefficients) -> tuple[FlowSystem, FlowSolution]:
-    across = max(1, round(_ACROSS * around))
-    mesh = SectionMesh(around=around, across=across, wall_ratio=_WALL_RATIO).mesh()
-    conditions = [
-        Dirichlet(boundary=name, component=c, value=partial(_component, c))
-        for name in ("symmetry", "wall")
-        for c in range(3)
-    ]
-    system = FlowSystem.of(
-        mesh=mesh, conditions=conditions, components=3, enclosed=True, body_force=body_force
-    )
-    solution = solve_flow(system=system, coefficients=coefficients)
-    if not solution.status.ok:
-        raise ValueError(solution.status.text)
-    return system, solution
-
-
-def _component(component: int, places: FloatArray) -> FloatArray:
-    return np.asarray(velocity(places)[component])
-
-
-def _velocity_error(system: FlowSystem, solution: FlowSolution) -> float:
-    return relative_rms(system.at_points(solution.velocity)[0], velocity(system.points), system.weights)
-
-
-def _pressure_error(system: FlowSystem, solution: FlowSolution) -> float:
-    weights = system.weights
-    fields = (np.asarray(system.pressure.interpolate(solution.pressure)), pressure(system.points))
-    found, true = (field - np.sum(weights * field) / weights.sum() for field in fields)
-    return relative_rms(found, true, weights)
+def _component(component: int, points: FloatArray) -> FloatArray:
+    return np.asarray(velocity(points)[component])
 
 
 def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -245,7 +237,7 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
     coarse, fine = (cells.system() for cells in _MESHES[level])
     speed = 0.7 if defect == "coriolis_too_weak" else 1.0
     rates = _slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12)
-    exact = _CREEPING / (2 if defect == "radius_for_bore" else 1)
+    exact = _CREEPING_PER_DIAMETER / (2 if defect == "radius_for_bore" else 1)
     fast = [_decay_length(fine, 0.0, speed * rotation) ** -1 * rotation**0.5 for rotation in _FAST]
     # The limit is approached as R^(-1/4), which two rates take off.
     step = (_FAST[1] / _FAST[0]) ** 0.25
@@ -275,7 +267,7 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
 
 
 def _decay_length(system: FlowSystem, reynolds: float, rotation_reynolds: float) -> float:
-    """Way on which the slowest disturbance falls by e, in diameters."""
+    """Length on which the slowest disturbance falls by e, in diameters."""
     rates = _slowest_decay(system=system, reynolds=reynolds, rotation_reynolds=rotation_reynolds, count=1)
     return -1 / float(rates[0].real)
 
@@ -289,14 +281,22 @@ def _slowest_decay(
     Raises: ArithmeticError: the developed flow or a mode of it was not found.
     Source: quadratic eigenproblem by finite elements, solved by shift and invert.
     """
-    flow, matrices = _pencil(system, reynolds, rotation_reynolds)
+    if reynolds == 0:
+        flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation_reynolds)
+        c = section_coefficients(kl=rotation_reynolds, s=rotation_reynolds, inertia=0.0)
+        matrices = _matrices(system, flow, c, 1.0)
+    else:
+        kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+        flow = developed_section(system=system, kl=kl, s=s)
+        matrices = _matrices(system, flow, section_coefficients(kl=kl, s=s), reynolds**-2)
     scale, expected = reynolds or 1.0, _length_bound(reynolds, rotation_reynolds)
-    found = []
+    modes = []
     for share in _SHIFTS:
         mu, residual = _modes(matrices, -share * scale / expected, count + 4)
         rates = mu / scale
-        found.append(rates[(rates.real < 0) & (np.abs(rates) > _NOT_A_MODE / expected) & (residual < _LEFT)])
-    rates = np.concatenate(found)
+        decaying = (rates.real < 0) & (np.abs(rates) > _NOT_A_MODE / expected)
+        modes.append(rates[decaying & (residual < _MAX_RESIDUAL)])
+    rates = np.concatenate(modes)
     if rates.size == 0 or not flow.status.ok:
         raise ArithmeticError("no mode found: refine the section's mesh")
     ordered = rates[np.lexsort((rates.imag, -np.round(rates.real, 6)))]
@@ -305,68 +305,60 @@ def _slowest_decay(
 
 
 def _length_bound(reynolds: float, rotation_reynolds: float) -> float:
-    """The tube law's, in diameters."""
+    """Developing length of the tube law, in diameters."""
     ratio = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation_reynolds).value
     return float(
         developing_length(reynolds=reynolds, rotation_reynolds=rotation_reynolds, friction_ratio=ratio)
     )
 
 
-def _pencil(
-    system: FlowSystem, reynolds: float, rotation_reynolds: float
-) -> tuple[FlowSolution, tuple[Any, Any, Any]]:
-    """Developed flow and the matrices A0, A1, A2 about it, without the wall's unknowns."""
-    if reynolds == 0:
-        flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation_reynolds)
-        c = section_coefficients(kl=rotation_reynolds, s=rotation_reynolds, inertia=0.0)
-        return flow, _matrices(system, flow, c, 1.0)
-    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
-    flow = developed_section(system=system, kl=kl, s=s)
-    return flow, _matrices(system, flow, section_coefficients(kl=kl, s=s), reynolds**-2)
+def _matrices(
+    system: FlowSystem, flow: FlowSolution, c: Coefficients, lengthwise: float
+) -> tuple[Any, Any, Any]:
+    """A0, A1 and A2 without the wall's unknowns.
 
-
-def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: float) -> tuple[Any, Any, Any]:
-    """A0, A1 and A2; `along` is the factor of pressure and diffusion along the tube."""
-    zero = system.linear_matrix(c)
+    Args: `lengthwise`: factor of pressure and diffusion along the tube.
+    """
+    constant = system.linear_matrix(c)
     if c.inertia != 0.0:
-        zero = zero + c.inertia * system.convection_matrix(flow.vector)
+        constant = constant + c.inertia * system.convection_matrix(flow.vector)
     carried = c.inertia * system.weighted_mass(system.at_points(flow.velocity)[0][2])
     coupling = system.pressure_mass()
-    one = system.of_all(sparse.kron(sparse.identity(3), carried)).tolil()
+    linear = system.of_all(sparse.kron(sparse.identity(3), carried)).tolil()
     first, nodes = flow.velocity.size, flow.velocity.shape[1]
     axial, pressure = slice(first - nodes, first), slice(first, None)
-    one[axial, pressure], one[pressure, axial] = along * coupling.T, -coupling
-    two = system.of_all(sparse.kron(sparse.identity(3), -along * system.mass))
+    linear[axial, pressure], linear[pressure, axial] = lengthwise * coupling.T, -coupling
+    quadratic = system.of_all(sparse.kron(sparse.identity(3), -lengthwise * system.mass))
     # The pressure's level, pinned in the section's own problem, is a part of what varies along the tube.
     free = np.union1d(system.free, [first])
-    zero, one, two = (matrix.tocsr()[free][:, free].tocsc() for matrix in (zero, one, two))
-    return zero, one, two
+    a0, a1, a2 = (matrix.tocsr()[free][:, free].tocsc() for matrix in (constant, linear, quadratic))
+    return a0, a1, a2
 
 
 def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[ComplexArray, FloatArray]:
     """Eigenvalues mu next to a shift, and the relative residuals of their modes."""
-    zero, one, two = matrices
-    size = zero.shape[0]
-    factors = Factors((zero + shift * one + shift**2 * two).tocsc())
+    a0, a1, a2 = matrices
+    size = a0.shape[0]
+    factors = Factors((a0 + shift * a1 + shift**2 * a2).tocsc())
 
     def inverse(y: FloatArray) -> FloatArray:
         # (q, mu q) linearises the square; one factored matrix of the section's size serves.
         low, high = y[:size], y[size:]
-        first = -factors.solve(one @ low + two @ (high + shift * low))
+        first = -factors.solve(a1 @ low + a2 @ (high + shift * low))
         return np.concatenate([first, shift * first + low])
 
     start = np.random.default_rng(0).standard_normal(2 * size)
     operator = LinearOperator((2 * size, 2 * size), matvec=inverse, dtype=np.float64)
-    nearness, vectors = eigs(operator, k=count, v0=start, tol=_TOLERANCE)
+    nearness, vectors = eigs(operator, k=count, v0=start, tol=_EIGENVALUE_TOLERANCE)
     mu = shift + 1 / nearness
     q = vectors[:size]
-    rest = zero @ q + (one @ q) * mu + (two @ q) * mu**2
-    scale = abs(zero) @ np.abs(q) + (abs(one) @ np.abs(q)) * np.abs(mu)
+    rest = a0 @ q + (a1 @ q) * mu + (a2 @ q) * mu**2
+    scale = abs(a0) @ np.abs(q) + (abs(a1) @ np.abs(q)) * np.abs(mu)
     return mu, np.linalg.norm(rest, axis=0) / np.linalg.norm(scale, axis=0)
 
 
-_TURBULENT: Final = 4000.0
-_STEP: Final = 1.01
+_TURBULENT_FROM_RE: Final = 4000.0
+_RE_STEP: Final = 1.01
 
 
 def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -375,12 +367,12 @@ def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     def friction_of(reynolds: FloatArray) -> FloatArray:
         f = friction_factor(reynolds=reynolds, relative_roughness=0.0)
         if defect == "sudden_switch":
-            f = np.where(reynolds < _TURBULENT, 0.316 * reynolds**-0.25, f)
+            f = np.where(reynolds < _TURBULENT_FROM_RE, 0.316 * reynolds**-0.25, f)
             return np.where(reynolds < 2040, 64 / reynolds, f)
         return f / 4 if defect == "fanning_factor" else f
 
     laminar = np.geomspace(1, 1000, 200)
-    sweep = np.exp(np.arange(np.log(100), np.log(1e5), np.log(_STEP)))
+    sweep = np.exp(np.arange(np.log(100), np.log(1e5), np.log(_RE_STEP)))
     curve = friction_of(sweep)
     shown = figure(
         "friction factor of a smooth tube",
@@ -393,7 +385,7 @@ def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         quantities=as_found(
             laminar=np.max(np.abs(friction_of(laminar) * laminar / 64 - 1)),
             jump=np.max(np.abs(np.diff(curve) / curve[:-1])),
-            head_slope=np.min(np.diff(np.log(curve * sweep**2)) / np.log(_STEP)),
+            head_slope=np.min(np.diff(np.log(curve * sweep**2)) / np.log(_RE_STEP)),
         ),
         series=(shown,),
     )

@@ -42,8 +42,8 @@ _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""
 _FILLS: Final = np.linspace(0.02, 1.0, 50)
 """In units of the largest."""
-_LEAST: Final = 0.05
-"""Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
+_MIN_HEAD: Final = 0.05
+"""Smallest head in units of the gas pressure's: below it lies a stall."""
 _PRINTED_K: Final = Reference(
     value=PAPER_DRAG_COEFFICIENT, uncertainty=from_half_width(0.1 * PAPER_DRAG_COEFFICIENT)
 )
@@ -52,12 +52,12 @@ _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 """In units of the scene's."""
 _NARROWEST: Final = 0.1
 """Smallest bore searched for k = 50, in units of the scene's."""
-_WARM: Final = 333.15
+_WARM_K: Final = 333.15
 _OIL: Final = "silicone oil 100 cSt"
-_OIL_TABLE: Final = 298.15
-"""K, at which its data are given."""
-_VELOCITIES: Final = (1e-4, 3000.0, 401)
-"""Of the figure, m/s."""
+_OIL_TABLE_K: Final = 298.15
+"""Temperature of the data of the oil."""
+_FIGURE_VELOCITIES: Final = (1e-4, 3000.0, 401)
+"""Ends and number of the figure's velocities, m/s."""
 
 
 def _driving_heads(scene: Scene, shares: npt.ArrayLike) -> tuple[float, ...]:
@@ -68,24 +68,30 @@ def _driving_heads(scene: Scene, shares: npt.ArrayLike) -> tuple[float, ...]:
     """
     share, gas = np.asarray(shares, dtype=np.float64), scene.gas.pressure
     driven, other = wall_pressure_of(scene, np.array([share, 1 - share]) * scene.disc.max_fill_ratio)
-    heads = np.maximum(gas + driven - other, _LEAST * gas) / scene.liquid.density
+    heads = np.maximum(gas + driven - other, _MIN_HEAD * gas) / scene.liquid.density
     return tuple(heads.tolist())
 
 
 @lru_cache(maxsize=64)
 def _running(scene: Scene, heads: tuple[float, ...]) -> TubeLoss:
-    """A full tube at the velocities with (k(u) + 1) u^2/2 = head, m^2/s^2, above zero."""
+    """Loss of a full tube at the velocities with (k(u) + 1) u^2/2 = head, m^2/s^2, above zero."""
     return tube_loss(scene, TubeHeads.of(scene).velocity(heads))
 
 
 def _under_gas(scene: Scene) -> TubeLoss:
-    """At equal fills, where gas alone drives."""
+    """Loss at equal fills, where gas alone drives."""
     return _running(scene, (scene.gas.pressure / scene.liquid.density,))
 
 
 def bernoulli_ends(scene: Scene) -> Evidence:
-    """Without the exit's share, which is the same at all values."""
-    return Evidence(quantities={"one_k": _one_k(scene)} | as_found(siphon_share=_siphon_share(scene)))
+    """Effects of one k and of a full tube; the exit's share is the same at all values."""
+    heads = _driving_heads(scene, [0.5, 0.0, 0.25, 0.75, 1.0])
+    runs = _running(scene, heads)
+    k, half_width = float(runs.k.value[0]), float(runs.k.uncertainty[0])
+    worst = float(np.max(np.abs(np.sqrt(2 * np.array(heads[1:]) / (k + 1)) / runs.velocity[1:] - 1)))
+    # k's own uncertainty is common to all velocities, so it only scales the difference.
+    one_k = Found(value=worst, input=from_half_width(worst * half_width / (k + 1)))
+    return Evidence(quantities={"one_k": one_k} | as_found(siphon_share=_siphon_share(scene)))
 
 
 def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -109,15 +115,6 @@ def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence
         numbers={"exit_excess": exit_loss, "bare_bore": bare.tube.bore, "share_bare": _siphon_share(bare)},
         series=(shown,),
     )
-
-
-def _one_k(scene: Scene) -> Found:
-    """k's own uncertainty is common to all velocities, so it only scales the difference."""
-    heads = _driving_heads(scene, [0.5, 0.0, 0.25, 0.75, 1.0])
-    runs = _running(scene, heads)
-    k, half_width = float(runs.k.value[0]), float(runs.k.uncertainty[0])
-    worst = float(np.max(np.abs(np.sqrt(2 * np.array(heads[1:]) / (k + 1)) / runs.velocity[1:] - 1)))
-    return Found(value=worst, input=from_half_width(worst * half_width / (k + 1)))
 
 
 def _siphon_share(scene: Scene) -> float:
@@ -156,10 +153,28 @@ def drag_coefficient(scene: Scene, level: Level, defect: str | None = None) -> E
     printed, bare = fig_7_readings()
     narrow = _running(bare, _driving_heads(bare, [0.5]))
     bores = [float(_with_bore(scene, factor).k.value[0]) for factor in _BORES]
-    known = liquids_at_room_temperature()
-    liquids = {one.name: _under_gas(dataclasses.replace(scene, liquid=one)) for one in known}
-    table, differences = _over_liquids(liquids), _differences(printed, bare)
-    of_liquids = [float(run.k.value[0]) for run in liquids.values()]
+    liquids = {
+        liquid.name: _under_gas(dataclasses.replace(scene, liquid=liquid))
+        for liquid in liquids_at_room_temperature()
+    }
+    runs = liquids.values()
+    of_liquids = [float(run.k.value[0]) for run in runs]
+    table = CaseTable(
+        name="k of the scene's tube with each known liquid, equal fills, the scene's gas pressure",
+        columns={
+            "liquid": list(liquids),
+            "velocity": [float(run.velocity[0]) for run in runs],
+            "Reynolds number": [float(run.reynolds[0]) for run in runs],
+            "k": of_liquids,
+            "half-width": [float(run.k.uncertainty[0]) for run in runs],
+            "flow": [str(run.flow_state[0]) for run in runs],
+        },
+        units={"velocity": "m/s", "Reynolds number": "1", "k": "1", "half-width": "1"},
+    )
+    differences = _differences(printed, bare)
+    # Rows of the table that the text names, by law.
+    rows = {"pressure": 2, "empty": 4, "warm": 5, "oil": 6}
+    _, *laws = differences.columns.values()
     return Evidence(
         quantities=drag_coefficient_ends(scene).quantities,
         numbers={
@@ -179,10 +194,25 @@ def drag_coefficient(scene: Scene, level: Level, defect: str | None = None) -> E
             "liquid_low": min(of_liquids),
             "liquid_high": max(of_liquids),
             "bore_for_50": _bore_for(scene, PAPER_DRAG_COEFFICIENT),
-            **_numbers(differences),
+            **{
+                f"{name}_{law}": float(column[row])
+                for law, column in zip(("paper", "calibrated"), laws, strict=True)
+                for name, row in rows.items()
+            },
         },
         series=(_over_velocity(scene),),
         tables=(table, differences),
+    )
+
+
+def _over_velocity(scene: Scene) -> Series:
+    curve = tube_loss(scene, np.geomspace(*_FIGURE_VELOCITIES))
+    return figure(
+        "k against the velocity, the scene's tube and liquid",
+        ("velocity", "m/s", curve.velocity),
+        Curve("k(u)", "1", curve.k.value, uncertainty=curve.k.uncertainty),
+        Curve("50", "1", np.full(curve.velocity.shape, PAPER_DRAG_COEFFICIENT), style="paper"),
+        log=True,
     )
 
 
@@ -191,7 +221,7 @@ def _over_fills(scene: Scene) -> TubeLoss:
 
 
 def _with_bore(scene: Scene, factor: float) -> TubeLoss:
-    """With the bore multiplied; a bend's radius is at least the bore, so a wide tube still bends."""
+    """Loss with the bore multiplied; a bend's radius is at least the bore, so a wide tube still bends."""
     tube, bore = scene.tube, factor * scene.tube.bore
     bends = tuple(dataclasses.replace(bend, radius=max(bend.radius, bore)) for bend in tube.bends)
     return _under_gas(dataclasses.replace(scene, tube=dataclasses.replace(tube, bore=bore, bends=bends)))
@@ -208,33 +238,6 @@ def _bore_for(scene: Scene, k: float) -> float:
     return float(brentq(excess, _NARROWEST, 1.0, xtol=1e-6)) * scene.tube.bore
 
 
-def _over_velocity(scene: Scene) -> Series:
-    curve = tube_loss(scene, np.geomspace(*_VELOCITIES))
-    return figure(
-        "k against the velocity, the scene's tube and liquid",
-        ("velocity", "m/s", curve.velocity),
-        Curve("k(u)", "1", curve.k.value, uncertainty=curve.k.uncertainty),
-        Curve("50", "1", np.full(curve.velocity.shape, PAPER_DRAG_COEFFICIENT), style="paper"),
-        log=True,
-    )
-
-
-def _over_liquids(liquids: dict[str, TubeLoss]) -> CaseTable:
-    runs = liquids.values()
-    return CaseTable(
-        name="k of the scene's tube with each known liquid, equal fills, the scene's gas pressure",
-        columns={
-            "liquid": list(liquids),
-            "velocity": [float(run.velocity[0]) for run in runs],
-            "Reynolds number": [float(run.reynolds[0]) for run in runs],
-            "k": [float(run.k.value[0]) for run in runs],
-            "half-width": [float(run.k.uncertainty[0]) for run in runs],
-            "flow": [str(run.flow_state[0]) for run in runs],
-        },
-        units={"velocity": "m/s", "Reynolds number": "1", "k": "1", "half-width": "1"},
-    )
-
-
 def _differences(scene: Scene, bare: Scene) -> CaseTable:
     """Velocities of both laws over those at equal fills, each on the disc that meets Fig. 7 under it."""
     full, gas = scene.disc.max_fill_ratio, scene.gas.pressure
@@ -244,16 +247,16 @@ def _differences(scene: Scene, bare: Scene) -> CaseTable:
         "2.5 times the gas pressure": (scene.liquid, full / 2, 2.5 * gas),
         "driven chamber full": (scene.liquid, full, gas),
         "driven chamber nearly empty": (scene.liquid, 0.05 * full, gas),
-        "water at 60 degrees Celsius": (liquid_at(name="water", temperature=_WARM), full / 2, gas),
-        _OIL: (liquid_at(name=_OIL, temperature=_OIL_TABLE), full / 2, gas),
+        "water at 60 degrees Celsius": (liquid_at(name="water", temperature=_WARM_K), full / 2, gas),
+        _OIL: (liquid_at(name=_OIL, temperature=_OIL_TABLE_K), full / 2, gas),
     }
 
     columns: dict[str, Sequence[float | str]] = {"condition": list(rows)}
-    for name, law_of, given in (
+    for name, law_of, disc in (
         ("by Eq. 19, k = 50", paper_law, scene),
         ("by the calibrated law", flow_law_of, bare),
     ):
-        laws = [law_of(dataclasses.replace(given, liquid=liquid)) for liquid, _, _ in rows.values()]
+        laws = [law_of(dataclasses.replace(disc, liquid=liquid)) for liquid, _, _ in rows.values()]
         velocities = [
             float(law.evaluate(fill_ratio=fill, gas_pressure=pressure).velocity)
             for law, (_, fill, pressure) in zip(laws, rows.values(), strict=True)
@@ -263,14 +266,3 @@ def _differences(scene: Scene, bare: Scene) -> CaseTable:
         name="what differs between the laws once both meet Fig. 7: velocity over that at equal fills",
         columns=columns,
     )
-
-
-def _numbers(differences: CaseTable) -> dict[str, float]:
-    """The rows of the table that the text names, by law."""
-    rows = {"pressure": 2, "empty": 4, "warm": 5, "oil": 6}
-    _, *laws = differences.columns.values()
-    return {
-        f"{name}_{law}": float(column[row])
-        for law, column in zip(("paper", "calibrated"), laws, strict=True)
-        for name, row in rows.items()
-    }

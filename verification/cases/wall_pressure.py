@@ -19,7 +19,6 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Series,
     as_found,
     figure,
 )
@@ -42,20 +41,20 @@ from ringbalance.verification.reference.chambers import (
     whole_ring_pressure,
 )
 
-_SHARES: Final = np.array([0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
-"""Of the largest fill."""
+_FILLS_OF_MAX: Final = np.array([0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
 _JUDGED: Final = {"thin": 0, "half": 2, "full": 5}
-_SPEEDS: Final = (0.1, 0.2, 0.5, 1.0)
-"""Of the scene's speed, for the table."""
+"""Judged fills, by their positions among these."""
+_SPEED_RATIOS: Final = (0.1, 0.2, 0.5, 1.0)
+"""Speeds of the table over the scene's."""
 _PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
 _PRINTED: Final = {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
-_POINTS: Final = 41
+_CURVE_POINTS: Final = 41
 
 
 def wall_pressure_ends(scene: Scene) -> Evidence:
     """Eq. 12 against the closed form."""
-    pressure = wall_pressure_of(scene, _SHARES * scene.disc.max_fill_ratio)
-    by_eq_12 = _eq_12(scene, scene.disc, _SHARES * scene.disc.max_fill_ratio)
+    pressure = wall_pressure_of(scene, _FILLS_OF_MAX * scene.disc.max_fill_ratio)
+    by_eq_12 = _eq_12(scene, scene.disc, _FILLS_OF_MAX * scene.disc.max_fill_ratio)
     return Evidence(
         quantities={
             name: Found(value=float(pressure[index])).against(by_eq_12[index])
@@ -67,7 +66,7 @@ def wall_pressure_ends(scene: Scene) -> Evidence:
 def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Eq. 12 against finite elements over fill, plate thickness, speed and gravity."""
     disc, bare = scene.disc, with_plate(scene.disc, 0.0)
-    x = _SHARES * disc.max_fill_ratio
+    x = _FILLS_OF_MAX * disc.max_fill_ratio
     ring = ring_of(scene, tuple(x.tolist()))
     by_eq_12 = _eq_12(scene, disc, x)
     shortfall = 1 - by_eq_12 / ring.wall_pressure.value
@@ -80,6 +79,20 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
     if defect == "whole_ring":
         shape = dataclasses.replace(shape, value=whole_ring_pressure(unplated))
     gravity = _gravity_table(scene)
+    # Relative error of Eq. 12 against plate thickness, at the smallest and the largest fill.
+    widest = 0.5 * disc.inner_radius * np.sin(disc.central_angle / 2)
+    thickness = np.linspace(0, widest, 21)
+    fills = np.array([0.02, 1.0]) * disc.max_fill_ratio
+    discs = [with_plate(disc, t) for t in thickness]
+    thin, full = np.transpose(
+        [_eq_12(scene, each, fills) / wall_pressure_of(scene, fills, disc=each) - 1 for each in discs]
+    )
+    over_plates = figure(
+        "error of Eq. 12 against the thickness of the plates",
+        ("plate thickness", "m", thickness),
+        Curve("thin ring", "1", thin, style="paper"),
+        Curve("largest fill", "1", full, style="paper"),
+    )
     over_fill = figure(
         "pressure on the outer wall",
         ("fill ratio", "1", x),
@@ -102,7 +115,7 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
             ),
             "gravity": gravity.columns["change by gravity"][-1],
         },
-        series=(over_fill, _over_plates(scene)),
+        series=(over_fill, over_plates),
         convergence=(mesh_table(ring, "wall_pressure", "Pa", -1),),
         tables=(gravity,),
         status=ring.status,
@@ -118,26 +131,9 @@ def _eq_12(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
     )
 
 
-def _over_plates(scene: Scene) -> Series:
-    """Relative error of Eq. 12 against plate thickness, at the smallest and the largest fill."""
-    widest = 0.5 * scene.disc.inner_radius * np.sin(scene.disc.central_angle / 2)
-    thickness = np.linspace(0, widest, 21)
-    fills = np.array([0.02, 1.0]) * scene.disc.max_fill_ratio
-    discs = [with_plate(scene.disc, t) for t in thickness]
-    thin, full = np.transpose(
-        [_eq_12(scene, disc, fills) / wall_pressure_of(scene, fills, disc=disc) - 1 for disc in discs]
-    )
-    return figure(
-        "error of Eq. 12 against the thickness of the plates",
-        ("plate thickness", "m", thickness),
-        Curve("thin ring", "1", thin, style="paper"),
-        Curve("largest fill", "1", full, style="paper"),
-    )
-
-
 def _gravity_table(scene: Scene) -> CaseTable:
     """Mean wall pressure over a turn with gravity, relative to that without, at falling speeds."""
-    speeds = [share * scene.rotor.speed for share in _SPEEDS]
+    speeds = [share * scene.rotor.speed for share in _SPEED_RATIOS]
     middle = scene.disc.max_fill_ratio / 2
     rings = [
         ring_quantities(
@@ -150,7 +146,7 @@ def _gravity_table(scene: Scene) -> CaseTable:
         )
         for speed in speeds
     ]
-    plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEEDS)
+    plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEED_RATIOS)
     mean, closed = np.array([(ring.wall_pressure.value[0], ring.solved[0]) for ring in rings]).T
     ripple = np.array([ring.ripple["wall_pressure"][0] for ring in rings])
     return CaseTable(
@@ -172,34 +168,56 @@ def velocity_departure_ends(scene: Scene) -> Evidence:
 
 def velocity_departure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The fall under the true wall pressure, by Eq. 19's own arithmetic, and by the calibrated law."""
-    given = at_paper_density(scene)
-    physics = _departures(given)
+    printed_scene = at_paper_density(scene)
+    physics = _departures(printed_scene)
     if defect == "eq_12_used":
-        physics = {name: found.with_correction() for name, found in physics.items()}
+        physics = {name: number.with_correction() for name, number in physics.items()}
     arithmetic = {
         f"arithmetic_{name}": Found(
-            value=_eq_19(given, p),
-            input=rounded_radius(partial(_eq_19, given, p)),
+            value=_eq_19(printed_scene, p),
+            input=rounded_radius(partial(_eq_19, printed_scene, p)),
             reference=_PRINTED[name],
         )
         for name, p in _PRESSURES.items()
     }
-    share = np.linspace(0, 1, _POINTS)
-    fall = _relative_velocity(given, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share)
-    laws = {name: _law_velocity(given, pressure, share) for name, pressure in _PRESSURES.items()}
+    share = np.linspace(0, 1, _CURVE_POINTS)
+    fall = _relative_velocity(
+        printed_scene, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share
+    )
+    stall = paper.stall_pressure(
+        disc=printed_scene.disc, density=DENSITY, angular_velocity=printed_scene.rotor.speed
+    )
+    law = flow_law_of(printed_scene)
+    law_falls, figures = {}, []
+    for name, p in _PRESSURES.items():
+        velocity = law.evaluate(fill_ratio=share * law.max_fill_ratio, gas_pressure=p, primed=True).velocity
+        law_falls[f"law_{name}"] = 1 - float(velocity[0] / velocity[-1])
+        eq_19 = np.sqrt((p + stall * (2 * share - 1)) / (p + stall))
+        figures.append(
+            figure(
+                f"velocity over that of a full chamber, {p / 1e6:.1f} MPa",
+                ("fill ratio", "1", share * scene.disc.max_fill_ratio),
+                Curve("Eq. 19", "1", eq_19, style="paper"),
+                Curve("true wall pressure, one k", "1", _relative_velocity(printed_scene, p, share)),
+                Curve("calibrated law of the scene", "1", velocity / velocity[-1], style="reference"),
+            )
+        )
     return Evidence(
-        quantities={**physics, **arithmetic, **as_found(slope=np.min(np.diff(fall)) * (_POINTS - 1))},
+        quantities={**physics, **arithmetic, **as_found(slope=np.min(np.diff(fall)) * (_CURVE_POINTS - 1))},
         numbers={
-            **{f"rounded_{name}": _eq_19(given, p, RING_RADIUS.value) for name, p in _PRESSURES.items()},
-            "shortfall": 1 - _stall_by_eq_12(given) / _full_pressure(given),
-            **{f"law_{name}": 1 - float(law[0] / law[-1]) for name, law in laws.items()},
+            **{
+                f"rounded_{name}": _eq_19(printed_scene, p, RING_RADIUS.value)
+                for name, p in _PRESSURES.items()
+            },
+            "shortfall": 1 - stall / _full_pressure(printed_scene),
+            **law_falls,
         },
-        series=tuple(_fall_figure(given, p, share, laws[name]) for name, p in _PRESSURES.items()),
+        series=tuple(figures),
     )
 
 
 def _departures(scene: Scene) -> dict[str, Found]:
-    """With the true wall pressure of a full chamber; corrected, with Eq. 12's at the printed radius."""
+    """Falls with the true wall pressure of a full chamber; corrected, with Eq. 12's at the printed radius."""
     full = _full_pressure(scene)
     return {
         f"departure_{name}": Found(
@@ -213,11 +231,6 @@ def _departures(scene: Scene) -> dict[str, Found]:
 
 def _full_pressure(scene: Scene) -> float:
     return float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY))
-
-
-def _stall_by_eq_12(scene: Scene) -> float:
-    """The same by Eq. 12, Pa."""
-    return paper.stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed)
 
 
 def _eq_19(scene: Scene, pressure: float, radius: float | None = None) -> float:
@@ -240,23 +253,6 @@ def _relative_velocity(scene: Scene, pressure: float, share: FloatArray) -> Floa
     driven, other = wall_pressure_of(scene, fills, density=DENSITY)
     squared = pressure + driven - other
     return np.asarray(np.sqrt(squared / squared[-1]), dtype=np.float64)
-
-
-def _law_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:
-    law = flow_law_of(scene)
-    return law.evaluate(fill_ratio=share * law.max_fill_ratio, gas_pressure=pressure, primed=True).velocity
-
-
-def _fall_figure(scene: Scene, pressure: float, share: FloatArray, law: FloatArray) -> Series:
-    level = _stall_by_eq_12(scene)
-    eq_19 = np.sqrt((pressure + level * (2 * share - 1)) / (pressure + level))
-    return figure(
-        f"velocity over that of a full chamber, {pressure / 1e6:.1f} MPa",
-        ("fill ratio", "1", share * scene.disc.max_fill_ratio),
-        Curve("Eq. 19", "1", eq_19, style="paper"),
-        Curve("true wall pressure, one k", "1", _relative_velocity(scene, pressure, share)),
-        Curve("calibrated law of the scene", "1", law / law[-1], style="reference"),
-    )
 
 
 def rectangular_element(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

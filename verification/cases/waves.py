@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Final
@@ -59,7 +59,7 @@ def sloshing(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def _depths(disc: Disc, fills: Sequence[float]) -> FloatArray:
-    """H = ln(R2/a)."""
+    """Depths H = ln(R2/a)."""
     return np.asarray(np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=fills)))
 
 
@@ -82,7 +82,7 @@ def _exact_frequencies(disc: Disc) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def _ring_frequencies(disc: Disc, factor: float) -> FloatArray:
-    """With a factor on the Coriolis force: zero for a chamber that does not turn, or a mutation."""
+    """Natural frequencies with a factor on the Coriolis force: zero without rotation, or a mutation."""
     cells = default_sloshing_cells(disc=disc, modes=_MODES)[0]
     radii = surface_radius(disc=disc, fill_ratio=_FILLS).tolist()
     systems = (sloshing_system(disc=disc, surface_radius=a, cells=cells) for a in radii)
@@ -102,9 +102,9 @@ def _swing(disc: Disc, fills: tuple[float, ...]) -> SloshingResponse:
 def _swing_errors(
     disc: Disc, fills: tuple[float, ...], swing: SloshingResponse, *, backwards: bool
 ) -> dict[str, float]:
-    """Of moment and wall pressure, relative.
+    """Relative errors of moment and wall pressure.
 
-    Turning gravity backwards is the same as turning the Coriolis force of the reference round.
+    Gravity that turns backwards has the same effect as a reversed Coriolis force of the reference.
     """
     turned = [replace(each, mixed=-each.mixed) if backwards else each for each in _waves(disc, fills)]
     moments = [waves.amplification(frequency_ratio=1.0) for waves in turned]
@@ -123,12 +123,21 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
     bare, fills = replace(scene.disc, plate_thickness=0.0), (_IMPORTED_FILL,)
     disc = replace(bare, geometry=disc_chamber(bare, _CELLS[level]))
     exact = _waves(bare, fills)[0].frequencies(modes=_IMPORTED_MODES)
+
+    def system(mesh: Any, *, ends: float) -> SloshingSystem:
+        if defect == "an_edge_of_the_surface_taken_for_a_wall":
+            surface = mesh.boundaries[FREE_SURFACE]
+            mesh = replace(mesh, _boundaries={**mesh.boundaries, FREE_SURFACE: surface[1:]})
+        true = section_system(mesh, ends=ends)
+        factor = 1.02 if defect == "coriolis_off_by_two_percent" else 1.0
+        return replace(true, coriolis=factor * true.coriolis)
+
     imported_system.cache_clear()
-    with patch("ringbalance.physics.sloshing_system.section_system", _mutated(defect)):
-        found = sloshing_modes(disc=disc, fill_ratio=fills, modes=_IMPORTED_MODES).frequency_ratio
+    with patch("ringbalance.physics.sloshing_system.section_system", system):
+        frequencies = sloshing_modes(disc=disc, fill_ratio=fills, modes=_IMPORTED_MODES).frequency_ratio
         swing = _swing(disc, fills)
     imported_system.cache_clear()
-    values, widths = found.value[0], found.uncertainty[0]
+    values, widths = frequencies.value[0], frequencies.uncertainty[0]
     study = _still_study(bare, _LEVELS[level])
     shown = figure(
         "plane waves of an imported sector",
@@ -149,18 +158,6 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
     )
 
 
-def _mutated(defect: str | None) -> Callable[..., SloshingSystem]:
-    def system(mesh: Any, *, ends: float) -> SloshingSystem:
-        if defect == "an_edge_of_the_surface_taken_for_a_wall":
-            surface = mesh.boundaries[FREE_SURFACE]
-            mesh = replace(mesh, _boundaries={**mesh.boundaries, FREE_SURFACE: surface[1:]})
-        true = section_system(mesh, ends=ends)
-        factor = 1.02 if defect == "coriolis_off_by_two_percent" else 1.0
-        return replace(true, coriolis=factor * true.coriolis)
-
-    return system
-
-
 @lru_cache(maxsize=2)
 def _still_study(disc: Disc, levels: tuple[int, ...]) -> Convergence:
     """Frequencies without Coriolis force at half the depth, on meshes that become finer."""
@@ -169,7 +166,7 @@ def _still_study(disc: Disc, levels: tuple[int, ...]) -> Convergence:
     errors = []
     for radial in levels:
         cut = middle_section(disc_chamber(disc, (radial, 3 * radial, 2)), surface_radius=a)
-        found = _frequencies(section_system(cut.mesh, ends=0.0), 0.0)[:_IMPORTED_MODES]
-        errors.append(float(np.abs(found / exact - 1).max()))
+        frequencies = _frequencies(section_system(cut.mesh, ends=0.0), 0.0)[:_IMPORTED_MODES]
+        errors.append(float(np.abs(frequencies / exact - 1).max()))
     quantity = "frequencies without Coriolis force, largest relative error"
     return Convergence.of_errors(quantity, 2.0, size=[1 / n for n in levels], error=errors)

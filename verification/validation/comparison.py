@@ -1,4 +1,4 @@
-"""Observations, bundled ones or a user's own, beside the program's predictions: statistics, verdict, plot."""
+"""Observations, bundled ones or a user's own, with the program's predictions: statistics, verdict, plot."""
 
 # ruff: noqa: ARG001 - every study has the uniform case interface
 from __future__ import annotations
@@ -29,15 +29,14 @@ MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(
     {None: 1.0, "ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
 )
 """Factors on what is predicted; every comparison with measurements must notice the last two."""
-_FEWEST: Final = 2
+_MIN_POINTS: Final = 2
 """Points of a user's file from which a scatter can be had."""
-_FEWEST_SERIES: Final = 3
-_HELD: Final = 0.95
+_MIN_SERIES: Final = 3
 
 
 @dataclass(frozen=True, kw_only=True)
 class _ModelStatistics:
-    """How a model stands to measurements, relative to the measured values."""
+    """Errors of a model against measurements, relative to the measured values."""
 
     points: int
     series: int
@@ -46,9 +45,9 @@ class _ModelStatistics:
     bias_uncertainty: float
     """Expanded (95 %)."""
     standard_deviation: float
-    """Of the model alone: the scatter less the measurements' own."""
+    """Scatter of the model alone, less the measurements' own."""
     share_within: float
-    """Of the points whose deviation lies within both 95 % uncertainties, the model's stated one and U_D."""
+    """Fraction of the points with a deviation within both 95 % uncertainties, the stated one and U_D."""
     width_needed: float
     """Factor on both uncertainties at which they hold 95 % of the points."""
 
@@ -59,7 +58,7 @@ class _ModelStatistics:
 
 @dataclass(frozen=True, kw_only=True)
 class Predictions:
-    """All fields of one length, SI."""
+    """Measured points with their predictions, all fields of one length, SI."""
 
     measured: FloatArray
     predicted: FloatArray
@@ -69,7 +68,7 @@ class Predictions:
     """U_D, relative."""
     series: StringArray
     columns: Mapping[str, FloatArray]
-    """What the predictions need, and what else all data sets have."""
+    """Inputs of the predictions, and further columns that all data sets have."""
 
     @property
     def bias(self) -> float:
@@ -84,8 +83,13 @@ class Predictions:
 
     def where(self, chosen: BoolArray | IntArray | slice) -> Predictions:
         """Some of the points, or all in another order."""
-        own = {name: column[chosen] for name, column in vars(self).items() if name != "columns"}
-        return Predictions(**own, columns={name: column[chosen] for name, column in self.columns.items()})
+        fields = {name: column[chosen] for name, column in vars(self).items() if name != "columns"}
+        return Predictions(**fields, columns={name: column[chosen] for name, column in self.columns.items()})
+
+    @property
+    def share_within(self) -> float:
+        """Fraction of the points with a deviation within both 95 % uncertainties."""
+        return float(np.mean(self.used <= 1))
 
     @property
     def statistics(self) -> _ModelStatistics:
@@ -96,23 +100,28 @@ class Predictions:
         the n means of the series; from fewer than three series to U_D.
         Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
         """
-        ratio, used, names = np.log(self.predicted / self.measured), self.used, np.unique(self.series)
+        ratio, names = np.log(self.predicted / self.measured), np.unique(self.series)
         means = np.array([np.mean(ratio[self.series == name]) for name in names])
+        if names.size < _MIN_SERIES:
+            bias_uncertainty = float(np.mean(self.uncertainty))
+        else:
+            t = float(special.stdtrit(means.size - 1, 0.975))
+            bias_uncertainty = t * float(np.std(means, ddof=1)) / math.sqrt(means.size)
         unexplained = float(np.var(ratio, ddof=1) - np.mean((self.uncertainty / 2) ** 2))
         return _ModelStatistics(
             points=ratio.size,
             series=names.size,
             bias=self.bias,
-            bias_uncertainty=_mean_uncertainty(means, float(np.mean(self.uncertainty))),
+            bias_uncertainty=bias_uncertainty,
             standard_deviation=math.sqrt(max(unexplained, 0.0)),
-            share_within=float(np.mean(used <= 1)),
-            width_needed=float(np.quantile(used, _HELD)),
+            share_within=self.share_within,
+            width_needed=float(np.quantile(self.used, 0.95)),
         )
 
     @property
     def verdict(self) -> Verdict:
         """Confirmed where both uncertainties hold the promised fraction of the points."""
-        return Verdict.CONFIRMED if self.statistics.share_within >= PROMISED else Verdict.REFUTED
+        return Verdict.CONFIRMED if self.share_within >= PROMISED else Verdict.REFUTED
 
     def over_reynolds(self, of: str) -> Series:
         """Predicted friction factors with their stated uncertainty, and the measured ones."""
@@ -137,20 +146,13 @@ class Predictions:
         )
 
 
-def _mean_uncertainty(means: FloatArray, measurement_uncertainty: float) -> float:
-    if means.size < _FEWEST_SERIES:
-        return measurement_uncertainty
-    factor = float(special.stdtrit(means.size - 1, 0.975))
-    return factor * float(np.std(means, ddof=1)) / math.sqrt(means.size)
-
-
 def measurements(name: str) -> Observations:
     """The data set of a file in `data/`, by its name without ".csv"."""
     path = files("ringbalance.verification.validation") / "data" / f"{name}.csv"
-    found, faults = observations_of(path.read_bytes(), file=path.name)
-    if found is None:
+    observations, faults = observations_of(path.read_bytes(), file=path.name)
+    if observations is None:
         raise SceneError(faults)
-    return found
+    return observations
 
 
 def compare(*sets: Observations, mutation: str | None = None) -> Predictions:
@@ -183,25 +185,28 @@ def compare(*sets: Observations, mutation: str | None = None) -> Predictions:
 
 def friction(*sets: Observations, mutation: str | None = None) -> Predictions:
     """`compare` friction factors, in ascending order of the Reynolds number."""
-    found = compare(*sets, mutation=mutation)
-    return found.where(np.argsort(found.columns["reynolds"], kind="stable"))
+    points = compare(*sets, mutation=mutation)
+    return points.where(np.argsort(points.columns["reynolds"], kind="stable"))
 
 
-def beside_judged(
+def with_left_out(
     judged: Predictions, left_out: Mapping[str, Predictions] = MappingProxyType({}), *, taught: int = 0
 ) -> dict[str, float]:
-    """Numbers of what a case leaves out, and of all readings together.
+    """Numbers of the readings that a case leaves out, and of all readings together.
 
-    Args: `left_out`: comparisons that are not judged, by name. `taught`: readings that taught a coefficient,
-        which are no predictions and count in nothing but `taught_points`.
+    Args: `left_out`: readings that are not judged, by name. `taught`: number of readings that taught a
+        coefficient, which are no predictions and count in nothing but `taught_points`.
     Returns: `<name>_points`, `<name>_within` and `<name>_bias` of each, `all_points`, `all_within`.
     """
-    found = {"taught_points": float(taught)} if taught else {}
-    for name, one in left_out.items():
-        within = float(np.mean(one.used <= 1))
-        found |= {f"{name}_points": float(one.used.size), f"{name}_within": within, f"{name}_bias": one.bias}
-    used = np.concatenate([judged.used, *(one.used for one in left_out.values())])
-    return {**found, "all_points": float(used.size), "all_within": float(np.mean(used <= 1))}
+    numbers = {"taught_points": float(taught)} if taught else {}
+    for name, readings in left_out.items():
+        numbers |= {
+            f"{name}_points": float(readings.used.size),
+            f"{name}_within": readings.share_within,
+            f"{name}_bias": readings.bias,
+        }
+    used = np.concatenate([judged.used, *(readings.used for readings in left_out.values())])
+    return {**numbers, "all_points": float(used.size), "all_within": float(np.mean(used <= 1))}
 
 
 def study(
@@ -212,44 +217,42 @@ def study(
     sets: Sequence[str],
     unit: str,
     taught: Sequence[str] = (),
-    beside: Mapping[str, str] = MappingProxyType({}),
+    left_out: Mapping[str, str] = MappingProxyType({}),
 ) -> Evidence:
     """Evidence of a case that compares bundled data sets of one kind, whatever the scene.
 
-    Args: `unit`: of what was measured, SI. `taught`: series from which the stated uncertainty was taken; how
-        far their bias and twice their scatter are from it is found as `calibration`. `beside`: sets that are
-        not judged either, by the name of their numbers.
+    Args: `unit`: of the measured quantity, SI. `taught`: series from which the stated uncertainty was taken;
+        the quantity `calibration` compares their bias and twice their scatter with it. `left_out`: further
+        sets that are not judged, by the name of their numbers.
     """
     sources = [measurements(name) for name in sets]
     teaching = [np.isin(data.series, taught) for data in sources]
-    parts = [data.where(~one) for data, one in zip(sources, teaching, strict=True)]
-    found = data_evidence(*parts, unit=unit, mutation=defect)
-    others = {name: compare(measurements(other)) for name, other in beside.items()}
-    count = sum(int(one.sum()) for one in teaching)
-    more = beside_judged(compare(*parts, mutation=defect), others, taught=count)
+    parts = [data.where(~series) for data, series in zip(sources, teaching, strict=True)]
+    evidence = data_evidence(*parts, unit=unit, mutation=defect)
+    others = {name: compare(measurements(other)) for name, other in left_out.items()}
+    count = sum(int(series.sum()) for series in teaching)
+    beyond = with_left_out(compare(*parts, mutation=defect), others, taught=count)
+    numbers = {**evidence.numbers, **beyond}
     if not count:
-        return dataclasses.replace(found, numbers={**found.numbers, **more})
-    rest = [data.where(one) for data, one in zip(sources, teaching, strict=True) if one.any()]
+        return dataclasses.replace(evidence, numbers=numbers)
+    rest = [data.where(series) for data, series in zip(sources, teaching, strict=True) if series.any()]
     teachers = compare(*rest, mutation=defect)
     width = math.hypot(teachers.bias, 2 * teachers.statistics.standard_deviation)
-    more["taught_width"] = width
     stated = float(np.mean(teachers.stated / teachers.predicted))
     return dataclasses.replace(
-        found,
-        quantities={**found.quantities, **as_found(calibration=abs(width / stated - 1))},
-        numbers={**found.numbers, **more},
+        evidence,
+        quantities={**evidence.quantities, **as_found(calibration=abs(width / stated - 1))},
+        numbers={**numbers, "taught_width": width},
     )
 
 
 def data_evidence(*sets: Observations, unit: str, mutation: str | None = None) -> Evidence:
-    """Evidence of a case that compares data sets of one kind. Args: `unit`: of what was measured, SI."""
-    comparison = compare(*sets, mutation=mutation)
+    """Evidence of a case that compares data sets of one kind. Args: `unit`: of the measured quantity, SI."""
+    points = compare(*sets, mutation=mutation)
     return Evidence(
-        quantities=as_found(
-            share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)
-        ),
-        numbers=comparison.statistics.numbers(),
-        series=(comparison.scatter(KINDS[sets[0].kind].title, unit),),
+        quantities=as_found(share_within=points.share_within, bias=abs(points.bias)),
+        numbers=points.statistics.numbers(),
+        series=(points.scatter(KINDS[sets[0].kind].title, unit),),
     )
 
 
@@ -259,11 +262,15 @@ def data_document(path: Path) -> dict[str, Any]:
     Raises: SceneError: not such a file, or too few points.
     """
     (data,) = read_observations([path])
-    kind, comparison = KINDS[data.kind], compare(data)
-    if len(data) < _FEWEST:
+    kind, points = KINDS[data.kind], compare(data)
+    if len(data) < _MIN_POINTS:
         raise SceneError.of_file(
-            data.file, f"{len(data)} point, and {_FEWEST} are the fewest that can be judged"
+            data.file, f"{len(data)} point, and {_MIN_POINTS} are the fewest that can be judged"
         )
+    series = {}
+    for name in np.unique(points.series).tolist():
+        part = points.where(points.series == name)
+        series[name] = {"points": part.measured.size, "bias": part.bias, "share_within": part.share_within}
     return {
         "file": str(path),
         "kind": data.kind,
@@ -271,27 +278,18 @@ def data_document(path: Path) -> dict[str, Any]:
         "source": data.source,
         "measured": kind.measured[0].name,
         "limit": PROMISED,
-        "verdict": comparison.verdict.value,
-        "statistics": vars(comparison.statistics),
-        "series": {name: _of_series(comparison, name) for name in np.unique(comparison.series).tolist()},
+        "verdict": points.verdict.value,
+        "statistics": vars(points.statistics),
+        "series": series,
         "points": [
             dict(zip(("series", "measured", "predicted", "stated", "U_D"), row, strict=True))
             for row in zip(
-                comparison.series.tolist(),
-                comparison.measured.tolist(),
-                comparison.predicted.tolist(),
-                comparison.stated.tolist(),
-                comparison.uncertainty.tolist(),
+                points.series.tolist(),
+                points.measured.tolist(),
+                points.predicted.tolist(),
+                points.stated.tolist(),
+                points.uncertainty.tolist(),
                 strict=True,
             )
         ],
-    }
-
-
-def _of_series(comparison: Predictions, name: str) -> Mapping[str, float]:
-    one = comparison.where(comparison.series == name)
-    return {
-        "points": one.measured.size,
-        "bias": one.bias,
-        "share_within": float(np.mean(one.used <= 1)),
     }

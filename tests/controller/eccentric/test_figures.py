@@ -18,11 +18,11 @@ from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.verification.cases import driven_balancing
 from ringbalance.verification.cases.driven_balancing import (
     _balanced_at_constant_speed,
-    _beside_the_targets,
     _estimate_imbalance,
     _figure_four,
     _imbalance_record,
     _motion_bound,
+    _off_target,
     run_up,
 )
 from ringbalance.verification.cases.driven_positioning import _efforts, _printed_compensation, growth
@@ -51,7 +51,7 @@ def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricSce
 
 
 def test_figure_eight_is_mended_by_fine_tuning(paper: EccentricScene) -> None:
-    result = _balanced_at_constant_speed(_beside_the_targets(paper), time_limit=200.0)
+    result = _balanced_at_constant_speed(_off_target(paper), time_limit=200.0)
     plant = PlantParameters.of(paper)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
     expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))

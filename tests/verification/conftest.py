@@ -67,15 +67,15 @@ VERIFICATION = (
 class MadeUpCode:
     """Code of the made-up case: ten, unless a defect is built in."""
 
-    found: Found = field(default_factory=lambda: Found(value=10.0))
-    defect: Callable[[Found, str | None, Scene], Found] = lambda found, defect, _: (
-        Found(value=found.value + 1) if defect == "off_by_one" else found
+    number: Found = field(default_factory=lambda: Found(value=10.0))
+    defect: Callable[[Found, str | None, Scene], Found] = lambda number, defect, _: (
+        Found(value=number.value + 1) if defect == "off_by_one" else number
     )
 
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         thicker = scene.disc.plate_thickness == 0.004
-        found = Found(value=20.0) if thicker else self.defect(self.found, defect, scene)
-        return Evidence(quantities={"answer": found.against(10.0)}, numbers={"doubt": 0.0123})
+        number = Found(value=20.0) if thicker else self.defect(self.number, defect, scene)
+        return Evidence(quantities={"answer": number.against(10.0)}, numbers={"doubt": 0.0123})
 
 
 @pytest.fixture

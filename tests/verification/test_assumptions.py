@@ -1,4 +1,4 @@
-"""What nobody gave widens a claim, and can only take a verdict away."""
+"""Inputs that nobody gave widen a claim, and can only take a verdict away."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BORE = RestsOn(path="tube.bore")
 
 
 def with_origin(scene: Scene, path: str, origin: str) -> Scene:
-    others = [(known, word) for known, word in scene.origins if known != path]
+    others = [pair for pair in scene.origins if pair[0] != path]
     return dataclasses.replace(scene, origins=(*others, (path, origin)))  # type: ignore[arg-type]
 
 
@@ -38,8 +38,8 @@ def test_what_somebody_vouches_for_is_no_assumption(paper_scene: Scene, origin: 
 def test_an_assumed_part_has_the_wider_range_and_an_inferred_value_the_stated_one(paper_scene: Scene) -> None:
     def ends(origin: str, share: float) -> tuple[float, float]:
         scene = stating(with_origin(paper_scene, "tube.bore", origin), "bore", share)
-        (found,) = assumptions_of([BORE], scene)
-        return found.low / found.value, found.high / found.value
+        (bore,) = assumptions_of([BORE], scene)
+        return bore.low / bore.value, bore.high / bore.value
 
     assert ends("assumed", 0.01) == pytest.approx((0.5, 1.5))
     assert ends("assumed", 0.9) == pytest.approx((0.1, 1.9))
@@ -48,8 +48,8 @@ def test_an_assumed_part_has_the_wider_range_and_an_inferred_value_the_stated_on
 
 def test_a_range_of_its_own_goes_first_and_none_at_all_is_an_error(paper_scene: Scene) -> None:
     scene = stating(with_origin(paper_scene, "tube.bore", "inferred"), "bore", 0.01)
-    (own,) = assumptions_of([RestsOn(path="tube.bore", low=1e-3, high=2e-3, why="so")], scene)
-    assert (own.low, own.high, own.why) == (1e-3, 2e-3, "so")
+    (assumption,) = assumptions_of([RestsOn(path="tube.bore", low=1e-3, high=2e-3, why="so")], scene)
+    assert (assumption.low, assumption.high, assumption.why) == (1e-3, 2e-3, "so")
     with pytest.raises(ValueError, match=r"environment\.gravity: nobody gave it"):
         assumptions_of([RestsOn(path="environment.gravity")], dataclasses.replace(scene, uncertainty=()))
 
@@ -70,9 +70,9 @@ class Thick:
         return self.per_mm * (1e3 * scene.disc.plate_thickness - 2.777)
 
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
-        found = Found(value=10.0 + self.offset + self._more(scene))
+        number = Found(value=10.0 + self.offset + self._more(scene))
         reference = 10.0 + (self._more(scene) if self.shared else 0.0)
-        return Evidence(quantities={"answer": found.against(reference)}, numbers={"doubt": 0.0})
+        return Evidence(quantities={"answer": number.against(reference)}, numbers={"doubt": 0.0})
 
 
 RESTS = (
@@ -101,7 +101,7 @@ def test_a_claim_is_decided_where_it_is_so_over_the_whole_range(
     code = Thick(per_mm=per_mm, offset=offset, shared=shared)
     result = run_definition(definition, code, scene=paper_scene)
     assert result.verdict == expected
-    assert [one.path for one in result.assumptions] == ["disc.plate_thickness"]
+    assert [each.path for each in result.assumptions] == ["disc.plate_thickness"]
     given_by_all = with_origin(paper_scene, "disc.plate_thickness", "given")
     alone = run_definition(definition, code, scene=given_by_all)
     assert alone.verdict == ("refuted" if offset else "confirmed")
@@ -116,7 +116,7 @@ widths = st.floats(0.0, 5.0)
     metric=st.sampled_from(["validation", "at_most", "at_least"]),
     value=numbers,
     corrected=st.none() | numbers,
-    known=widths,
+    half_width=widths,
     reach=st.tuples(widths, widths),
     wider=st.floats(1.0, 100.0),
 )
@@ -124,15 +124,15 @@ def test_widening_an_assumption_only_weakens(
     metric: Metric,
     value: float,
     corrected: float | None,
-    known: float,
+    half_width: float,
     reach: tuple[float, float],
     wider: float,
 ) -> None:
     def verdict(factor: float) -> Verdict:
-        found = Found(value=value, input=known, corrected=corrected)
-        found = found.moved(-factor * reach[0], factor * reach[1])
+        number = Found(value=value, input=half_width, corrected=corrected)
+        number = number.moved(-factor * reach[0], factor * reach[1])
         reference = Reference(value=10.0, uncertainty=0.1)
-        return judge_quantity(kind="claim", metric=metric, limit=0.5, number=found.against(reference))[0]
+        return judge_quantity(kind="claim", metric=metric, limit=0.5, number=number.against(reference))[0]
 
     assert verdict(wider) in (verdict(1.0), Verdict.INCONCLUSIVE)
     assert verdict(1.0) in (verdict(0.0), Verdict.INCONCLUSIVE)
@@ -166,7 +166,7 @@ NUMBERS = {
 @pytest.mark.parametrize("case", CHEAP)
 def test_no_verdict_rests_on_an_assumption_that_it_does_not_name(paper_scene: Scene, case: str) -> None:
     definition: CaseDefinition = load_case(case)
-    named = {one.path for one in definition.rests_on}
+    named = {needed.path for needed in definition.rests_on}
     changed = paper_scene
     for table, keys in NUMBERS.items():
         part = getattr(changed, table)
@@ -176,7 +176,7 @@ def test_no_verdict_rests_on_an_assumption_that_it_does_not_name(paper_scene: Sc
     errors = []
     for scene in (paper_scene, changed):
         evidence = code.compute(scene, "light")
-        errors.append({name: found.error for name, found in evidence.quantities.items()})
+        errors.append({name: number.error for name, number in evidence.quantities.items()})
     for quantity in definition.quantity:
         against = evidence.quantities[quantity.name].reference
         passes = quantity.limit * (1.0 if against is None else against.value)

@@ -1,4 +1,4 @@
-"""What is written for OpenFOAM and read from it; the kept comparison.  OpenFOAM itself is not needed."""
+"""Files written for OpenFOAM and read from it; the stored comparison.  OpenFOAM itself is not needed."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def test_a_face_between_two_cells_is_no_boundary(modules: dict[str, ModuleType],
 def test_free_frequencies_are_found_again(modules: dict[str, ModuleType]) -> None:
     time = np.arange(0, 10 * 2 * np.pi, 2 * np.pi / 150)
     values = 3 + np.cos(0.62 * time + 0.3) + 0.3 * np.cos(1.22 * time) * np.exp(-0.005 * time)
-    found = modules["waves"].frequencies(time, values, after=0.4, count=2)
-    assert found == pytest.approx([0.62, 1.22], rel=1e-3)
+    result = modules["waves"].frequencies(time, values, after=0.4, count=2)
+    assert result == pytest.approx([0.62, 1.22], rel=1e-3)
 
 
 def test_the_quasi_static_swing_is_that_of_a_level_surface(modules: dict[str, ModuleType]) -> None:
@@ -89,8 +89,8 @@ def test_the_quasi_static_swing_is_that_of_a_level_surface(modules: dict[str, Mo
 
 def test_a_swing_is_told_from_mean_and_drift(modules: dict[str, ModuleType]) -> None:
     time = np.arange(0, 6 * 2 * np.pi, 0.05)
-    found = modules["waves"].swing(time, 1 + 0.01 * time + 0.2 * np.cos(time - 0.4), turns=3)
-    assert abs(found) == pytest.approx(0.2, rel=1e-6)
+    result = modules["waves"].swing(time, 1 + 0.01 * time + 0.2 * np.cos(time - 0.4), turns=3)
+    assert abs(result) == pytest.approx(0.2, rel=1e-6)
 
 
 def test_the_page_shows_what_was_kept(modules: dict[str, ModuleType]) -> None:

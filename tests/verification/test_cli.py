@@ -48,7 +48,7 @@ def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "meant"),
+    ("case_id", "meant"),
     [
         ("claim_6", "claim_06_wall_pressure"),
         ("gci_celik", "gci_celik2008"),
@@ -57,12 +57,12 @@ def test_the_list_runs_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_an_unknown_case_is_bad_input(
-    capsys: pytest.CaptureFixture[str], asked: str, meant: str | None
+    capsys: pytest.CaptureFixture[str], case_id: str, meant: str | None
 ) -> None:
-    assert run_command("verify", case_ids=(asked,)) == 2
+    assert run_command("verify", case_ids=(case_id,)) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert f'unknown case "{asked}"' in printed.err
+    assert f'unknown case "{case_id}"' in printed.err
     assert ("did you mean" in printed.err) == (meant is not None)
     assert meant is None or f'"{meant}"' in printed.err
 
@@ -81,7 +81,7 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     paper_scene: Scene,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    wrong = made_up_code(found=Found(value=20.0))
+    wrong = made_up_code(number=Found(value=20.0))
     refuted = run_definition(claim, wrong, scene=paper_scene)
     failed = run_definition(verification, wrong, scene=paper_scene)
     solution = dataclasses.replace(
@@ -92,7 +92,7 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     assert _exit_code([refuted]) == 0
     assert _exit_code([solution]) == 0
     assert _exit_code([refuted, failed]) == 1
-    blind = made_up_code(defect=lambda found, _, __: found)
+    blind = made_up_code(defect=lambda number, _, __: number)
     broken = run_definition(claim, blind, scene=paper_scene, mutations=True)
     assert _exit_code([broken]) == 1
     _print_results([broken, refuted])

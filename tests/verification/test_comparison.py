@@ -14,15 +14,15 @@ SMALL = st.floats(min_value=0, max_value=1e6)
 ANY = st.floats(min_value=-1e6, max_value=1e6)
 
 
-def compare(found: Found, reference: float, uncertainty: float = 0.0) -> Deviation:
-    return found.compared(Reference(value=reference, uncertainty=uncertainty))
+def compare(number: Found, reference: float, uncertainty: float = 0.0) -> Deviation:
+    return number.compared(Reference(value=reference, uncertainty=uncertainty))
 
 
 def test_three_four_twelve_thirteen() -> None:
-    found = compare(Found(value=10.0, numerical=3.0, input=4.0), 4.0, 12.0)
-    assert found.error == 6.0
-    assert found.half_width == pytest.approx(26.0)
-    assert found.consistent
+    number = compare(Found(value=10.0, numerical=3.0, input=4.0), 4.0, 12.0)
+    assert number.error == 6.0
+    assert number.half_width == pytest.approx(26.0)
+    assert number.consistent
 
 
 def test_an_error_just_outside_is_seen() -> None:
@@ -54,8 +54,8 @@ def test_what_is_not_a_number_is_refused(value: float, numerical: float, input_:
 
 @given(ANY, ANY, SMALL, SMALL, SMALL)
 def test_more_uncertainty_never_turns_agreement_into_difference(
-    found: float, reference: float, numerical: float, input_: float, more: float
+    number: float, reference: float, numerical: float, input_: float, more: float
 ) -> None:
-    before = compare(Found(value=found, numerical=numerical, input=input_), reference)
-    after = compare(Found(value=found, numerical=numerical, input=input_ + more), reference)
+    before = compare(Found(value=number, numerical=numerical, input=input_), reference)
+    after = compare(Found(value=number, numerical=numerical, input=input_ + more), reference)
     assert after.consistent or not before.consistent

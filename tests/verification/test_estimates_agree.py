@@ -61,9 +61,9 @@ def test_sloshing_is_judged_at_the_worst_fill(paper_scene: Scene) -> None:
     """At 3000 rpm the wall pressure without sloshing is off by 2.3 % at the largest fill."""
     scene = with_tables(paper_scene, rotor={"speed": 3000 * math.pi / 30})
     rows = {row["term"]: row for row in calibration_document(calibrate(scene))["models_used"]}
-    found = rows["gravity ripple at 1x and sloshing"]
-    assert found["estimated_contribution"] > 0.023
-    assert found["model"].startswith("apart")
+    row = rows["gravity ripple at 1x and sloshing"]
+    assert row["estimated_contribution"] > 0.023
+    assert row["model"].startswith("apart")
 
 
 @pytest.mark.parametrize(("rpm", "code"), [(600, "no_ring"), (2000, "out_of_range"), (10_000, "ok")])

@@ -102,11 +102,11 @@ def test_a_belief_about_the_rotor_follows_the_rotor(paper_scene: Scene) -> None:
 
 
 def test_the_papers_scene_is_solved(paper_scene: Scene) -> None:
-    found = at(paper_scene, {})
-    assert found.ending is Ending.SOLVED
-    assert found.violations == ()
-    assert 0 < found.worst_ratio <= 1
-    assert 0 < found.residual < 1e-10
+    result = at(paper_scene, {})
+    assert result.ending is Ending.SOLVED
+    assert result.violations == ()
+    assert 0 < result.worst_ratio <= 1
+    assert 0 < result.residual < 1e-10
 
 
 @pytest.fixture(scope="module")
@@ -120,17 +120,29 @@ def short() -> Scene:
 def test_a_scene_of_little_more_than_a_disc_can_be_varied_along_every_axis(
     short: Scene, axis: InputAxis
 ) -> None:
-    found = at(short, {axis.name: float(axis.at(0.5))})
-    assert found.violations == ()
-    assert found.loop
+    assert scene_at(short, {axis.name: float(axis.at(0.5))}) != short
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        axis if axis.name in ("angle", "pressure") else pytest.param(axis, marks=pytest.mark.heavy)
+        for axis in AXES
+    ],
+    ids=lambda axis: axis.name,
+)
+def test_such_a_scene_holds_along_every_axis(short: Scene, axis: InputAxis) -> None:
+    result = at(short, {axis.name: float(axis.at(0.5))})
+    assert result.violations == ()
+    assert result.loop
 
 
 def test_a_rotor_without_a_ring_is_refused_by_name(paper_scene: Scene) -> None:
-    found = at(paper_scene, {"speed": 10.0})
-    assert found.ending is Ending.REFUSED
-    assert "[rotor] speed" in found.text
-    assert "/" not in found.text.split(": ")[0]
-    assert found.violations == ()
+    result = at(paper_scene, {"speed": 10.0})
+    assert result.ending is Ending.REFUSED
+    assert "[rotor] speed" in result.text
+    assert "/" not in result.text.split(": ")[0]
+    assert result.violations == ()
 
 
 def test_half_widths_too_small_and_lost_liquid_are_noticed(paper_scene: Scene) -> None:
@@ -156,13 +168,13 @@ def test_a_head_that_falls_with_the_velocity_is_noticed(calibration: Calibration
     assert "head" in faults(calibration, tube=replace(tube, k=falling))
 
 
-@pytest.mark.parametrize(("name", "told"), [("wall_pressure", "wall pressure"), ("moment", "moment")])
+@pytest.mark.parametrize(("name", "title"), [("wall_pressure", "wall pressure"), ("moment", "moment")])
 def test_a_chamber_quantity_that_does_not_grow_is_noticed(
-    calibration: Calibration, name: str, told: str
+    calibration: Calibration, name: str, title: str
 ) -> None:
     curve = getattr(calibration.chamber, name)
     spoiled = replace(calibration.chamber, **{name: replace(curve, value=-curve.value)})
-    assert f"the {told} does not grow" in faults(calibration, chamber=spoiled)
+    assert f"the {title} does not grow" in faults(calibration, chamber=spoiled)
 
 
 def test_a_velocity_that_falls_with_the_pressure_is_noticed(
@@ -183,9 +195,9 @@ def test_an_exception_is_a_finding(paper_scene: Scene, monkeypatch: pytest.Monke
         raise ZeroDivisionError("by accident")
 
     monkeypatch.setattr(extremes_point, "calibrate", fails)
-    found = at(paper_scene, {})
-    assert found.ending is Ending.BROKEN
-    assert found.violations == ("exception ZeroDivisionError: by accident",)
+    result = at(paper_scene, {})
+    assert result.ending is Ending.BROKEN
+    assert result.violations == ("exception ZeroDivisionError: by accident",)
 
 
 @pytest.fixture
@@ -209,7 +221,7 @@ SMALL = Size(points=10, sweep=5, fineness=1.0)
 def test_an_interrupted_study_resumes_where_it_stopped(
     paper_scene: Scene, tmp_path: Path, counting: list[Point]
 ) -> None:
-    whole = find_extremes(paper_scene, size=SMALL).to_dict()
+    complete = find_extremes(paper_scene, size=SMALL).to_dict()
     counting.clear()
 
     def stop(what: str, done: int, _: int) -> None:
@@ -219,28 +231,28 @@ def test_an_interrupted_study_resumes_where_it_stopped(
     with pytest.raises(KeyboardInterrupt):
         find_extremes(paper_scene, size=SMALL, folder=tmp_path, progress=stop)
     assert len(counting) == 17
-    assert find_extremes(paper_scene, size=SMALL, folder=tmp_path).to_dict() == whole
-    assert len(counting) == whole["judged"]
+    assert find_extremes(paper_scene, size=SMALL, folder=tmp_path).to_dict() == complete
+    assert len(counting) == complete["judged"]
     find_extremes(paper_scene.with_values({"tube.bore": "1.6 mm"}), size=SMALL, folder=tmp_path)
-    assert len(counting) == 2 * whole["judged"]
+    assert len(counting) == 2 * complete["judged"]
 
 
 def test_everything_is_reported(paper_scene: Scene, counting: list[Point]) -> None:
-    found = find_extremes(paper_scene, size=SMALL)
-    document = found.to_dict()
+    result = find_extremes(paper_scene, size=SMALL)
+    document = result.to_dict()
     assert len(counting) == document["judged"] == 10 + 5 * len(AXES)
-    assert found.broken() == 0
+    assert result.broken() == 0
     assert sum(document["endings"].values()) == document["judged"]
     json.dumps(document, allow_nan=False)
 
 
 @pytest.mark.usefixtures("counting")
 def test_a_sweep_finds_where_answers_end(paper_scene: Scene) -> None:
-    found = find_extremes(paper_scene, size=Size(points=1, sweep=11, fineness=1e-3)).sweeps[0].to_dict()
-    assert np.all(np.diff(found["values"]) > 0)
-    assert found["answered"] == [pytest.approx(300, rel=0.02), pytest.approx(2e4, rel=0.02)]
-    assert found["beyond"] == ["too fast"]
-    below, between, above = found["spans"]
+    result = find_extremes(paper_scene, size=Size(points=1, sweep=11, fineness=1e-3)).sweeps[0].to_dict()
+    assert np.all(np.diff(result["values"]) > 0)
+    assert result["answered"] == [pytest.approx(300, rel=0.02), pytest.approx(2e4, rel=0.02)]
+    assert result["beyond"] == ["too fast"]
+    below, between, above = result["spans"]
     assert (below["low"], above["high"]) == (pytest.approx(1), pytest.approx(3e5))
     assert below["high"] < 300 < between["low"]
     assert between["high"] < 2e4 < above["low"]
@@ -261,11 +273,11 @@ def test_a_stretch_has_the_message_next_to_the_answers() -> None:
 @pytest.mark.heavy
 def test_two_workers_find_what_one_finds(paper_scene: Scene) -> None:
     few = Size(points=10, sweep=2, fineness=1.0)
-    one, two = (find_extremes(paper_scene, size=few, workers=n).to_dict() for n in (1, 2))
-    assert one == two
+    single, two = (find_extremes(paper_scene, size=few, workers=n).to_dict() for n in (1, 2))
+    assert single == two
 
 
 def test_a_few_designed_points_hold(paper_scene: Scene) -> None:
     for point in designed_set(count=4, seed=1):
-        found = at(paper_scene, point)
-        assert found.violations == (), (found.text, dict(point))
+        result = at(paper_scene, point)
+        assert result.violations == (), (result.text, dict(point))

@@ -162,25 +162,15 @@ def test_wrong_code_is_one_sentence_and_stops_no_other(
         assert word in printed.err
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "named"),
-    [
-        ('claim = "Two and two are four."\n', "", "claim"),
-        ("limit = 1e-12", "limit = 0.0", "limit must be positive"),
-        ('kind = "code_verification"', "kind = code", "Invalid value"),
-        ('kind = "code_verification"', 'kind = "code_verification"\nabout = ["cheese"]', "about"),
-    ],
-)
 def test_a_wrong_text_is_one_sentence_and_stops_no_other(
-    folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, named: str
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert old in TEXT
-    _write(folder, "wrong", CODE, TEXT.replace(old, new))
+    _write(folder, "wrong", CODE, TEXT.replace("limit = 1e-12", "limit = 0.0"))
     assert run_command("verify", case_ids=("good",), cases=folder) == 2
     printed = capsys.readouterr()
     assert "1 passed" in printed.out
     assert len(printed.err.splitlines()) == 1
-    for word in ("wrong/case.toml", named):
+    for word in ("wrong/case.toml", "limit must be positive"):
         assert word in printed.err
 
 
@@ -195,6 +185,6 @@ def test_a_case_asked_for_by_name_says_what_is_wrong_with_its_text(
 
 
 def test_a_folder_without_cases_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for place in (tmp_path, tmp_path / "missing"):
-        assert run_command("verify", case_ids=("claim_12_correction_mass",), cases=place) == 2
-        assert str(place) in capsys.readouterr().err
+    for folder in (tmp_path, tmp_path / "missing"):
+        assert run_command("verify", case_ids=("claim_12_correction_mass",), cases=folder) == 2
+        assert str(folder) in capsys.readouterr().err

@@ -42,8 +42,8 @@ def test_the_moment_with_plates_by_two_integrals(paper_scene: Scene) -> None:
         epsabs=0,
         epsrel=1e-10,
     )
-    found = float(exact_moment(disc=disc, density=1000, fill_ratio=0.3))
-    assert found == pytest.approx(1000 * disc.axial_width * value, rel=1e-9)
+    result = float(exact_moment(disc=disc, density=1000, fill_ratio=0.3))
+    assert result == pytest.approx(1000 * disc.axial_width * value, rel=1e-9)
 
 
 def test_lambda_approaches_its_limit_at_the_centre(paper_scene: Scene) -> None:
@@ -59,41 +59,43 @@ def test_the_wall_pressure_holds_the_centrifugal_force_of_a_thin_film(paper_scen
     film = fill * chamber_volume(disc=disc) / disc.axial_width
     arc = 2 * disc.outer_radius * float(half_angle(disc=disc, radius=disc.outer_radius))
     thin = 1000 * 500.0**2 * disc.outer_radius * film / arc
-    found = exact_wall_pressure(disc=disc, density=1000, angular_velocity=500.0, fill_ratio=fill)
-    assert float(found) == pytest.approx(thin, rel=1e-5)
+    result = exact_wall_pressure(disc=disc, density=1000, angular_velocity=500.0, fill_ratio=fill)
+    assert float(result) == pytest.approx(thin, rel=1e-5)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_derivatives_of_the_manufactured_pressure(dimension: int) -> None:
     exact = Manufactured(length=0.0445, width=0.062)
-    place = np.array([0.031, 0.012, 0.009])[:dimension]
+    point = np.array([0.031, 0.012, 0.009])[:dimension]
     step = 1e-5
     shifts = step * np.eye(dimension)
-    ahead = np.array([exact.pressure(place + d) for d in shifts])
-    behind = np.array([exact.pressure(place - d) for d in shifts])
-    np.testing.assert_allclose(exact.gradient(place), (ahead - behind) / (2 * step), rtol=1e-6)
+    ahead = np.array([exact.pressure(point + d) for d in shifts])
+    behind = np.array([exact.pressure(point - d) for d in shifts])
+    np.testing.assert_allclose(exact.gradient(point), (ahead - behind) / (2 * step), rtol=1e-6)
 
 
 def test_the_manufactured_flow_satisfies_its_equation() -> None:
     """All derivatives once more by central differences, in the equation itself."""
-    place, step = np.array([0.12, 0.21]), 1e-4
+    point, step = np.array([0.12, 0.21]), 1e-4
 
     def derivative(field: Callable[[np.ndarray], np.ndarray], axis: int) -> np.ndarray:
         shift = step * np.eye(2)[axis]
-        return np.asarray((field(place + shift) - field(place - shift)) / (2 * step))
+        return np.asarray((field(point + shift) - field(point - shift)) / (2 * step))
 
     def second(axis: int) -> np.ndarray:
         shift = step * np.eye(2)[axis]
-        ahead, behind = case.velocity(place + shift), case.velocity(place - shift)
-        return (ahead + behind - 2 * case.velocity(place)) / step**2
+        ahead, behind = case.velocity(point + shift), case.velocity(point - shift)
+        return (ahead + behind - 2 * case.velocity(point)) / step**2
 
-    u, v, w = case.velocity(place)
-    along = [derivative(case.velocity, axis) for axis in (0, 1)]
-    assert along[0][0] + along[1][1] == pytest.approx(0.0, abs=1e-7)
+    u, v, w = case.velocity(point)
+    gradients = [derivative(case.velocity, axis) for axis in (0, 1)]
+    assert gradients[0][0] + gradients[1][1] == pytest.approx(0.0, abs=1e-7)
     turning = np.array([w, 0.0, -u])
     slope = np.array([*(derivative(case.pressure, axis) for axis in (0, 1)), 0.0])
-    expected = 3.0 * (u * along[0] + v * along[1]) + 5.0 * turning - 0.7 * (second(0) + second(1)) + slope
-    np.testing.assert_allclose(case.body_force(place), expected, rtol=1e-5, atol=1e-5)
+    expected = (
+        3.0 * (u * gradients[0] + v * gradients[1]) + 5.0 * turning - 0.7 * (second(0) + second(1)) + slope
+    )
+    np.testing.assert_allclose(case.body_force(point), expected, rtol=1e-5, atol=1e-5)
 
 
 def test_the_exact_ring_across_the_shaft_is_a_circle_that_holds_the_liquid(disc: Disc) -> None:
@@ -136,5 +138,5 @@ def disc(paper_scene: Scene) -> Disc:
 
 def test_input_uncertainty_of_a_product() -> None:
     # f = a b with a = 3 +- 0.1, b = 4 +- 0.2: u^2 = (4 0.1)^2 + (3 0.2)^2.
-    found = input_uncertainty([(lambda a: a * 4, 3.0, 0.1), (lambda b: 3 * b, 4.0, 0.2)])
-    assert found == pytest.approx(math.hypot(0.4, 0.6))
+    result = input_uncertainty([(lambda a: a * 4, 3.0, 0.1), (lambda b: 3 * b, 4.0, 0.2)])
+    assert result == pytest.approx(math.hypot(0.4, 0.6))

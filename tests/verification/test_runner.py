@@ -34,14 +34,14 @@ def test_every_mutation_is_run_and_caught(
     for definition in (claim, verification):
         result = run_definition(definition, made_up_code(), scene=paper_scene, mutations=True)
         mutations = result.mutations
-        assert [mutation.id for mutation in mutations] == ["off_by_one", "thicker"]
+        assert [each.mutation.id for each in mutations] == ["off_by_one", "thicker"]
         assert all(mutation.caught for mutation in mutations)
 
 
 def test_a_case_that_misses_a_defect_is_broken(
     claim: CaseDefinition, made_up_code: Any, paper_scene: Scene
 ) -> None:
-    blind = made_up_code(defect=lambda found, _, __: found)
+    blind = made_up_code(defect=lambda number, _, __: number)
     result = run_definition(claim, blind, scene=paper_scene, mutations=True)
     assert [mutation.caught for mutation in result.mutations] == [False, True]
     assert result.broken
@@ -176,8 +176,12 @@ def test_the_eccentric_masses_are_compiled_in_one_process(paper_scene: Scene) ->
 def test_processes_give_what_one_process_gives(paper_scene: Scene) -> None:
     alone = run_cases(QUICK, scene=paper_scene, mutations=True)
     spread = run_cases(QUICK, scene=paper_scene, mutations=True, workers=2)
-    for one, other in zip(alone, spread, strict=True):
-        assert (one.verdict, one.numbers, one.mutations) == (other.verdict, other.numbers, other.mutations)
+    for single, other in zip(alone, spread, strict=True):
+        assert (single.verdict, single.numbers, single.mutations) == (
+            other.verdict,
+            other.numbers,
+            other.mutations,
+        )
 
 
 def test_a_case_about_a_sector_says_why_it_does_not_judge_an_imported_chamber(paper_scene: Scene) -> None:

@@ -1,7 +1,8 @@
-"""What stands behind each quantity: from the cases, and from nothing else."""
+"""Basis of each quantity: from the cases, and from nothing else."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import pytest
@@ -21,6 +22,11 @@ def _case(**changes: Any) -> dict[str, Any]:
 
 def _cell(*cases: dict[str, Any], subject: str = "friction", head: str = "Validated by measurements") -> str:
     return standing_rows(cases)[list(SUBJECTS).index(subject)][HEADS.index(head)]
+
+
+@lru_cache(maxsize=8)
+def _measured(name: str) -> dict[str, Any]:
+    return run_case(f"measured_{name}", scene=paper_scene()).to_dict()
 
 
 def test_measurements_show_their_points_and_what_was_found() -> None:
@@ -53,20 +59,20 @@ def test_what_is_left_out_is_counted_and_what_taught_is_no_prediction(
     name: str, readings: int, judged: str, everything: str, left_out: str
 ) -> None:
     """Against the rows of the data files."""
-    case = run_case(f"measured_{name}", scene=paper_scene()).to_dict()
+    case = _measured(name)
     subject, numbers = case["about"][0], case["numbers"]
     assert judged in _cell(case, subject=subject)
     assert everything in _cell(case, subject=subject)
     assert left_out in _cell(case, subject=subject, head="Left out of that, and why")
-    counted = sum(numbers[f"{one['name']}_points"] for one in case["left_out"])
+    counted = sum(numbers[f"{each['name']}_points"] for each in case["left_out"])
     assert numbers["points"] + counted == readings
 
 
 def test_the_stated_uncertainty_of_waves_follows_from_the_points_that_taught_it() -> None:
-    case = run_case("measured_waves", scene=paper_scene()).to_dict()
+    case = _measured("waves")
     assert case["verdict"] == "confirmed"
     assert case["numbers"]["taught_width"] == pytest.approx(FREQUENCY_UNCERTAINTY, rel=0.085)
-    (judged,) = (one for one in case["quantities"] if one["name"] == "calibration")
+    (judged,) = (each for each in case["quantities"] if each["name"] == "calibration")
     assert judged["verdict"] == "confirmed"
 
 

@@ -73,23 +73,23 @@ def _synthetic(
 
 
 def test_bias_and_scatter_of_a_made_up_model_are_found() -> None:
-    found = _synthetic(np.random.default_rng(1), bias=0.03, scatter=0.04)
-    assert found.points == 4000
-    assert found.series == 20
-    assert abs(found.bias - 0.03) < found.bias_uncertainty
-    assert found.standard_deviation == pytest.approx(0.04, rel=0.05)
+    statistics = _synthetic(np.random.default_rng(1), bias=0.03, scatter=0.04)
+    assert statistics.points == 4000
+    assert statistics.series == 20
+    assert abs(statistics.bias - 0.03) < statistics.bias_uncertainty
+    assert statistics.standard_deviation == pytest.approx(0.04, rel=0.05)
 
 
 def test_the_band_of_an_unbiased_model_holds_what_it_promises() -> None:
-    found = _synthetic(np.random.default_rng(2), bias=0.0, scatter=0.03)
-    inside = round(found.share_within * found.points)
-    assert binomtest(inside, found.points, 0.954).pvalue > 1e-3
-    assert found.width_needed == pytest.approx(1.96 / 2, rel=0.03)
+    statistics = _synthetic(np.random.default_rng(2), bias=0.0, scatter=0.03)
+    inside = round(statistics.share_within * statistics.points)
+    assert binomtest(inside, statistics.points, 0.954).pvalue > 1e-3
+    assert statistics.width_needed == pytest.approx(1.96 / 2, rel=0.03)
 
 
 def test_scatter_that_the_measurements_explain_is_not_the_models() -> None:
-    found = _synthetic(np.random.default_rng(3), bias=0.0, scatter=0.0)
-    assert found.standard_deviation < 0.003
+    statistics = _synthetic(np.random.default_rng(3), bias=0.0, scatter=0.0)
+    assert statistics.standard_deviation < 0.003
 
 
 def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
@@ -98,7 +98,7 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
     series = np.repeat(np.array([f"rig {i}" for i in range(8)]), 50)
     for _ in range(400):
         measured = np.exp(np.repeat(0.02 * rng.standard_normal(8), 50) + 0.005 * rng.standard_normal(400))
-        found = Predictions(
+        statistics = Predictions(
             predicted=np.ones(400),
             measured=measured,
             series=series,
@@ -106,7 +106,7 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
             uncertainty=np.full(400, 0.01),
             columns={},
         ).statistics
-        covered += abs(found.bias) <= found.bias_uncertainty
+        covered += abs(statistics.bias) <= statistics.bias_uncertainty
     assert binomtest(covered, 400, 0.95).pvalue > 1e-3
 
 
@@ -126,8 +126,8 @@ def test_points_come_in_ascending_order_with_their_walls() -> None:
 def test_laminar_friction_of_ducts_against_finite_elements() -> None:
     for aspect in (1.0, 2.9, 8.0):
         system = DuctMesh(aspect_ratio=aspect).system()
-        found = friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
-        assert float(laminar_ratio(np.array([aspect]))[0]) == pytest.approx(found, rel=1e-4)
+        ratio = friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
+        assert float(laminar_ratio(np.array([aspect]))[0]) == pytest.approx(ratio, rel=1e-4)
     assert laminar_ratio(np.array([0.0, 1e4])) == pytest.approx([1.0, 1.5], rel=1e-3)
 
 
@@ -191,11 +191,11 @@ def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> N
 
 def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others() -> None:
     data = measurements("stanton_pannell_1914")
-    found = compare(data)
-    rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], found.predicted, strict=True))
-    own = compare(parsed(_HEAD + "reynolds,friction_factor\n" + rows))
-    assert own.statistics.bias == pytest.approx(0, abs=1e-12)
-    assert (found.verdict, own.verdict) == ("confirmed", "confirmed")
+    points = compare(data)
+    rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], points.predicted, strict=True))
+    perfect = compare(parsed(_HEAD + "reynolds,friction_factor\n" + rows))
+    assert perfect.statistics.bias == pytest.approx(0, abs=1e-12)
+    assert (points.verdict, perfect.verdict) == ("confirmed", "confirmed")
     assert compare(data, mutation="ten_per_cent_high").verdict == "refuted"
 
 
@@ -204,8 +204,8 @@ def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judge
     study = load_case("measured_waves").study
     assert study is not None
     taught = np.isin(data.series, study.settings["taught"])
-    found = compare(data.where(taught)).statistics
-    width = math.hypot(found.bias, 2 * found.standard_deviation)
+    statistics = compare(data.where(taught)).statistics
+    width = math.hypot(statistics.bias, 2 * statistics.standard_deviation)
     assert round(width, 2) == FREQUENCY_UNCERTAINTY
 
 
@@ -221,11 +221,11 @@ def test_end_losses_that_are_left_out_are_noticed() -> None:
     long = data.where(np.char.startswith(data.series, "tube"))
     reynolds, slenderness = bench.tube_numbers(long)
     friction = slenderness * 64 / reynolds
-    found = compare(long)
+    points = compare(long)
     pairs = zip(slenderness, reynolds, strict=True)
-    dynamic = found.predicted / (1 + np.array([bench.tube_loss(*pair, 100.0)[0] for pair in pairs]))
-    assert np.max(np.abs(found.predicted / found.measured - 1)) < 0.04
-    assert np.min(dynamic * (1 + friction) / found.measured) < 0.8
+    dynamic = points.predicted / (1 + np.array([bench.tube_loss(*pair, 100.0)[0] for pair in pairs]))
+    assert np.max(np.abs(points.predicted / points.measured - 1)) < 0.04
+    assert np.min(dynamic * (1 + friction) / points.measured) < 0.8
 
 
 @pytest.mark.parametrize("depth", [0.06, 0.3, 1.5])
@@ -241,10 +241,10 @@ def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
         "conductance [l/(s*bar)]"
     )
     text = _HEAD.replace("friction", "vessel") + f"{columns}\n1,4,10,1,293.15,1,1\n"
-    found = compare(parsed(text))
+    points = compare(parsed(text))
     adiabatic = 5 * (2.5 ** (1 / 7) - 1)
-    assert found.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
-    assert found.stated[0] ** 2 - (0.1 * found.predicted[0]) ** 2 == pytest.approx(
+    assert points.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
+    assert points.stated[0] ** 2 - (0.1 * points.predicted[0]) ** 2 == pytest.approx(
         ((math.log(2.5) - adiabatic) / 2) ** 2, rel=1e-3
     )
 

@@ -178,7 +178,7 @@ class FigureAxis:
 
 
 @dataclass(frozen=True)
-class Curve:
+class FigureCurve:
     """One line of a figure, of the length of its x axis."""
 
     name: str
@@ -195,12 +195,12 @@ class Series:
 
     name: str
     x: FigureAxis
-    y: Sequence[Curve]
+    y: Sequence[FigureCurve]
     log: bool = False
     """Both axes logarithmic."""
 
 
-def figure(name: str, x: tuple[str, str, npt.ArrayLike], *curves: Curve, log: bool = False) -> Series:
+def figure(name: str, x: tuple[str, str, npt.ArrayLike], *curves: FigureCurve, log: bool = False) -> Series:
     """A figure of curves over one axis: its name, unit and values."""
     title, unit, values = x
     axis = FigureAxis(name=title, unit=unit, values=np.asarray(values, dtype=np.float64))
@@ -281,7 +281,7 @@ def orders_found(studies: Mapping[str, Convergence]) -> dict[str, Found]:
 def order_figure(studies: Mapping[str, Convergence]) -> Series:
     """Errors of several studies on the same meshes, by the name of their curve."""
     size = next(iter(studies.values())).size
-    curves = (Curve(name, "1", np.array(study.error)) for name, study in studies.items())
+    curves = (FigureCurve(name, "1", np.array(study.error)) for name, study in studies.items())
     return figure("error against mesh size", ("relative mesh size", "1", size), *curves, log=True)
 
 

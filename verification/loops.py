@@ -20,7 +20,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import CaseTable, Curve, Found, Series, figure
+from ringbalance.verification.evidence import CaseTable, FigureCurve, Found, Series, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
 """Phases of the initial vibration, the four cases of Fig. 6, rad."""
@@ -167,5 +167,7 @@ def amplitude_series(name: str, runs: dict[str, Simulation]) -> Series:
     """Amplitude against time of several runs, by the name of their curve, on one time axis."""
     longest = max(float(run.time[-1]) for run in runs.values())
     time = np.linspace(0.0, longest, _CURVE_POINTS)
-    curves = tuple(Curve(label, "m", np.interp(time, run.time, run.amplitude)) for label, run in runs.items())
+    curves = tuple(
+        FigureCurve(label, "m", np.interp(time, run.time, run.amplitude)) for label, run in runs.items()
+    )
     return figure(name, ("time", "s", time), *curves)

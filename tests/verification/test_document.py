@@ -11,9 +11,9 @@ import pytest
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import (
-    Curve,
     Evidence,
     FigureAxis,
+    FigureCurve,
     Found,
     Level,
     NotRunError,
@@ -27,7 +27,7 @@ PROMISED_OF_QUANTITY = {"name", "unit", "value", "reference", "error", "uncertai
 
 
 def test_what_is_promised_is_there(claim: CaseDefinition, made_up_code: Any, paper_scene: Scene) -> None:
-    code = made_up_code(found=Found(value=10.2, input=0.05))
+    code = made_up_code(number=Found(value=10.2, input=0.05))
     document = run_definition(claim, code, scene=paper_scene).to_dict()
     assert set(document) >= PROMISED
     (quantity,) = document["quantities"]
@@ -64,7 +64,7 @@ def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any
 def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) -> None:
     class Gappy:
         def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
-            curve = Curve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
+            curve = FigureCurve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
             axis = FigureAxis(name="x", unit="s", values=np.array([0.0, 1.0]))
             return Evidence(
                 quantities={"answer": Found(value=10.0).against(10.0)},

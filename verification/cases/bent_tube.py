@@ -16,8 +16,8 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     CaseTable,
     Convergence,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     figure,
@@ -104,7 +104,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
     shown = figure(
         "loss along the path beyond that of the straight turning tube",
         ("arc length over bore", "1", s),
-        Curve("three dimensions", "1", loss - 2 / flow.reynolds * flow.gradient * s),
+        FigureCurve("three dimensions", "1", loss - 2 / flow.reynolds * flow.gradient * s),
     )
     rows = {
         "friction of the whole length": terms["friction"],

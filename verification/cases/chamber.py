@@ -17,8 +17,8 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
     COVERAGE_FACTOR,
     CaseTable,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     Reference,
@@ -133,9 +133,9 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     shown = figure(
         "inner radius of the ring",
         ("fill ratio", "1", x),
-        Curve("exact area", "m", surface_radius(disc=disc, fill_ratio=x)),
-        Curve("Eq. 3", "m", by_eq_3, style="paper"),
-        Curve("no plates", "m", surface_radius(disc=bare, fill_ratio=x), style="reference"),
+        FigureCurve("exact area", "m", surface_radius(disc=disc, fill_ratio=x)),
+        FigureCurve("Eq. 3", "m", by_eq_3, style="paper"),
+        FigureCurve("no plates", "m", surface_radius(disc=bare, fill_ratio=x), style="reference"),
     )
     return Evidence(
         quantities={
@@ -168,8 +168,8 @@ def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     shown = figure(
         "moment of one chamber",
         ("fill ratio", "1", fills),
-        Curve("finite elements", "kg m", ring.moment.value, uncertainty=ring.moment.uncertainty),
-        Curve(
+        FigureCurve("finite elements", "kg m", ring.moment.value, uncertainty=ring.moment.uncertainty),
+        FigureCurve(
             "Eq. 7", "kg m", np.array([_eq_7(disc, _radius_by_eq_3(disc, x)) for x in fills]), style="paper"
         ),
     )
@@ -219,8 +219,8 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
     shown = figure(
         "balancing ability against its direction",
         ("angle from a chamber's centre line", "rad", angle),
-        Curve("found", "kg m", largest),
-        Curve("Eq. 8", "kg m", np.full(angle.shape, DISC_MOMENT.value), style="paper"),
+        FigureCurve("found", "kg m", largest),
+        FigureCurve("Eq. 8", "kg m", np.full(angle.shape, DISC_MOMENT.value), style="paper"),
     )
     rounding = CHAMBER_MOMENT.uncertainty * math.sqrt(2)
     return Evidence(
@@ -275,8 +275,10 @@ def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     shown = figure(
         "moment of a pair per transferred mass",
         ("fill ratio of one chamber", "1", fills),
-        Curve("finite elements", "m", curve),
-        Curve("72 mm within 0.7 %", "m", claimed, style="paper", uncertainty=LAMBDA_TOLERANCE * claimed),
+        FigureCurve("finite elements", "m", curve),
+        FigureCurve(
+            "72 mm within 0.7 %", "m", claimed, style="paper", uncertainty=LAMBDA_TOLERANCE * claimed
+        ),
     )
     return Evidence(
         quantities={

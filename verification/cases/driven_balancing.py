@@ -24,8 +24,8 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import filter_settings
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import (
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     Series,
@@ -90,7 +90,7 @@ def _amplitudes(
     time = next(iter(runs.values())).time
     shown = time <= until
     curves = (
-        Curve(
+        FigureCurve(
             label, "m", envelope(run.amplitude[shown]), style="reference" if label == reference else "found"
         )
         for label, run in runs.items()
@@ -151,7 +151,7 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
         f"angles of the masses, {next(iter(balanced.runs))}",
         ("time", "s", thinned(runs[0].time[shown])),
         *(
-            Curve(name, "rad", thinned(angle[shown]))
+            FigureCurve(name, "rad", thinned(angle[shown]))
             for name, angle in zip(("mass 1", "mass 2"), runs[0].mass_angle, strict=True)
         ),
     )
@@ -312,8 +312,8 @@ def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) ->
     over_scale = figure(
         "time to be within 2 % over the noise that the filter assumes",
         ("assumed over true noise", "1", scales),
-        Curve("found", "s", times),
-        Curve("printed", "s", np.full(times.shape, _PRINTED_TIME_S), style="paper"),
+        FigureCurve("found", "s", times),
+        FigureCurve("printed", "s", np.full(times.shape, _PRINTED_TIME_S), style="paper"),
         log=True,
     )
     # The figure's own four curves, as distances from the truth over the imbalance.
@@ -324,7 +324,7 @@ def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) ->
         "error of the estimate over the imbalance, honest covariances",
         ("time", "s", thinned(estimates.time[shown])),
         *(
-            Curve(f"{phase:.0f} degrees", "1", thinned(row[shown]))
+            FigureCurve(f"{phase:.0f} degrees", "1", thinned(row[shown]))
             for phase, row in zip(_FIG_4_PHASES_DEG, relative, strict=True)
         ),
     )
@@ -406,11 +406,12 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
     shown = (time > -_BEFORE_S) & (time < _AFTER_S)
     when = thinned(time[shown])
     estimated = (
-        Curve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.history["friction_arm"][shown, 0]))
+        FigureCurve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.history["friction_arm"][shown, 0]))
         for arm, run in runs.items()
     )
     printed = (
-        Curve(f"{1e3 * arm:g} mm, printed", "m", np.full(when.size, arm), style="reference") for arm in runs
+        FigureCurve(f"{1e3 * arm:g} mm, printed", "m", np.full(when.size, arm), style="reference")
+        for arm in runs
     )
     axis = ("time since the masses started", "s", when)
     return Evidence(

@@ -14,7 +14,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import compiled
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, as_found, figure
+from ringbalance.verification.evidence import Evidence, FigureCurve, Found, Level, as_found, figure
 from ringbalance.verification.papers import changed
 
 _STEP_S: Final = {"light": 4e-4, "heavy": 1e-4}
@@ -56,10 +56,10 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     over_speed = figure(
         "effort of one move over the speed",
         ("speed over natural frequency", "1", _SPEED_RATIOS),
-        Curve("compensated exactly", "N m s", shown["exact"]),
-        Curve("arm assumed a fifth too small", "N m s", shown["short"]),
-        Curve("not compensated", "N m s", shown["without"]),
-        Curve("as printed", "N m s", shown["printed"], style="paper"),
+        FigureCurve("compensated exactly", "N m s", shown["exact"]),
+        FigureCurve("arm assumed a fifth too small", "N m s", shown["short"]),
+        FigureCurve("not compensated", "N m s", shown["without"]),
+        FigureCurve("as printed", "N m s", shown["printed"], style="paper"),
     )
     exact, short = (float(grown[name if defect is None else "without"].min()) for name in ("exact", "short"))
     return Evidence(

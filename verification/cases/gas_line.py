@@ -29,8 +29,8 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.evidence import (
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     NotRunError,
@@ -97,9 +97,9 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     over_radius = figure(
         "largest fill that leaves the gas hole dry",
         ("radius of the hole on the centre line", "m", radius),
-        Curve("running", "1", running),
-        Curve("stopped, worst angle", "1", rest),
-        Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
+        FigureCurve("running", "1", running),
+        FigureCurve("stopped, worst angle", "1", rest),
+        FigureCurve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
     )
     return Evidence(
         quantities={

@@ -14,8 +14,8 @@ from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     NotRunError,
@@ -57,9 +57,9 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
     shown = figure(
         "pressure that starts the flow from an almost empty chamber",
         ("inner radius of the siphon crest", "m", radius),
-        Curve("priming, other chamber vented", "Pa", np.array([priming(float(r)) for r in radius])),
-        Curve("0.54 MPa", "Pa", np.full(radius.shape, LOWEST_PRESSURE.value), style="paper"),
-        Curve("stall by Eq. 19", "Pa", np.full(radius.shape, stall), style="reference"),
+        FigureCurve("priming, other chamber vented", "Pa", np.array([priming(float(r)) for r in radius])),
+        FigureCurve("0.54 MPa", "Pa", np.full(radius.shape, LOWEST_PRESSURE.value), style="paper"),
+        FigureCurve("stall by Eq. 19", "Pa", np.full(radius.shape, stall), style="reference"),
     )
     return Evidence(
         quantities={
@@ -103,8 +103,8 @@ def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evid
     shown = figure(
         "ability of a pair against the gas pressure, by the calibrated law",
         ("gas pressure", "Pa", pressure),
-        Curve("the scene's liquid", "kg m", abilities[0]),
-        Curve("twice as dense", "kg m", abilities[1]),
+        FigureCurve("the scene's liquid", "kg m", abilities[0]),
+        FigureCurve("twice as dense", "kg m", abilities[1]),
     )
     return Evidence(
         # Twice the density, twice the ability.

@@ -43,8 +43,8 @@ from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Bend, Scene, Tube
 from ringbalance.verification.evidence import (
     CaseTable,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     NotRunError,
@@ -268,10 +268,10 @@ def _figure(scene: Scene, without: frozenset[str]) -> Series:
     return figure(
         "loss coefficient by the library and by the program",
         ("velocity", "m/s", loss.velocity),
-        Curve("fluids, all methods", "1", (low + high) / 2, "reference", (high - low) / 2),
-        Curve("program, at rest", "1", _program(scene.tube, loss.reynolds, None).k, "points"),
-        Curve("program, turning", "1", loss.k.value, uncertainty=loss.k.uncertainty),
-        Curve("50", "1", fifty, "paper"),
+        FigureCurve("fluids, all methods", "1", (low + high) / 2, "reference", (high - low) / 2),
+        FigureCurve("program, at rest", "1", _program(scene.tube, loss.reynolds, None).k, "points"),
+        FigureCurve("program, turning", "1", loss.k.value, uncertainty=loss.k.uncertainty),
+        FigureCurve("50", "1", fifty, "paper"),
         log=True,
     )
 

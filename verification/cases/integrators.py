@@ -31,8 +31,8 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.verification.evidence import (
     Convergence,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     NotRunError,
@@ -182,8 +182,8 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     shown = figure(
         "error of the moved fill against the number of segments",
         ("segments", "1", counts),
-        Curve("Eq. 20", "1", np.array(study.error), style="paper"),
-        Curve("first order", "1", (study.error or ())[0] * counts[0] / counts, style="reference"),
+        FigureCurve("Eq. 20", "1", np.array(study.error), style="paper"),
+        FigureCurve("first order", "1", (study.error or ())[0] * counts[0] / counts, style="reference"),
         log=True,
     )
     return Evidence(
@@ -318,9 +318,9 @@ def _stall_study(
     shown = figure(
         "fill beyond the stall against the length of a segment",
         ("segment over the time to the stall", "1", 1 / counts),
-        Curve("largest step over the stall, Eq. 20", "1", over.max(axis=1), style="paper"),
-        Curve("cycle of a tube that stays full", "1", cycle),
-        Curve("kappa^2/4", "1", bound, style="reference"),
+        FigureCurve("largest step over the stall, Eq. 20", "1", over.max(axis=1), style="paper"),
+        FigureCurve("cycle of a tube that stays full", "1", cycle),
+        FigureCurve("kappa^2/4", "1", bound, style="reference"),
         log=True,
     )
     return judged, 2 * math.sqrt(1e-3) / rate, shown

@@ -13,7 +13,7 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, as_found, figure
+from ringbalance.verification.evidence import Evidence, FigureCurve, Found, Level, Reference, as_found, figure
 from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.tube import (
     POISEUILLE_GRADIENT,
@@ -189,8 +189,8 @@ def rotating_duct(scene: Scene, level: Level, defect: str | None = None) -> Evid
     shown = figure(
         "Fanning friction factor of a rotating square duct, computed and measured",
         ("rotation number 2 omega d/U", "1", 2 * s),
-        Curve("computed", "1", fanning, style="points"),
-        Curve("correlation of measurements", "1", measured, style="reference"),
+        FigureCurve("computed", "1", fanning, style="points"),
+        FigureCurve("correlation of measurements", "1", measured, style="reference"),
         log=True,
     )
     numbers = {"signed_bias": float(np.mean(deviation))}
@@ -251,8 +251,8 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     shown = figure(
         "vibration of a rotor, measured and predicted",
         ("unbalance", "kg*m", unbalance),
-        Curve("predicted", "m", predicted),
-        Curve("measured", "m", np.array(amplitudes), style="points"),
+        FigureCurve("predicted", "m", predicted),
+        FigureCurve("measured", "m", np.array(amplitudes), style="points"),
     )
     return Evidence(
         quantities=quantities,

@@ -40,8 +40,8 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     CaseTable,
     Convergence,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     as_found,
@@ -126,9 +126,9 @@ def rotating_section(scene: Scene, level: Level, defect: str | None = None) -> E
     shown = figure(
         "friction over that at rest, without inertia",
         ("rotation Reynolds number", "1", _ROTATIONS),
-        Curve("finite elements", "1", fast),
-        Curve("slow series", "1", 1 + _ROTATIONS**2 / _SLOW_SERIES, style="reference"),
-        Curve("fast limit", "1", limit, style="reference"),
+        FigureCurve("finite elements", "1", fast),
+        FigureCurve("slow series", "1", 1 + _ROTATIONS**2 / _SLOW_SERIES, style="reference"),
+        FigureCurve("fast limit", "1", limit, style="reference"),
         log=True,
     )
     return Evidence(
@@ -377,8 +377,8 @@ def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     shown = figure(
         "friction factor of a smooth tube",
         ("Reynolds number", "1", sweep),
-        Curve("blend", "1", curve),
-        Curve("64/Re", "1", 64 / sweep, style="reference"),
+        FigureCurve("blend", "1", curve),
+        FigureCurve("64/Re", "1", 64 / sweep, style="reference"),
         log=True,
     )
     return Evidence(

@@ -24,8 +24,8 @@ from ringbalance.scene.liquids import liquid_at, liquids_at_room_temperature
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     CaseTable,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     Reference,
@@ -105,8 +105,8 @@ def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence
     shown = figure(
         "velocity at the scene's gas pressure",
         ("fill ratio", "1", fills),
-        Curve("calibrated law", "m/s", flow.velocity, uncertainty=flow.uncertainty),
-        Curve("Eq. 14 with one k", "m/s", one_k, style="paper"),
+        FigureCurve("calibrated law", "m/s", flow.velocity, uncertainty=flow.uncertainty),
+        FigureCurve("Eq. 14 with one k", "m/s", one_k, style="paper"),
     )
     # Half the exit's share of k + 1 beyond '+1' is its effect on the velocity.
     by_exit = as_found(exit_velocity=abs(exit_loss) / (2 * (k + 1)))
@@ -210,8 +210,8 @@ def _over_velocity(scene: Scene) -> Series:
     return figure(
         "k against the velocity, the scene's tube and liquid",
         ("velocity", "m/s", curve.velocity),
-        Curve("k(u)", "1", curve.k.value, uncertainty=curve.k.uncertainty),
-        Curve("50", "1", np.full(curve.velocity.shape, PAPER_DRAG_COEFFICIENT), style="paper"),
+        FigureCurve("k(u)", "1", curve.k.value, uncertainty=curve.k.uncertainty),
+        FigureCurve("50", "1", np.full(curve.velocity.shape, PAPER_DRAG_COEFFICIENT), style="paper"),
         log=True,
     )
 

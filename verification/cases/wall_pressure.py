@@ -15,8 +15,8 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import (
     CaseTable,
-    Curve,
     Evidence,
+    FigureCurve,
     Found,
     Level,
     as_found,
@@ -90,14 +90,16 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
     over_plates = figure(
         "error of Eq. 12 against the thickness of the plates",
         ("plate thickness", "m", thickness),
-        Curve("thin ring", "1", thin, style="paper"),
-        Curve("largest fill", "1", full, style="paper"),
+        FigureCurve("thin ring", "1", thin, style="paper"),
+        FigureCurve("largest fill", "1", full, style="paper"),
     )
     over_fill = figure(
         "pressure on the outer wall",
         ("fill ratio", "1", x),
-        Curve("finite elements", "Pa", ring.wall_pressure.value, uncertainty=ring.wall_pressure.uncertainty),
-        Curve("Eq. 12", "Pa", by_eq_12, style="paper"),
+        FigureCurve(
+            "finite elements", "Pa", ring.wall_pressure.value, uncertainty=ring.wall_pressure.uncertainty
+        ),
+        FigureCurve("Eq. 12", "Pa", by_eq_12, style="paper"),
     )
     return Evidence(
         quantities={
@@ -197,9 +199,9 @@ def velocity_departure(scene: Scene, level: Level, defect: str | None = None) ->
             figure(
                 f"velocity over that of a full chamber, {p / 1e6:.1f} MPa",
                 ("fill ratio", "1", share * scene.disc.max_fill_ratio),
-                Curve("Eq. 19", "1", eq_19, style="paper"),
-                Curve("true wall pressure, one k", "1", _relative_velocity(printed_scene, p, share)),
-                Curve("calibrated law of the scene", "1", velocity / velocity[-1], style="reference"),
+                FigureCurve("Eq. 19", "1", eq_19, style="paper"),
+                FigureCurve("true wall pressure, one k", "1", _relative_velocity(printed_scene, p, share)),
+                FigureCurve("calibrated law of the scene", "1", velocity / velocity[-1], style="reference"),
             )
         )
     return Evidence(
@@ -268,8 +270,8 @@ def rectangular_element(scene: Scene, level: Level, defect: str | None = None) -
     shown = figure(
         "pressure on the outer wall",
         ("fill ratio", "1", fills),
-        Curve("finite elements", "Pa", ring.wall_pressure.value),
-        Curve("Eq. 11 integrated", "Pa", exact, style="paper"),
+        FigureCurve("finite elements", "Pa", ring.wall_pressure.value),
+        FigureCurve("Eq. 11 integrated", "Pa", exact, style="paper"),
     )
     return Evidence(
         quantities={

@@ -28,7 +28,7 @@ from ringbalance.physics.sloshing_system import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Convergence, Curve, Evidence, Level, as_found, figure
+from ringbalance.verification.evidence import Convergence, Evidence, FigureCurve, Level, as_found, figure
 from ringbalance.verification.reference.chambers import CosineWaves, disc_chamber
 
 _MODES: Final = 4
@@ -142,8 +142,8 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
     shown = figure(
         "plane waves of an imported sector",
         ("wave", "1", np.arange(1.0, _IMPORTED_MODES + 1)),
-        Curve("imported mesh", "1", values),
-        Curve("sum of cosines", "1", exact, style="reference"),
+        FigureCurve("imported mesh", "1", values),
+        FigureCurve("sum of cosines", "1", exact, style="reference"),
     )
     return Evidence(
         quantities=as_found(

@@ -20,7 +20,7 @@ from ringbalance.identification.reading import KINDS, observations_of, read_obse
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
+from ringbalance.verification.evidence import Evidence, FigureCurve, Level, Series, as_found, figure
 from ringbalance.verification.verdicts import Verdict
 
 PROMISED: Final = 0.93
@@ -128,8 +128,8 @@ class Predictions:
         return figure(
             f"friction factor of {of}, measured and predicted",
             ("Reynolds number", "1", self.columns["reynolds"]),
-            Curve("predicted", "1", self.predicted, uncertainty=self.stated),
-            Curve("measured", "1", self.measured, style="points"),
+            FigureCurve("predicted", "1", self.predicted, uncertainty=self.stated),
+            FigureCurve("measured", "1", self.measured, style="points"),
             log=True,
         )
 
@@ -140,8 +140,8 @@ class Predictions:
         return figure(
             f"{name}: predicted over measured",
             ("measured", unit, measured),
-            Curve("equal", unit, measured, uncertainty=(self.uncertainty * self.measured)[order]),
-            Curve("predicted", unit, predicted, style="points"),
+            FigureCurve("equal", unit, measured, uncertainty=(self.uncertainty * self.measured)[order]),
+            FigureCurve("predicted", unit, predicted, style="points"),
             log=bool(measured[-1] > 10 * measured[0]),
         )
 

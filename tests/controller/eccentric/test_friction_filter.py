@@ -161,7 +161,10 @@ def test_the_printed_jacobian_is_that_of_a_mass_without_a_motor() -> None:
     assert printed == pytest.approx(_friction_flow(bare, rate, arm, SPEED, 0.0, STEP, True)[1])
 
 
-@pytest.mark.parametrize(("name", "time_limit"), [("eccentric_mass_paper", 8.0), ("washing_machine", 5.0)])
+@pytest.mark.parametrize(
+    ("name", "time_limit"),
+    [pytest.param("eccentric_mass_paper", 8.0, marks=pytest.mark.heavy), ("washing_machine", 5.0)],
+)
 def test_intervals_of_friction_arms_hold_the_arms_of_built_machines(name: str, time_limit: float) -> None:
     """Constants of motor and masses are in them; noise alone covers a quarter."""
     scene = at_constant_speed(bundled(name), time_limit=time_limit)

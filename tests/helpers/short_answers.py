@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
@@ -30,7 +31,7 @@ def driven() -> rb.EccentricScene:
 def answer(name: str) -> Any:
     """Answer of a function; for the ring under the paper's law where it takes a law."""
     law = rb.paper_law(short())
-    return {
+    functions: dict[str, Callable[[], Any]] = {
         "scene": short,
         "eccentric scene": driven,
         "calibration": lambda: rb.calibrate(short()),
@@ -41,4 +42,5 @@ def answer(name: str) -> Any:
         "tuning": lambda: rb.tune(short(), flow_law=law),
         "fit": lambda: rb.fit(short(), MEASUREMENTS / "trial_weight.csv"),
         "comparison": lambda: rb.compare(short(), short()),
-    }[name]()
+    }
+    return functions[name]()

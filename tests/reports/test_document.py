@@ -67,10 +67,10 @@ def test_provenance_names_neither_folder_nor_machine() -> None:
 
 
 def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
-    rows = MAX_PAGE_ROWS + 1
+    length = MAX_PAGE_ROWS + 1
     table: Record = {
         "name": "Settled after, by period",
-        "columns": {"period": [0.1 * i for i in range(rows)], "ending": ["settled"] * rows},
+        "columns": {"period": [0.1 * i for i in range(length)], "ending": ["settled"] * length},
         "units": {"period": "s"},
     }
     short = {"name": "short", "columns": {"a": [1.0]}, "units": {}}

@@ -328,7 +328,7 @@ def _values(scene: SceneFile, path: str, values: Any) -> tuple[str, Range | list
 
 
 def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: ValueReader) -> None:
-    """Raises: SceneError: bare numbers that are all as far from the scene's value as a wrong unit is."""
+    """Refuse bare numbers that are all as far from the scene's value as in a wrong unit."""
     table, _, key = path.partition(".")
     scene_value, dimension = getattr(getattr(scene, table), key, None), reader.dimension
     bare = bool(values) and all(isinstance(each, int | float) and each > 0 for each in values)

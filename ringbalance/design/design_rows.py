@@ -203,7 +203,7 @@ def _edges(design: Design) -> Iterator[tuple[str, str, str | None]]:
 
 
 def _keys_table(design: Design, judgement: Judgement) -> Table:
-    """All that a drawing and a controller need."""
+    """Table of the keys that a drawing and a controller need."""
     rows = [
         (
             path,

@@ -191,7 +191,7 @@ def _path(port: float, crest: float | None) -> float:
 
 
 def _up(length: float) -> float:
-    """To a hundredth of a millimetre, upwards: no tube is shorter than its path."""
+    """Round up to a hundredth of a millimetre: no tube is shorter than its path."""
     return math.ceil(length * 1e5 - 1e-6) / 1e5
 
 
@@ -222,7 +222,7 @@ def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
 
 
 def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
-    """An error of an axis as one of the scene's key that has it; one of a file of valves as it is."""
+    """Give an error of an axis to the key of the scene that has it; one of a file of valves stays."""
     if fault.file != COMMAND_LINE:
         return fault
     return Fault(

@@ -73,7 +73,7 @@ def _velocity_walk(noise: float, step: float, stiffness: float, rotor: float, ma
 
 
 def _unbalance_walk(noise: float, step: float, rotor: float, mass: float) -> float:
-    """The whole mass times the displacement that a second of samples leaves unknown, kg m in 1 s."""
+    """Whole mass times the displacement that a second of samples leaves unknown, kg m in 1 s."""
     return _UNBALANCE_WALK_FRACTION * (rotor + 2 * mass) * noise * math.sqrt(step)
 
 
@@ -102,7 +102,7 @@ def _amplitude_limit(mass: float, radius: float, rotor: float, noise: float) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class ImbalanceFilter:
-    """The Kalman filter of rotor and unbalance."""
+    """Kalman filter of rotor and unbalance."""
 
     step: Annotated[PositiveTime, derived("step of [sensor]", "time between two updates", "sensor.step")]
     discretisation: Annotated[
@@ -212,7 +212,7 @@ class ImbalanceFilter:
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionFilter:
-    """The extended Kalman filter of the friction arms, and the drive meanwhile."""
+    """Extended Kalman filter of the friction arms, and the drive of the friction stage."""
 
     step: Annotated[PositiveTime, derived("step of [sensor]", "time between two updates", "sensor.step")]
     discretisation: Annotated[
@@ -283,7 +283,7 @@ class FrictionFilter:
 
 @dataclass(frozen=True, kw_only=True)
 class Lqr:
-    """The regulator that moves the masses to their targets."""
+    """Regulator that moves the masses to their targets."""
 
     state_weight: Annotated[
         Weight, standard(3.5, "q in Q = q diag(0.1, 0.1, 0.01, 0.01), of angles and speeds in SI")
@@ -304,7 +304,7 @@ class Lqr:
 
 @dataclass(frozen=True, kw_only=True)
 class FineTuning:
-    """The search by trial."""
+    """Search by trial for a smaller vibration."""
 
     step: Annotated[
         PositiveAngle, standard("4 deg", "first trial move of the masses; it is halved when no move helps")

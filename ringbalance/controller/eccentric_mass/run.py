@@ -1,4 +1,4 @@
-"""One run of a scene with two eccentric masses: plant, sensors and strategy, sample by sample."""
+"""Run of a scene with two eccentric masses: plant, sensors and strategy, sample by sample."""
 
 from __future__ import annotations
 
@@ -192,5 +192,5 @@ def simulate_eccentric(
 
 
 def locked_run(scene: EccentricScene) -> EccentricRun:
-    """The run of the same rotor with the masses clamped where they start: without balancing."""
+    """Run the rotor with the masses clamped where they start: without balancing."""
     return simulate_eccentric(replace(scene, supervisor=replace(scene.supervisor, strategy="locked")))

@@ -165,7 +165,7 @@ def _loop(
     hold_poles: _Poles | None = None,
     start: float | None = None,
 ) -> _SampledLoop:
-    """Args: `value_poles`, `hold_poles`: poles that recommend a value, and a hold; default `poles`."""
+    """Judge a loop. Args: `value_poles`, `hold_poles`: poles that limit a value, a hold; default `poles`."""
     step, value_poles, hold_poles = scene.lqr.step, value_poles or poles, hold_poles or poles
 
     def hold_stable(hold: float) -> bool:

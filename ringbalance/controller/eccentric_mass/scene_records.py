@@ -350,7 +350,7 @@ def _widths_below(names: tuple[str, ...]) -> Rule:
 
 
 def _width_checks() -> Iterator[Check]:
-    """An angle may be less than its uncertainty."""
+    """Yield a rule for each table; an angle may be less than its uncertainty."""
     for table, key in ECCENTRIC_MASS.tables["uncertainty"].keys.items():
         if table != ORIGIN and isinstance(key.takes, Entries):
             names = tuple(name for name in key.takes.keys if name != "phase")

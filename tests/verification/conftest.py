@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import pytest
 
@@ -65,17 +66,20 @@ VERIFICATION = (
 
 @dataclass(frozen=True, kw_only=True)
 class MadeUpCode:
-    """Code of the made-up case: ten, unless a defect is built in."""
+    """Code of the made-up case: ten, unless a defect is built in, with further fields of its evidence."""
 
     number: Found = field(default_factory=lambda: Found(value=10.0))
     defect: Callable[[Found, str | None, Scene], Found] = lambda number, defect, _: (
         Found(value=number.value + 1) if defect == "off_by_one" else number
     )
 
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         thicker = scene.disc.plate_thickness == 0.004
         number = Found(value=20.0) if thicker else self.defect(self.number, defect, scene)
-        return Evidence(quantities={"answer": number.against(10.0)}, numbers={"doubt": 0.0123})
+        evidence = Evidence(quantities={"answer": number.against(10.0)}, numbers={"doubt": 0.0123})
+        return replace(evidence, **self.evidence)
 
 
 @pytest.fixture

@@ -79,7 +79,7 @@ def test_the_program_s_cases_say_all_that_a_report_shows() -> None:
     for case in load_cases():
         assert case.explanation, case.id
         assert case.consequence, case.id
-        assert case.kind == "claim" or (case.order is not None and case.about), case.id
+        assert (case.kind == "claim") != (case.order is not None and bool(case.about)), case.id
 
 
 def test_a_case_goes_from_process_to_process() -> None:

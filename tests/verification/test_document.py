@@ -10,15 +10,7 @@ import pytest
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.evidence import (
-    Evidence,
-    FigureAxis,
-    FigureCurve,
-    Found,
-    Level,
-    NotRunError,
-    Series,
-)
+from ringbalance.verification.evidence import FigureCurve, Found, NotRunError, figure
 from ringbalance.verification.result import definition_document, merge_saved
 from ringbalance.verification.runner import run_definition
 
@@ -61,18 +53,10 @@ def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any
     assert document["quantities"][0]["uncertainty"] == 0.0
 
 
-def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) -> None:
-    class Gappy:
-        def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
-            curve = FigureCurve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
-            axis = FigureAxis(name="x", unit="s", values=np.array([0.0, 1.0]))
-            return Evidence(
-                quantities={"answer": Found(value=10.0).against(10.0)},
-                numbers={"doubt": 1.0},
-                series=(Series(name="s", x=axis, y=(curve,)),),
-            )
-
-    document = run_definition(claim, Gappy(), scene=paper_scene).to_dict()
+def test_gaps_in_a_curve_become_null(claim: CaseDefinition, made_up_code: Any, paper_scene: Scene) -> None:
+    curve = FigureCurve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
+    code = made_up_code(evidence={"series": (figure("s", ("x", "s", [0.0, 1.0]), curve),)})
+    document = run_definition(claim, code, scene=paper_scene).to_dict()
     (series,) = document["series"]
     assert series["y"][0]["values"] == [1.0, None]
     assert series["x"] == {"name": "x", "unit": "s", "values": [0.0, 1.0]}

@@ -13,7 +13,7 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.models import Scene
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError
+from ringbalance.verification.evidence import Found, NotRunError
 from ringbalance.verification.runner import case_jobs, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 
@@ -104,28 +104,20 @@ def test_a_programming_error_is_not_swallowed(
         run_definition(claim, made_up_code(defect=stumble), scene=paper_scene)
 
 
-def test_a_solve_that_did_not_succeed_cannot_confirm(claim: CaseDefinition, paper_scene: Scene) -> None:
-    class Unsolved:
-        def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
-            status = Status(code=StatusCode.NOT_CONVERGED, text="refine the mesh")
-            value = 20.0 if defect else 10.0
-            return Evidence(
-                quantities={"answer": Found(value=value).against(10.0)},
-                numbers={"doubt": 0.0},
-                status=status,
-            )
-
-    result = run_definition(claim, Unsolved(), scene=paper_scene)
+def test_a_solve_that_did_not_succeed_cannot_confirm(
+    claim: CaseDefinition, made_up_code: Any, paper_scene: Scene
+) -> None:
+    status = Status(code=StatusCode.NOT_CONVERGED, text="refine the mesh")
+    result = run_definition(claim, made_up_code(evidence={"status": status}), scene=paper_scene)
     assert result.verdict is Verdict.INCONCLUSIVE
     assert result.status == "refine the mesh"
 
 
-def test_evidence_must_name_what_is_judged(claim: CaseDefinition, paper_scene: Scene) -> None:
-    class Other:
-        def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
-            return Evidence(quantities={"another": Found(value=1.0)})
-
-    result = run_definition(claim, Other(), scene=paper_scene)
+def test_evidence_must_name_what_is_judged(
+    claim: CaseDefinition, made_up_code: Any, paper_scene: Scene
+) -> None:
+    code = made_up_code(evidence={"quantities": {"another": Found(value=1.0)}})
+    result = run_definition(claim, code, scene=paper_scene)
     assert result.verdict is Verdict.INCONCLUSIVE
     assert "judged are ['answer'], found ['another']" in result.status
 

@@ -99,7 +99,8 @@ def toml_of(value: Any) -> str:
 @cache
 def scenes() -> list[tuple[str, Scene]]:
     """The first scenes of the seed that load, with their texts."""
-    draw, loaded = random.Random(SEED), []
+    draw = random.Random(SEED)
+    loaded: list[tuple[str, Scene]] = []
     while len(loaded) < SCENES:
         tables = document_of(draw)
         text = "\n".join(

@@ -233,7 +233,8 @@ class Extremes(Result):
 
 def axis_rows(columns: Record) -> list[Cells]:
     """The stretches of every axis: its title (at its first), stretch, answer, loop and message."""
-    rows, before = [], ""
+    rows: list[Cells] = []
+    before = ""
     names = ("axis", "from", "to", "unit", "ending", "loop", "said")
     for title, low, high, unit, ending, loop, message in zip(*(columns[name] for name in names), strict=True):
         first, last = (number(float(end), digits=3) for end in (low, high))

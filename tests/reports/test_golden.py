@@ -22,6 +22,12 @@ def evidence_of(name: str) -> dict[str, Any]:
     return kept_evidence(name)
 
 
+@cache
+def pages_of(name: str) -> tuple[str, ...]:
+    """Pages without drawings, shared by the tests of this module."""
+    return tuple(render(evidence_of(name)).values())
+
+
 @pytest.mark.usefixtures("unwritten")
 @pytest.mark.parametrize("name", NAMES)
 def test_the_pages_say_what_they_said(name: str) -> None:
@@ -32,10 +38,8 @@ def test_the_pages_say_what_they_said(name: str) -> None:
 @pytest.mark.usefixtures("unwritten")
 @pytest.mark.parametrize("name", NAMES)
 def test_every_traced_number_is_the_evidence_s(name: str) -> None:
-    evidence = evidence_of(name)
-    pages = render(evidence).values()
-    found = traces(pages)
-    assert len(found) >= FEWEST_TRACES[name]
+    evidence, pages = evidence_of(name), pages_of(name)
+    assert len(traces(pages)) >= FEWEST_TRACES[name]
     assert untrue(pages, evidence) == []
     assert apart(evidence) == []
 
@@ -43,7 +47,7 @@ def test_every_traced_number_is_the_evidence_s(name: str) -> None:
 @pytest.mark.usefixtures("unwritten")
 def test_a_changed_number_changes_what_is_printed() -> None:
     evidence = json.loads(json.dumps(evidence_of("ring")))
-    before = dict(traces(render(evidence).values()))
+    before = dict(traces(pages_of("ring")))
     for path in random.Random(3).sample(sorted(before), 60):
         owner, _, key = path.rpartition(".")
         holder, value = evidence_at(evidence, owner), evidence_at(evidence, path)

@@ -313,6 +313,7 @@ def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.heavy
 def test_a_worker_makes_the_same_views(first: Report, views: Mapping[str, Record | None]) -> None:
     path = first.page.parent / "evidence.json"
     with Workers(1) as pool:

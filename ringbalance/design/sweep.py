@@ -462,8 +462,9 @@ def run_sweep(
         for i, row in zip(accepted, deal_out("runs", tasks_of(content, calls)), strict=True):
             driven[i] = row
     deal_in_process = partial(deal, executor=None)
-    left_out = registered("function", "left_out")
-    errors = left_out(scene, points, static, check, deal_in_process) if check else []
+    # Loaded where rows are checked alone: it brings the meshes.
+    left_out = registered("function", "left_out") if check else None
+    errors = left_out(scene, points, static, check, deal_in_process) if left_out else []
     return Sweep(
         scene=scene,
         plan=plan,

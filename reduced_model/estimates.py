@@ -1,4 +1,4 @@
-"""The numbers that estimates of left-out terms rest on: the tube's flow, the injection that decides.
+"""Basis of the estimates of left-out terms: the tube's flow, and the injection that decides.
 
 Every estimate of `terms` is relative to the quantity that the term changes and holds at the worst fill of the
 range.  What belongs to an injection is judged for the one that matters most, the shortest.
@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.physics.tube.state import TubeState, tube_state, tube_state_at
+from ringbalance.physics.tube.state import tube_state, tube_state_at
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.flow import TubeFlow
@@ -24,13 +24,12 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
 
-SHARES: Final = (0.15, 0.3, 0.5, 0.7, 0.85)
+FILL_SHARES: Final = (0.15, 0.3, 0.5, 0.7, 0.85)
 """Fills of the driven chamber at which the flow is judged, as shares of max_fill_ratio."""
-_NO_PRESSURE: Final = 1.0
-"""Gauge, Pa, at or below which the gas drives nothing."""
-_VELOCITIES: Final = 25
-_TUBE_PARTS: Final = ("whole", "roughness", "rotation", "bends", "ends")
-"""Of the loss."""
+_NO_PRESSURE_PA: Final = 1.0
+"""Gauge pressure at or below which the gas drives nothing."""
+_VELOCITY_POINTS: Final = 25
+_LOSS_PARTS: Final = ("whole", "roughness", "rotation", "bends", "ends")
 
 
 def deciding_gas_time(scene: Scene, *, rate: float) -> float:
@@ -76,7 +75,7 @@ def start_up_loss(*, start_up: float, gas_time: float, laminar: float = 0.0) -> 
 
 
 class RangeFlow(NamedTuple):
-    """The tube's flow over the fills of `SHARES`, the opposite chamber with the rest of the pair's liquid."""
+    """Flow of the tube over `FILL_SHARES`, the opposite chamber with the rest of the pair's liquid."""
 
     driving: FloatArray
     """Pressure that drives a full siphon, Pa."""
@@ -86,26 +85,26 @@ class RangeFlow(NamedTuple):
     """Velocity of a column separated at the crest, m/s, of one that spills where gas stays there; infinite
     without a crest, zero where it blocks."""
     primes: BoolArray
-    """Whether the gas lifts liquid over the crest of an unprimed tube."""
+    """True where the gas lifts liquid over the crest of an unprimed tube."""
     starts: BoolArray
-    """Whether the gas starts a flow in an unprimed tube."""
+    """True where the gas starts a flow in an unprimed tube."""
     equal: float
     """Velocity of a full siphon at equal fills, m/s; zero without gas pressure."""
 
     @property
     def velocity(self) -> FloatArray:
-        """The smaller of both, m/s."""
+        """Smaller velocity of a full and of a separated column, m/s."""
         return np.minimum(self.siphon, self.separated)
 
 
 @lru_cache(maxsize=8)
 def range_flow(scene: Scene) -> RangeFlow:
-    """The flow over the range of fills, unprimed. Source: `column_flow`."""
-    own = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio * np.array(SHARES))
-    tube = TubeFlow.of(Designs(scene=scene, size=own.size))
-    ends, gas = tube.ends(own, own[::-1]), np.full_like(own, pressure_factor(scene) * scene.gas.pressure)
+    """Flow over the range of fills, the tube unprimed beforehand. Source: `column_flow`."""
+    wall = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio * np.array(FILL_SHARES))
+    tube = TubeFlow.of(Designs(scene=scene, size=wall.size))
+    ends, gas = tube.ends(wall, wall[::-1]), np.full_like(wall, pressure_factor(scene) * scene.gas.pressure)
     driving = driving_pressure(tube.path, ends)
-    separated = np.full_like(own, np.inf)
+    separated = np.full_like(wall, np.inf)
     if tube.path.crest:
         separated = tube.flow(ends, primed=False).separation_velocity
     return RangeFlow(
@@ -113,72 +112,53 @@ def range_flow(scene: Scene) -> RangeFlow:
         siphon=tube.velocity(driving, driving > 0, to_crest=False),
         separated=separated,
         primes=resting_pressure(tube.path, ends) > gas_over_crest(tube.path, ends),
-        starts=can_flow(tube.path, ends, False) & (scene.gas.pressure > _NO_PRESSURE),
+        starts=can_flow(tube.path, ends, False) & (scene.gas.pressure > _NO_PRESSURE_PA),
         equal=float(tube.velocity(gas, gas > 0, to_crest=False)[0]),
     )
 
 
-def lost_at_crest(flow: RangeFlow) -> float:
-    """Share of a full siphon's velocity that is lost over the crest: all where the gas does not prime it."""
-    driven = flow.siphon > 0
-    if np.any(driven & ~flow.primes):
-        return 1.0
-    lost = 1 - flow.separated[driven] / flow.siphon[driven]
-    return float(np.max(np.maximum(lost, 0.0), initial=0.0))
-
-
 def range_velocities(flow: RangeFlow) -> FloatArray:
-    """From a quarter of the slowest flow, full or separated, to twice the fastest, m/s; empty without one."""
+    """A quarter of the slowest velocity, full or separated, to twice the fastest, m/s; empty without flow."""
     velocities = np.concatenate([flow.siphon, flow.separated])
     ends = np.log(velocities[(velocities > 0) & np.isfinite(velocities)])
     if not np.any(flow.velocity > 0):
         return np.empty(0)
-    return np.exp(np.linspace(np.min(ends) - np.log(4), np.max(ends) + np.log(2), _VELOCITIES))
+    return np.exp(np.linspace(np.min(ends) - np.log(4), np.max(ends) + np.log(2), _VELOCITY_POINTS))
 
 
 def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
-    """What leaving a part of the tube's loss out, or a constant in place of the whole, changes at worst.
+    """Largest change by leaving a part of the tube's loss out, or by a constant in place of the whole.
 
-    Returns: By `_TUBE_PARTS`, relative, of k under the same pressure, or of the head up to the siphon crest.
+    Returns: By part of the loss, relative, of k under the same pressure, or of the head up to the siphon
+        crest.
     """
-    whole_k, *whole_heads = _heads(scene, velocity, "")
-    log_u = np.log(velocity)
+    drags, heads = {}, {}
+    for part in ("", *_LOSS_PARTS):
+        tube = scene.tube
+        if part == "whole":
+            tube = replace(tube, drag_coefficient=PAPER_DRAG_COEFFICIENT)
+        elif part == "roughness":
+            tube = replace(tube, roughness=0.0)
+        elif part == "bends":
+            tube = replace(tube, bends=())
+        state = tube_state(scene, velocity, tube=tube)
+        if part == "rotation":
+            state = tube_state_at(tube=tube, reynolds=state.reynolds, rotation_reynolds=0.0)
+        elif part == "ends":
+            nothing = np.zeros(velocity.shape)
+            state = replace(state, terms={**state.terms, "entrance": nothing, "exit": nothing})
+        if part in ("whole", "ends"):
+            state = replace(state, kinetic_factor=np.ones(velocity.shape))
+        drags[part], heads[part] = state.k, [(state.k + 1) * velocity**2 / 2]
+        if tube.hump_radius is not None:
+            heads[part].append(crest_head(scene=scene, tube=scene.tube, state=state, velocity=velocity))
     # The same head drives another velocity, at which k is another: fully so in laminar flow.
-    slope, along = np.gradient(np.log(whole_heads[0]), log_u), np.gradient(np.log(whole_k), log_u)
+    log_u = np.log(velocity)
+    head_slope, k_slope = np.gradient(np.log(heads[""][0]), log_u), np.gradient(np.log(drags[""]), log_u)
     changes = {}
-    for part in _TUBE_PARTS:
-        k, *heads = _heads(scene, velocity, part)
-        ratios = np.array(heads) / np.array(whole_heads)
-        moved = np.abs(ratios[0] ** (-1 / slope) - 1)
-        own = np.abs(k / whole_k - 1) + np.abs(along) * moved
-        changes[part] = float(np.max([own, *np.abs(ratios[1:] - 1)]))
+    for part in _LOSS_PARTS:
+        ratios = np.array(heads[part]) / np.array(heads[""])
+        moved = np.abs(ratios[0] ** (-1 / head_slope) - 1)
+        change_of_k = np.abs(drags[part] / drags[""] - 1) + np.abs(k_slope) * moved
+        changes[part] = float(np.max([change_of_k, *np.abs(ratios[1:] - 1)]))
     return changes
-
-
-def _heads(scene: Scene, velocity: FloatArray, left_out: str) -> tuple[FloatArray, ...]:
-    """k, and the heads of the full tube and, where it has a crest, up to there."""
-    state = _loss_without(scene, velocity, left_out)
-    full = state.k, (state.k + 1) * velocity**2 / 2
-    if scene.tube.hump_radius is None:
-        return full
-    return (*full, crest_head(scene=scene, tube=scene.tube, state=state, velocity=velocity))
-
-
-def _loss_without(scene: Scene, velocity: FloatArray, left_out: str) -> TubeState:
-    """The loss of a smooth wall, at rest, straight, without entrance and exit; or the paper's constant."""
-    tube = scene.tube
-    if left_out == "whole":
-        tube = replace(tube, drag_coefficient=PAPER_DRAG_COEFFICIENT)
-    elif left_out == "roughness":
-        tube = replace(tube, roughness=0.0)
-    elif left_out == "bends":
-        tube = replace(tube, bends=())
-    state = tube_state(scene, velocity, tube=tube)
-    if left_out == "rotation":
-        return tube_state_at(tube=tube, reynolds=state.reynolds, rotation_reynolds=0.0)
-    if left_out == "ends":
-        nothing = np.zeros(velocity.shape)
-        state = replace(state, terms={**state.terms, "entrance": nothing, "exit": nothing})
-    if left_out in ("whole", "ends"):
-        state = replace(state, kinetic_factor=np.ones(velocity.shape))
-    return state

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, Literal, NamedTuple, get_args
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from ringbalance.reduced_model.chamber.contributions import (
     wall_layers,
 )
 from ringbalance.reduced_model.chamber.values import chamber_pressure
-from ringbalance.reduced_model.estimates import SHARES, RangeFlow
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
@@ -44,8 +43,6 @@ IN_INJECTIONS: Final = (INERTIA, FILLING, LAG, HELD)
 LEFT_OUT: Final = "left out"
 NOT_MODELLED: Final = "not modelled in this version"
 _NOTHING_FLOWS: Final = "nothing flows"
-Part = Literal["chamber", "tube", "injection"]
-PARTS: Final[tuple[Part, ...]] = get_args(Part)
 
 
 class Term(NamedTuple):
@@ -53,28 +50,21 @@ class Term(NamedTuple):
 
     name: str
     group: str
-    """Dimensionless group that its contribution grows with."""
+    """Dimensionless group that the contribution grows with."""
     model: str
-    """Empty where none holds it."""
+    """Model that holds the term; empty where none does."""
     value: float | None
-    """What leaving it out changes, relative, at the worst fill; None where the scene gives no basis."""
+    """Relative change by leaving the term out, at the worst fill; None where the scene gives no basis."""
     formula: str
-    """How that is estimated, with its numbers."""
+    """Formula of the estimate, with its numbers."""
     remark: str = ""
-    """Further reason, or what the scene makes of the model."""
+    """Further reason, or the settings of the scene that the model uses."""
     needed: bool | None = None
-    """Whether there is anything to model; None: where the estimate is above zero."""
+    """True if there is anything to model; None: where the estimate is above zero."""
     without: str = LEFT_OUT
-    """What stands in its place where there is nothing to model."""
+    """Name of the substitute where there is nothing to model."""
     unknown: str = "the scene gives no basis for an estimate"
-    """Said where there is no value."""
-
-    def chosen(self, tolerance: float) -> str:
-        """The model that serves; none where the scene gives no numbers or nothing to model."""
-        counts = self.value is not None and self.value > (0.0 if self.model else tolerance)
-        if not self.model:
-            return NOT_MODELLED if counts else LEFT_OUT
-        return self.model if (counts if self.needed is None else self.needed) else self.without
+    """Text in place of a missing value."""
 
     def reason(self, tolerance: float = 0.0) -> str:
         """Formula and value, of a term without a model compared with the tolerance."""
@@ -85,17 +75,18 @@ class Term(NamedTuple):
         return f"{self.formula}; {text}"
 
 
-def terms_of(scene: Scene, parts: Collection[str] = PARTS) -> Iterator[Term]:
+def terms_of(scene: Scene) -> Iterator[Term]:
     """Estimate every term of a scene, those of chamber, tube and injection, in the order of `models_used`.
 
     Those of chamber and tube are part of a flow law; those of an injection go beyond it.
     """
-    for part, terms in zip(PARTS, (_of_chamber, _of_tube, _of_injection), strict=True):
-        if part in parts:
-            yield from terms(scene)
+    yield from _chamber_terms(scene)
+    yield from _tube_terms(scene)
+    yield from _injection_terms(scene)
+    yield _lifted_liquid(scene)
 
 
-def _of_chamber(scene: Scene) -> Iterator[Term]:
+def _chamber_terms(scene: Scene) -> Iterator[Term]:
     disc, fills, gravity = scene.disc, chamber_fills(scene), gravity_shares(scene)
     fills = fills if fills.size else range_fills(scene)
     # Eqs. 1 and 2: S_c = theta (R2^2 - R1^2)/2, without plates.
@@ -141,19 +132,26 @@ _TUBE: Final[Mapping[str, tuple[str, str, str]]] = {
 """Name, group and model, by part of the loss."""
 
 
-def _of_tube(scene: Scene) -> Iterator[Term]:
+def _tube_terms(scene: Scene) -> Iterator[Term]:
     tube, flow = scene.tube, estimates.range_flow(scene)
     name, group = "priming over the siphon crest", "(p_A + P_A - D_m)/(p_A + P_A - P_C)"
     model, without = "four regimes", "always a full siphon"
     if tube.hump_radius is None:
-        text, remark = (
-            "the scene gives no hump_radius",
-            "Eq. 18, which levels the chambers out while the gas is off",
-        )
+        text = "the scene gives no hump_radius"
+        remark = "Eq. 18, which levels the chambers out while the gas is off"
         yield Term(name, group, model, None, text, remark, False, without)
     else:
+        driven = flow.siphon > 0
+        lost = np.maximum(1 - flow.separated[driven] / flow.siphon[driven], 0.0)
+        value = 1.0 if np.any(driven & ~flow.primes) else float(np.max(lost, initial=0.0))
         text = "1 - u_separated/u_siphon, or 1 where the column to the siphon crest outweighs the gas"
-        yield Term(name, group, model, estimates.lost_at_crest(flow), text, _over_crest(scene), True, without)
+        moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
+        gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"
+        remark = (
+            f"{tube.hump_shape}, {tube.hump_gas} gas, cavity of {gas}; "
+            f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
+        )
+        yield Term(name, group, model, value, text, remark, True, without)
     velocity, free = estimates.range_velocities(flow), tube.drag_coefficient is None
     changes = estimates.tube_changes(scene, velocity) if free and velocity.size else {}
     for part, (name, group, model) in _TUBE.items():
@@ -162,21 +160,13 @@ def _of_tube(scene: Scene) -> Iterator[Term]:
             simpler = f"k = {paper.PAPER_DRAG_COEFFICIENT:g}" if part == "whole" else "leaving it out"
             over = f"over {velocity[0]:.2g} to {velocity[-1]:.2g} m/s"
             text = f"{simpler} changes k, or the head up to the siphon crest, {over}"
-        # Also of a tube in which nothing flows.
+        # A tube in which nothing flows has its models as well.
         needed, without = free and value != 0.0, "constant k" if part == "whole" else LEFT_OUT
         yield Term(name, group, model, value, text, "", needed, without)
 
 
-def _over_crest(scene: Scene) -> str:
-    moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
-    gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"
-    return (
-        f"{scene.tube.hump_shape}, {scene.tube.hump_gas} gas, cavity of {gas}; "
-        f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
-    )
-
-
-def _of_injection(scene: Scene) -> Iterator[Term]:
+def _injection_terms(scene: Scene) -> Iterator[Term]:
+    """Start of the column, and filling and lag of the gas line, over the shortest injection that matters."""
     gas, flow, deciding = scene.gas, estimates.range_flow(scene), estimates.injection_time(scene)
     within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
     value, text = None, _NOTHING_FLOWS
@@ -188,71 +178,55 @@ def _of_injection(scene: Scene) -> Iterator[Term]:
         slowest = max(float(np.max(scene.liquid.density * scene.tube.length * velocity / driving)), 1e-12)
         value = estimates.start_up_loss(start_up=slowest, gas_time=deciding, laminar=laminar)
         text = f"start-up time 2 L/((k + 1) u) up to {1e3 * slowest:.3g} ms over the range of fills, {within}"
-    yield Term(
-        INERTIA, "2 L/((k + 1) u T)", "rho L du/dt of the liquid in the tube, in injections", value, text
-    )
-    # The fast and the slow end of the line.
-    ends = (line_ends(scene)[-1], line_ends(scene)[0])
+    model = "rho L du/dt of the liquid in the tube, in injections"
+    yield Term(INERTIA, "2 L/((k + 1) u T)", model, value, text)
+    ends = (line_ends(scene)[-1], line_ends(scene)[0])  # fast and slow
     volume, supply = chamber_volume(disc=scene.disc) + (gas.dead_volume or 0.0), ends[1].line.supply_pressure
     fill = [float(end.line.filling_time(supply, volume=volume)) for end in ends]
     vent = [float(end.line.venting_time(supply, volume=volume)) for end in ends]
     longer, lags = [max(pair) for pair in zip(fill, vent, strict=True)], [end.valve_lag for end in ends]
-    text = f"an empty chamber fills in {_span(fill)} ms and vents in {_span(vent)} ms, {within}"
-    group, model = "V/(C p_0 T)", "ISO 6358, in injections"
-    yield _timed(FILLING, group, model, longer, deciding, text, gas.conductance, _heat(scene, longer[1]))
-    text, model = f"{_span(lags)} ms {within}", "pure delay, in injections"
-    yield _timed(LAG, "t/T", model, lags, deciding, text, gas.valve_lag)
-    yield _held(scene, flow, deciding, within)
+    heat = "estimated isothermal, modelled without heat from the walls, which takes less"
+    if gas.process != "adiabatic":
+        sooner = 1e3 * longer[1] * (1 - 1 / HEAT_CAPACITY_RATIO)
+        heat = f"isothermal: without heat from the walls it would take up to {sooner:.3g} ms less"
+
+    def span(times: Sequence[float]) -> str:
+        return " to ".join(dict.fromkeys(f"{1e3 * time:.3g}" for time in times))
+
+    filling = f"an empty chamber fills in {span(fill)} ms and vents in {span(vent)} ms, {within}"
+    for name, group, model, times, prescribed, text, remark in (
+        (FILLING, "V/(C p_0 T)", "ISO 6358, in injections", longer, gas.conductance, filling, heat),
+        (LAG, "t/T", "pure delay, in injections", lags, gas.valve_lag, f"{span(lags)} ms {within}", ""),
+    ):
+        fast, slow = (min(time / deciding, 1.0) for time in times)
+        if prescribed is not None:
+            yield Term(name, group, model, slow, text, remark)
+        else:
+            both = " to ".join(dict.fromkeys((percent(fast), percent(slow))))
+            unknown = f"not in the scene: {both} over a default range"
+            yield Term(name, group, model, None, text, unknown=unknown)
 
 
-def _timed(
-    name: str,
-    group: str,
-    model: str,
-    times: Sequence[float],
-    deciding: float,
-    text: str,
-    given: float | None,
-    remark: str = "",
-) -> Term:
-    """A term of the times of the fast and the slow end of a gas line, s, over the deciding injection's."""
-    fast, slow = (min(time / deciding, 1.0) for time in times)
-    if given is not None:
-        return Term(name, group, model, slow, text, remark)
-    both = " to ".join(dict.fromkeys((percent(fast), percent(slow))))
-    return Term(name, group, model, None, text, unknown=f"not in the scene: {both} over a default range")
-
-
-def _held(scene: Scene, flow: RangeFlow, deciding: float, within: str) -> Term:
-    """What is lifted to the crest and falls back, as in a run, at the lowest level of the range."""
+def _lifted_liquid(scene: Scene) -> Term:
+    """Liquid that is lifted to the crest and falls back, as in a run, at the lowest level of the range."""
+    flow, deciding = estimates.range_flow(scene), estimates.injection_time(scene)
     tube, value, text = scene.tube, None, _NOTHING_FLOWS
     slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
     if tube.hump_radius is None:
         value, text = 0.0, "a tube without a crest stays full"
     elif np.isfinite(slowest):
-        level = float(surface_radius(disc=scene.disc, fill_ratio=SHARES[0] * scene.disc.max_fill_ratio))
+        lowest_fill = estimates.FILL_SHARES[0] * scene.disc.max_fill_ratio
+        level = float(surface_radius(disc=scene.disc, fill_ratio=lowest_fill))
         near = share_at_radius(tube=tube, radius=level, far_leg=False)
         length = tube.length * (crest_middle(tube) - near)
         value = min(length / max(slowest, 1e-300) / deciding, 1.0)
         text = (
             f"at most what fills {1e3 * length:.3g} mm of tube, from the level to the crest's middle, falls "
-            f"back after venting, over the liquid moved {within}, at the worst fill"
+            f"back after venting, over the liquid moved in the shortest injection that matters, "
+            f"{1e3 * deciding:.3g} ms, at the worst fill"
         )
     model = "lifted from the level to the crest unless the tube is primed, in injections"
     return Term(HELD, "l/(u T)", model, value, text)
-
-
-def _span(times: Sequence[float]) -> str:
-    """ms, of the fast and of the slow end."""
-    return " to ".join(dict.fromkeys(f"{1e3 * time:.3g}" for time in times))
-
-
-def _heat(scene: Scene, time: float) -> str:
-    """How far heat from the walls of a chamber moves the estimate of a filling time, s."""
-    if scene.gas.process == "adiabatic":
-        return "estimated isothermal, modelled without heat from the walls, which takes less"
-    sooner = 1e3 * time * (1 - 1 / HEAT_CAPACITY_RATIO)
-    return f"isothermal: without heat from the walls it would take up to {sooner:.3g} ms less"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,7 +243,7 @@ class ModelUsed:
 
     @property
     def modelled(self) -> bool:
-        """Whether a model holds the term."""
+        """True if a model holds the term."""
         return self.model not in (LEFT_OUT, NOT_MODELLED)
 
 
@@ -278,36 +252,32 @@ def models_used(
     *,
     law: str = CALIBRATED,
     obstacles: Mapping[str, str] = MappingProxyType({}),
-    asked: Collection[str] | None = None,
-    parts: Collection[str] = PARTS,
+    selected: Collection[str] | None = None,
 ) -> tuple[ModelUsed, ...]:
     """Model of every term of a scene, with the reason: chamber, tube, injection.
 
     Args:
         law: name of the flow law; any but the calibrated one has its own models of chamber and tube.
         obstacles: why the flow law cannot carry a term of an injection, by term.
-        asked: the terms of an injection to model; None: all.
-        parts: those whose terms are listed.
+        selected: the terms of an injection to model; None: all.
     """
     rows = []
-    for term in terms_of(scene, parts):
-        model, more = term.chosen(scene.tolerance), term.remark
+    for term in terms_of(scene):
+        remark, counts = term.remark, term.value is not None and term.value > 0
+        if not term.model:
+            counts = term.value is not None and term.value > scene.tolerance
+            model = NOT_MODELLED if counts else LEFT_OUT
+        else:
+            model = term.model if (counts if term.needed is None else term.needed) else term.without
         if term.name not in IN_INJECTIONS:
             if law != CALIBRATED:
-                model, more = f"as in the law “{law}”", ""
-        elif asked is not None:
-            model, more = (term.model if term.name in asked else LEFT_OUT), "the caller's choice"
+                model, remark = f"as in the law “{law}”", ""
+        elif selected is not None:
+            model, remark = (term.model if term.name in selected else LEFT_OUT), "the caller's choice"
         elif model != LEFT_OUT and term.name in obstacles:
-            model, more = NOT_MODELLED, obstacles[term.name]
-        why = term.reason(scene.tolerance)
-        rows.append(
-            ModelUsed(
-                term=term.name,
-                model=model,
-                why=f"{why}; {more}" if more else why,
-                estimated_contribution=term.value,
-            )
-        )
+            model, remark = NOT_MODELLED, obstacles[term.name]
+        why = "; ".join(filter(None, (term.reason(scene.tolerance), remark)))
+        rows.append(ModelUsed(term=term.name, model=model, why=why, estimated_contribution=term.value))
     return tuple(rows)
 
 
@@ -319,29 +289,29 @@ class _Neglected:
     bound: float
     """Sum of their contributions, relative to the liquid that the shortest injection that matters moves."""
     unknown: tuple[str, ...]
-    """Those that the scene gives no basis for an estimate of; not part of the bound."""
+    """Terms that the scene gives no basis for an estimate of; not part of the bound."""
     text: str
 
 
 def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
-    """What a run neglects beyond its flow law.
+    """Terms that a run neglects beyond its flow law.
 
     Source: errors of one sign at worst; each estimate is an upper bound.
     """
     rows = [row for row in used if row.term in IN_INJECTIONS and not row.modelled]
-    known = {r.term: r.estimated_contribution for r in rows if r.estimated_contribution is not None}
+    estimated = {r.term: r.estimated_contribution for r in rows if r.estimated_contribution is not None}
     unknown = tuple(row.term for row in rows if row.estimated_contribution is None)
-    bound = float(sum(known.values()))
+    bound = float(sum(estimated.values()))
     numbers = " that the scene gives numbers for" if unknown else ""
     text = f"no term of an injection{numbers} is neglected"
-    if known:
+    if estimated:
         text = (
-            f"neglected terms ({', '.join(known)}) change the liquid moved by the shortest injection that "
-            f"matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
+            f"neglected terms ({', '.join(estimated)}) change the liquid moved by the shortest injection "
+            f"that matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
         )
     # Without their numbers in the scene these two are a default range.
     ranges = [term for term in unknown if term in (FILLING, LAG)]
     others = [term for term in unknown if term not in ranges]
     text += f"; not in the scene, see the gas line's default range: {', '.join(ranges)}" if ranges else ""
     text += f"; not estimated, for lack of numbers in the scene: {', '.join(others)}" if others else ""
-    return _Neglected(terms=tuple(known), bound=bound, unknown=unknown, text=text)
+    return _Neglected(terms=tuple(estimated), bound=bound, unknown=unknown, text=text)

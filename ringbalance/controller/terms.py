@@ -31,7 +31,7 @@ def run_models(
     Raises: ValueError: a term that is not known, or that the scene or the law gives no numbers for.
     """
     _check(scene, model, asked or ())
-    return models_used(scene, law=model.name, obstacles=_obstacles(model), asked=asked)
+    return models_used(scene, law=model.name, obstacles=_obstacles(model), selected=asked)
 
 
 def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
-VELOCITY_POINTS: Final = 47
+_VELOCITY_POINTS: Final = 47
 
 
 def calibrate(scene: AnyScene) -> Calibration:
@@ -47,7 +47,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         presentation=Presentation(document=calibration_document, rows=calibration_rows),
         scene=scene,
         chamber=chamber,
-        tube=tube_loss(scene, np.geomspace(*VELOCITIES, VELOCITY_POINTS)),
+        tube=tube_loss(scene, np.geomspace(*VELOCITIES, _VELOCITY_POINTS)),
         flow_law=law,
         paper_law=paper_law(scene),
         answers=_answers(scene, chamber),
@@ -70,8 +70,8 @@ def calibrate(scene: AnyScene) -> Calibration:
 def _answers(scene: Scene, chamber: ChamberCalibration) -> Answers:
     """The answers of one scene as numbers, by the curves of its chamber, which hold gravity."""
     tube = TubeFlow.of(Designs.stacked([scene]), curve=chamber.hydrostatic_pressure.table.quintic)
-    found = Answers.of_tubes(tube, moments=chamber.moment.table.quintic)
-    row = {name: values[0] for name, values in vars(found).items()}
+    answers = Answers.of_tubes(tube, moments=chamber.moment.table.quintic)
+    row = {name: values[0] for name, values in vars(answers).items()}
     row["wall_pressure"] = chamber.wall_pressure.value[chamber.reported[-1]]
     row["moment_per_mass"] = chamber.moment_per_mass.value[()]
     return Answers(**row)

@@ -1,4 +1,4 @@
-"""What `calibrate` finds out about a balancer: the answers of its scene, each with its uncertainty budget."""
+"""Record of a calibration: the answers of a scene, each with its uncertainty budget."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES
 
 
 class _Named(NamedTuple):
-    """How an answer is shown."""
+    """Name, symbol and unit with which an answer is shown."""
 
     name: str
     symbol: str
@@ -76,11 +76,11 @@ ANSWERED: Final[Mapping[str, _Named]] = MappingProxyType(
 )
 """Answers that have an uncertainty budget, in the order in which they are shown, the main ones first."""
 MAIN: Final = 4
-"""How many are shown in a short text."""
+"""Number of answers that a short text shows."""
 FIELDS: Final = {"lambda": "moment_per_mass"}
 """Names in `Answers` that differ."""
-_PLACES: Final = {name: place for place, name in enumerate(ANSWERED)}
-_NEGLIGIBLE: Final = 1e-12
+_INDEX: Final = {name: index for index, name in enumerate(ANSWERED)}
+_NEGLIGIBLE_CHANGE: Final = 1e-12
 """Relative change of a quantity that counts as rounding, not as an effect of an input."""
 
 
@@ -92,14 +92,14 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
     """
     scene, stated = calibration.scene, bool(calibration.scene.uncertainty)
     errors = (*uncertainties(scene), of_chamber(VOLUME))
-    changes = _Changes.of(calibration, errors)
+    changes = _ErrorEffects.of(calibration, errors)
     effects, values = by_group(errors, changes.alone), _values(calibration)
-    lowered, raised = changes.together([_PLACES[name] for name in values])
+    lowered, raised = changes.together([_INDEX[name] for name in values])
     for (key, (value, numerical)), down, up in zip(values.items(), lowered, raised, strict=True):
         causes = {
             f"{UNCERTAIN_QUANTITIES[group]}.{group}" if group in UNCERTAIN_QUANTITIES else group: size
             for group, effect in effects.items()
-            if (size := float(effect[_PLACES[key]])) > _NEGLIGIBLE * abs(value)
+            if (size := float(effect[_INDEX[key]])) > _NEGLIGIBLE_CHANGE * abs(value)
         }
         parts = Parts(
             numerical=numerical,
@@ -122,7 +122,7 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Changes:
+class _ErrorEffects:
     """Changes of `ANSWERED`, the last axis, by the errors of a scene."""
 
     scene: Scene
@@ -135,19 +135,19 @@ class _Changes:
     waves: Waves
 
     @classmethod
-    def of(cls, calibration: Calibration, errors: Sequence[Uncertainty]) -> _Changes:
-        """By every error alone; the chambers' by what no model of them holds."""
-        scene, chamber, found = calibration.scene, calibration.chamber, calibration.answers
+    def of(cls, calibration: Calibration, errors: Sequence[Uncertainty]) -> _ErrorEffects:
+        """Effects of every error alone; those of the chambers' unmodelled terms included."""
+        scene, chamber, answers = calibration.scene, calibration.chamber, calibration.answers
         values, changes = changes_of(scene, _quantities, errors)
-        place = {error.name: place for place, error in enumerate(errors)}
+        row = {error.name: index for index, error in enumerate(errors)}
         at, fills = chamber.reported[-1], np.unique(chamber.fill_ratio)
         share = unmodelled_fractions(scene, fills)["heads"]
         waves = Waves(fill_ratio=fills, share=share, deviation=NORMAL_95 * np.array([-1.0, 1.0]))
         moved = _quantities(Designs.stacked([scene] * 2), waves=waves)
-        changes[place[WAVES]] = (moved - values[:, None]).T
+        changes[row[WAVES]] = (moved - values[:, None]).T
         central = float(chamber.moment_per_mass.uncertainty)
         moments = chamber.moment.unmodelled[np.argsort(chamber.fill_ratio)]
-        pair = math.hypot(*np.interp([found.least_fill_ratio, found.largest_fill_ratio], fills, moments))
+        pair = math.hypot(*np.interp([answers.least_fill_ratio, answers.largest_fill_ratio], fills, moments))
         facets = drawing_shares(scene.disc, np.empty(0)).volume
         linear = np.zeros((len(errors), len(ANSWERED)))
         for error, quantity, width in (
@@ -157,22 +157,27 @@ class _Changes:
             (MOMENT, "usable_moment", pair),
             (MOMENT, "reach", pair / math.tan(math.pi / scene.disc.chambers)),
             (VOLUME, "chamber_volume", facets * chamber.volume),
-            (VOLUME, "usable_volume", facets * float(found.usable_volume)),
+            (VOLUME, "usable_volume", facets * float(answers.usable_volume)),
         ):
-            linear[place[error], _PLACES[quantity]] = width
+            linear[row[error], _INDEX[quantity]] = width
         alone = changes + np.stack([-linear, linear], axis=1)
         return cls(scene=scene, errors=errors, values=values, alone=alone, linear=linear, waves=waves)
 
-    def together(self, places: Sequence[int]) -> tuple[list[float], list[float]]:
-        """By how much all errors together may lower and raise quantities (95 %), by their places.
+    def together(self, quantities: Sequence[int]) -> tuple[list[float], list[float]]:
+        """Largest decrease and increase (95 %) of quantities, by index, by all errors together.
 
         All move at once, in proportion to what each alone changes: on the sphere of 1.96 standard deviations
         to the point from which on, to the first order, a value lies further away.
         Source: Hasofer and Lind, "Exact and Invariant Second-Moment Code Format", J. Eng. Mech. Div. 100
             (1974) 111 (first-order reliability).
         """
-        asked = [(place, side) for place in places for side in (-1, 1)]
-        z = np.array([self._most_probable(place, side) for place, side in asked])
+        targets = [(quantity, side) for quantity in quantities for side in (-1, 1)]
+        z = np.empty((len(targets), len(self.errors)))
+        for row, (quantity, side) in enumerate(targets):
+            # Standard normal deviates of the errors that move the quantity most to this side.
+            low, high = (side * np.nan_to_num(self.alone[:, end, quantity]) for end in (0, 1))
+            size = np.maximum(np.maximum(low, high), 0.0)
+            z[row] = NORMAL_95 * np.where(high >= low, 1.0, -1.0) * size / (np.linalg.norm(size) or 1.0)
         waves = [each.name for each in self.errors].index(WAVES)
         values, base = np.empty((len(ANSWERED), len(z))), with_places(self.scene, self.errors)
         # Chambers of a mesh move with the scene, so that each scene has its own.
@@ -184,23 +189,18 @@ class _Changes:
             designs = Designs(scene=scene, size=np.size(rows))
             moved = replace(self.waves, deviation=np.atleast_1d(z[rows, waves]))
             values[:, rows] = np.reshape(_quantities(designs, waves=moved), values[:, rows].shape)
-        found, alone = [], both_sides(self.alone)
-        for row, (place, side) in enumerate(asked):
-            moved = side * (values[place, row] - self.values[place])
-            moved += side * float(z[row] @ self.linear[:, place]) / NORMAL_95
+        changes, alone = [], both_sides(self.alone)
+        for row, (quantity, side) in enumerate(targets):
+            change = side * (values[quantity, row] - self.values[quantity])
+            change += side * float(z[row] @ self.linear[:, quantity]) / NORMAL_95
             # Where nothing flows at that point, what flows at the sides counts.
-            found.append(float(max(moved, 0.0) if np.isfinite(moved) else alone[(side + 1) // 2][place]))
-        return found[::2], found[1::2]
-
-    def _most_probable(self, place: int, side: int) -> FloatArray:
-        """Standard normal deviates of the errors that move a quantity most to one side, shape (m,)."""
-        low, high = (side * np.nan_to_num(self.alone[:, end, place]) for end in (0, 1))
-        size = np.maximum(np.maximum(low, high), 0.0)
-        return NORMAL_95 * np.where(high >= low, 1.0, -1.0) * size / (np.linalg.norm(size) or 1.0)
+            sides = alone[(side + 1) // 2][quantity]
+            changes.append(float(max(change, 0.0) if np.isfinite(change) else sides))
+        return changes[::2], changes[1::2]
 
 
 def _values(calibration: Calibration) -> dict[str, tuple[float, float]]:
-    """Values that there are, with their numerical parts."""
+    """Values of the answers that exist, with their numerical half-widths."""
     chamber, answers, disc = calibration.chamber, calibration.answers, calibration.scene.disc
     at, error = chamber.reported[-1], calibration.flow_law.heads.interpolation_error
     level, moment = chamber.hydrostatic_pressure, float(np.max(chamber.moment.interpolation))
@@ -214,7 +214,7 @@ def _values(calibration: Calibration) -> dict[str, tuple[float, float]]:
         "velocity": error * abs(float(answers.velocity)),
         "reach": moment / math.tan(math.pi / disc.chambers),
         "drag_coefficient": error * (k + 1),
-        "chamber_volume": _NEGLIGIBLE * chamber.volume,
+        "chamber_volume": _NEGLIGIBLE_CHANGE * chamber.volume,
         "wall_pressure": float(chamber.wall_pressure.numerical[at]),
         "moment": float(chamber.moment.numerical[at]),
         "stall_pressure": width,
@@ -223,8 +223,10 @@ def _values(calibration: Calibration) -> dict[str, tuple[float, float]]:
         "crest_pressure": rounding,
         "cavitation_margin": rounding,
     }
-    found = {name: float(getattr(answers, FIELDS.get(name, name))) for name in ANSWERED}
-    return {name: (value, numerical.get(name, 0.0)) for name, value in found.items() if not math.isnan(value)}
+    values = {name: float(getattr(answers, FIELDS.get(name, name))) for name in ANSWERED}
+    return {
+        name: (value, numerical.get(name, 0.0)) for name, value in values.items() if not math.isnan(value)
+    }
 
 
 def _quantities(designs: Designs, *, waves: Waves | None = None) -> FloatArray:
@@ -234,7 +236,7 @@ def _quantities(designs: Designs, *, waves: Waves | None = None) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Calibration(PresentedResult):
-    """Everything that `calibrate` finds out about a scene's balancer.
+    """Results of `calibrate` for a scene's balancer.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
@@ -265,7 +267,7 @@ class Calibration(PresentedResult):
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Main numbers by key, with intervals, made when they are first asked for."""
+        """Main numbers by key, with intervals, computed on first use."""
         by_paper = paper.stall_pressure(
             disc=self.scene.disc,
             density=self.scene.liquid.density,
@@ -275,18 +277,14 @@ class Calibration(PresentedResult):
             ("lambda_variation", "variation of lambda over fills", "1", self.lambda_variation),
             ("stall_pressure_paper", "stall pressure by Eq. 19", "Pa", by_paper),
         )
-        found = [
-            *_budgets(self),
-            *(
-                Quantity(key=key, name=name, unit=unit, value=value, digits=3)
-                for key, name, unit, value in rest
-            ),
-        ]
-        return {each.key: each for each in found}
+        without_budget = (
+            Quantity(key=key, name=name, unit=unit, value=value, digits=3) for key, name, unit, value in rest
+        )
+        return {each.key: each for each in (*_budgets(self), *without_budget)}
 
     @cached_property
     def regime(self) -> Regime:
-        """How the tube flows at equal fills under the scene's gas pressure, gas over the crest beforehand."""
+        """Regime of the tube at equal fills under the scene's gas pressure, gas over the crest beforehand."""
         law = self.flow_law
         half = law.max_fill_ratio / 2
         flow = law.evaluate(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=self.scene.gas.pressure)
@@ -294,14 +292,14 @@ class Calibration(PresentedResult):
 
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:
-        """What the gas line can deliver, or both ends of a default range of lines; found when asked for."""
+        """Effect of the gas line, or of both ends of a default range of lines; computed on first use."""
         # The march is compiled: what needs no answer of it loads no compiler.
         answers: tuple[LineAnswer, ...] = registered("function", "line_answers")(self.scene, self.model)
         return answers
 
     @property
     def holding(self) -> Holding:
-        """Whether the fullest chamber that runs reach keeps its liquid with the gas off."""
+        """Stability of the liquid in the fullest chamber that runs reach, with the gas off."""
         return Holding.of(self.scene, fill_ratio=float(self.answers.largest_fill_ratio))
 
     @property

@@ -10,12 +10,11 @@ import numpy as np
 
 from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
 from ringbalance.reduced_model.calibration_record import MAIN, Calibration
-from ringbalance.reduced_model.chamber.values import drawing_shares
+from ringbalance.reduced_model.chamber.values import drawing_shares, paper_closed_forms
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
     RowStatus,
     chamber_status,
-    paper_columns,
     velocity_status,
 )
 from ringbalance.reduced_model.gas_line import line_text
@@ -26,10 +25,10 @@ from ringbalance.results.result import Rows, Table, models_table
 from ringbalance.results.rows import Finding, sentences
 from ringbalance.scene.models import Scene
 
-_ASIDE: Final = 0.01
-"""Angle below which a chamber counts as symmetric, deg."""
-_NEXT_TO_NOTHING: Final = 1e-3
-"""Of the outer wall's area."""
+_SYMMETRIC_DEG: Final = 0.01
+"""Largest angle of the moment in a chamber that counts as symmetric."""
+_INWARD_SHARE: Final = 1e-3
+"""Share of the outer wall's area below which no face counts as turned inward."""
 _MARKS: Final = MappingProxyType(
     {Regime.SIPHON: "", Regime.SEPARATED: "*", Regime.REVERSE: "r", Regime.UNDECIDED: "?"}
 )
@@ -57,8 +56,8 @@ def calibration_rows(calibration: Calibration) -> Rows:
     )
 
 
-def _known(calibration: Calibration, value: float, total: float | None) -> float | None:
-    """An uncertainty, as far as the scene's inputs can be believed."""
+def _printable_uncertainty(calibration: Calibration, value: float, total: float | None) -> float | None:
+    """Printable uncertainty: as far as the scene states its inputs' uncertainties."""
     return believed(value, total, stated=bool(calibration.scene.uncertainty))
 
 
@@ -79,13 +78,13 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
 
 
 def _mesh_findings(scene: Scene) -> Iterator[Finding]:
-    """What a user may not have meant in a chamber's mesh; its numbers are those of the mesh all the same."""
+    """Warnings of a mesh that a user may not have meant; the numbers are those of the mesh all the same."""
     geometry = scene.disc.geometry
     if geometry is None:
         return
     if (axis := axis_beside_shaft(geometry)) is not None:
         yield Finding(code="off_axis", values={"distance_m": float(np.hypot(*axis))})
-    if (inward := inward_share(geometry)) > _NEXT_TO_NOTHING:
+    if (inward := inward_share(geometry)) > _INWARD_SHARE:
         yield Finding(code="outer_wall_faces_inward", values={"area_share": inward})
     bend, volume = faceting(geometry).steepest, drawing_shares(scene.disc, np.empty(0)).volume
     if bend > SMOOTH or volume > scene.tolerance:
@@ -93,22 +92,18 @@ def _mesh_findings(scene: Scene) -> Iterator[Finding]:
 
 
 def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
-    scene, known, answers = calibration.scene, calibration.quantities, calibration.answers
+    scene, quantities, answers = calibration.scene, calibration.quantities, calibration.answers
     if calibration.regime is Regime.BLOCKED:
-        names = ("priming_pressure_vented", "stall_pressure")
-        needed = max(known[name].upper or known[name].value or 0.0 for name in names if name in known)
+        limits = [quantities.get(name) for name in ("priming_pressure_vented", "stall_pressure")]
+        needed = max(each.upper or each.value or 0.0 for each in limits if each is not None)
         yield Finding(code="blocked", values={"gas_pressure": scene.gas.pressure, "pressure": needed})
     if answers.least_fill_ratio > 0:
         code = "draw_down" if answers.residual_fill_ratio >= answers.stalled_fill_ratio else "gas_stalls"
-        values = {"fill_ratio": known["least_fill_ratio"], "depth": known["residual_depth"]}
+        values = {"fill_ratio": quantities["least_fill_ratio"], "depth": quantities["residual_depth"]}
         yield Finding(code=code, values=values)
-    if "cavitation_margin" in known:
-        margin, parts, law = (
-            float(answers.cavitation_margin),
-            known["cavitation_margin"].parts,
-            calibration.flow_law,
-        )
-        half = law.max_fill_ratio / 2
+    if "cavitation_margin" in quantities:
+        margin, parts = float(answers.cavitation_margin), quantities["cavitation_margin"].parts
+        law, half = calibration.flow_law, calibration.flow_law.max_fill_ratio / 2
         ends = law.ends(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=scene.gas.pressure)
         held = "crest_column_holds" if margin > 0 else "crest_column_separates"
         yield Finding(
@@ -118,23 +113,26 @@ def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
 
 
 def _direction(calibration: Calibration) -> Iterator[Finding]:
-    """Where an imported chamber is not symmetric, the angle from its middle in which its pair acts."""
+    """Angle from the middle of an imported chamber in which its pair acts, where it is not symmetric."""
     total, moment = calibration.scene.disc.max_fill_ratio, calibration.flow_law.moment
     fill = total * np.linspace(0.525, 1.0, 20)
     angles = np.angle(moment.pair_vector(fill_ratio=fill, opposite_fill_ratio=total - fill))
-    if np.degrees(np.max(np.abs(angles))) >= _ASIDE:
+    if np.degrees(np.max(np.abs(angles))) >= _SYMMETRIC_DEG:
         numbers = {"angle_equal": float(angles[0]), "angle_full": float(angles[-1])}
         yield Finding(code="moment_aside", values=numbers)
 
 
 def _legend(states: tuple[RowStatus, ...]) -> str:
-    """What limits some rows."""
+    """Legend of the states that limit some rows."""
     return "; ".join(f"{s}: {sentences()[s].text}" for s in RowStatus if s in states and s != RowStatus.OK)
 
 
 def _chamber_table(calibration: Calibration) -> Table:
     chamber, at = calibration.chamber, list(calibration.chamber.reported)
-    states, columns = chamber_status(calibration), paper_columns(calibration, chamber.fill_ratio[at])
+    states, by_paper = (
+        chamber_status(calibration),
+        paper_closed_forms(calibration.scene, chamber.fill_ratio[at]),
+    )
     legend = _legend(states)
     pressure, moment = (
         np.maximum(np.hypot(curve.uncertainty, curve.inputs), 1e-9 * np.max(curve.value))
@@ -142,23 +140,23 @@ def _chamber_table(calibration: Calibration) -> Table:
     )
 
     def cell(value: float, total: float, factor: float) -> str:
-        known = _known(calibration, value, total)
-        return rounded(factor * value, None if known is None else factor * known)
+        uncertainty = _printable_uncertainty(calibration, value, total)
+        return rounded(factor * value, None if uncertainty is None else factor * uncertainty)
 
     rows = []
     for row, i in enumerate(at):
         p, u = float(chamber.wall_pressure.value[i]), float(chamber.moment.value[i])
-        by_paper = [float(columns[name][row]) for name in ("wall_pressure_paper_Pa", "moment_paper_kg_m")]
+        p_paper, u_paper = (float(column[row]) for column in by_paper)
         rows.append(
             (
                 f"{chamber.fill_ratio[i]:g}",
                 f"{1e3 * chamber.ring.surface_radius[i]:.2f}",
                 cell(p, pressure[i], 1e-6),
-                cell(by_paper[0], pressure[i], 1e-6),
-                _off(by_paper[0], p),
+                cell(p_paper, pressure[i], 1e-6),
+                _off(p_paper, p),
                 cell(u, moment[i], 1e6),
-                cell(by_paper[1], moment[i], 1e6),
-                _off(by_paper[1], u),
+                cell(u_paper, moment[i], 1e6),
+                _off(u_paper, u),
                 *([str(states[row])] if legend else []),
             )
         )
@@ -195,9 +193,15 @@ def _law_table(calibration: Calibration) -> Table:
     for pressure in np.multiply(PRESSURE_FACTORS, calibration.scene.gas.pressure):
         flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=pressure)
         by_paper = calibration.paper_law.evaluate(fill_ratio=x, gas_pressure=pressure).velocity
-        cells = zip(flow.regime, flow.velocity, flow.uncertainty, by_paper, strict=True)
-        shown = (_velocity(calibration, Regime(int(r)), *values) for r, *values in cells)
-        rows.append((f"{pressure / 1e6:.3g}", *shown))
+        cells = []
+        for r, velocity, total, eq_19 in zip(
+            flow.regime, flow.velocity, flow.uncertainty, by_paper, strict=True
+        ):
+            regime = Regime(int(r))
+            text = rounded(velocity, _printable_uncertainty(calibration, velocity, total))
+            shown = "-" if regime is Regime.BLOCKED else f"{text}{_MARKS[regime]}"
+            cells.append(f"{shown} ({eq_19:.1f})")
+        rows.append((f"{pressure / 1e6:.3g}", *cells))
     note = (
         "* separated at the siphon crest, ? siphon or separated is undecided, r reverse, - blocked; "
         "x is the driven chamber's fill ratio"
@@ -207,11 +211,3 @@ def _law_table(calibration: Calibration) -> Table:
     heads = ("MPa", *(f"x = {v:.3g}" for v in x))
     caption = "Velocity from an empty tube, m/s (Eq. 19)"
     return Table(caption=caption, heads=heads, rows=rows, note="; ".join(filter(None, (note, legend))))
-
-
-def _velocity(
-    calibration: Calibration, regime: Regime, velocity: float, total: float, by_paper: float
-) -> str:
-    text = rounded(velocity, _known(calibration, velocity, total))
-    shown = "-" if regime is Regime.BLOCKED else f"{text}{_MARKS[regime]}"
-    return f"{shown} ({by_paper:.1f})"

@@ -30,13 +30,13 @@ from ringbalance.reduced_model.tube.regime import (
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
 
-_TOGETHER: Final = 8192
-"""Designs whose arrays fit into a processor's cache."""
+_DESIGNS_TOGETHER: Final = 8192
+"""Number of designs whose arrays fit into a processor's cache."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answers:
-    """What a calibration answers of n designs: arrays of shape (n,), SI, NaN where one has no such thing.
+    """Answers of calibrating n designs: arrays of shape (n,), SI, NaN where a design has no such thing.
 
     Gravity is left out, but of a single scene with its chamber's curves.  Where an input differs between
     designs all that depends on it does: the coefficient of loss k is that at the velocity of each design, not
@@ -48,7 +48,7 @@ class Answers:
     wall_pressure: FloatArray
     """At the largest fill, Pa."""
     moment: FloatArray
-    """Of a chamber at the largest fill, kg m."""
+    """Moment of a chamber at the largest fill, kg m."""
     moment_per_mass: FloatArray
     """lambda at equal fills, per transferred mass, m."""
     regime: IntArray
@@ -64,21 +64,21 @@ class Answers:
     stall_pressure: FloatArray
     """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
     priming_pressure_vented: FloatArray
-    """That starts a flow, crest gas vented, driven chamber empty, Pa."""
+    """Gauge pressure that starts a flow, crest gas vented, driven chamber empty, Pa."""
     priming_pressure_trapped: FloatArray
-    """The same with that gas trapped, at equal fills, Pa."""
+    """Gauge pressure that starts a flow, crest gas trapped, equal fills, Pa."""
     residual_fill_ratio: FloatArray
-    """Of the driven chamber, at which gas enters its port."""
+    """Fill of the driven chamber at which gas enters its port."""
     stalled_fill_ratio: FloatArray
-    """Of the driven chamber, at which an injection moves no liquid any more."""
+    """Fill of the driven chamber at which an injection moves no liquid any more."""
     least_fill_ratio: FloatArray
-    """To which injections can bring a chamber."""
+    """Smallest fill to which injections can bring a chamber."""
     largest_fill_ratio: FloatArray
-    """That the opposite chamber reaches then."""
+    """Fill of the opposite chamber then."""
     residual_depth: FloatArray
-    """Of the liquid over the port as gas enters it, m; zero where none does before the chamber is empty."""
+    """Depth of the liquid over the port as gas enters it, m; zero if the chamber empties before."""
     usable_volume: FloatArray
-    """That a pair can move from one chamber to the other, m^3."""
+    """Volume that a pair can move from one chamber to the other, m^3."""
     usable_moment: FloatArray
     """Largest moment of a pair to which injections can bring it, kg m."""
     reach: FloatArray
@@ -102,8 +102,8 @@ class Answers:
         Source: Eqs. 2 to 18 of the liquid-ring paper, with exact chambers, the siphon crest and k(u).
         """
         parts = []
-        for rows in np.array_split(np.arange(designs.size), -(-designs.size // _TOGETHER)):
-            part = designs if designs.size <= _TOGETHER else designs.take(rows)
+        for rows in np.array_split(np.arange(designs.size), -(-designs.size // _DESIGNS_TOGETHER)):
+            part = designs if designs.size <= _DESIGNS_TOGETHER else designs.take(rows)
             moved = None if waves is None else waves.take(rows)
             tube = (
                 near.of_neighbours(part, rows % near.designs.size) if near else TubeFlow.of(part, waves=moved)
@@ -119,7 +119,7 @@ class Answers:
     def of_tubes(
         cls, tube: TubeFlow, *, moments: Callable[[FloatArray], FloatArray] | None = None
     ) -> Answers:
-        """Those of the designs of tubes.
+        """Answers of the designs of tubes.
 
         Args: `moments`: of a chamber over the fill ratio, kg m; default the closed form.
         """
@@ -148,7 +148,7 @@ class Answers:
         lowest = _lowest(tube, flow, equal) if crest else (nothing, nothing)
         priming = (nothing, nothing)
         if crest:
-            vented, trapped = (replace(tube.path, trapped=kept) for kept in (False, True))
+            vented, trapped = (replace(tube.path, trapped=each) for each in (False, True))
             priming = priming_pressure(vented, uneven), priming_pressure(trapped, equal)
         return cls(
             chamber_volume=volume,
@@ -196,8 +196,8 @@ def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     def drawn(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
         part = tube.take(rows)
         scene = part.designs.scene
-        own, other = part.level(np.array([fills, top[rows] - fills]))
-        flow = part.flow(part.ends(own, other), primed=True, exactly=exactly)
+        driven, opposite = part.level(np.array([fills, top[rows] - fills]))
+        flow = part.flow(part.ends(driven, opposite), primed=True, exactly=exactly)
         return drawn_fill(scene, flow_rate=scene.tube.area * flow.velocity)
 
     return first_gas(tube.designs.scene, drawn, top=top, about=partial(drawn, exactly=False))
@@ -212,11 +212,11 @@ def _stalled_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     def moves(rows: IntArray, fills: FloatArray) -> BoolArray:
         part = tube.take(rows)
         scene, path = part.designs.scene, part.path
-        own, other = part.level(np.array([fills, scene.disc.max_fill_ratio - fills]))
-        rest, held = part.ends(own, other, driven=False), np.zeros(fills.shape, dtype=np.bool_)
+        driven, opposite = part.level(np.array([fills, scene.disc.max_fill_ratio - fills]))
+        rest, held = part.ends(driven, opposite, driven=False), np.zeros(fills.shape, dtype=np.bool_)
         if path.crest:
             # Only over a crest may a column be held while the gas is off.
             held = np.asarray(can_flow(path, rest, True) | can_flow(path, rest.reversed(), True))
-        return np.asarray(can_flow(path, part.ends(own, other), held))
+        return np.asarray(can_flow(path, part.ends(driven, opposite), held))
 
     return np.nan_to_num(first_stalled(moves, start=top / 2, end=NEARLY_EMPTY * top))

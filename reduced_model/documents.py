@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
 from typing import Any, Final
@@ -12,7 +11,6 @@ import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.contributions import compression
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
@@ -41,17 +39,37 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
     Returns: The document, in SI units and gauge pressures; no value is NaN or infinite.
     Source: combination after ASME V&V 20-2009.
     """
-    scene = calibration.scene
+    scene, tube, instability = calibration.scene, calibration.tube, calibration.instability
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "chamber": _chamber(calibration),
         "check": _check(calibration.chamber.check),
-        "tube": _tube(calibration),
+        "tube": {
+            "velocity_m_s": _listed(tube.velocity),
+            "reynolds": _listed(tube.reynolds),
+            "rotation_reynolds": tube.rotation_reynolds,
+            "k": _listed(tube.k.value),
+            "k_uncertainty": _listed(tube.k.uncertainty),
+            "flow_state": _listed(tube.flow_state),
+            "in_range": _listed(tube.in_range),
+            "range_notes": list(tube.range_notes),
+            "terms": {name: _listed(term) for name, term in tube.terms.items()},
+            "uncertainty_parts": {name: _listed(part) for name, part in tube.uncertainty_parts.items()},
+        },
         "law": _law(calibration),
         "regime": calibration.regime.label,
-        "asynchronous_instability": _instability(calibration),
+        "asynchronous_instability": None
+        if instability is None
+        else {
+            "fill_ratio": instability.fill_ratio,
+            "critical_speed_rad_s": instability.critical_speed,
+            "growth_over_critical_speed": instability.growth,
+        },
         "tolerance": scene.tolerance,
-        "holding": _holding(calibration),
+        "holding": {
+            "holds": calibration.holding.holds,
+            "largest_hump_radius_m": calibration.holding.largest_hump_radius,
+        },
         "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
@@ -64,40 +82,41 @@ def _listed(values: npt.ArrayLike) -> Any:
     return np.asarray(values).tolist()
 
 
-def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
-    return {
-        f"{name}_{unit}": _listed(curve.value[at]),
-        f"{name}_status": str(curve.status.code),
-        f"{name}_uncertainty": _listed(curve.uncertainty[at]),
-        f"{name}_input_uncertainty": _listed(curve.inputs[at]),
-        f"{name}_uncertainty_parts": {
-            "numerical": _listed(curve.numerical[at]),
-            "unmodelled_terms": _listed(curve.unmodelled[at]),
-        },
-    }
-
-
 def _chamber(calibration: Calibration) -> dict[str, Any]:
     scene, chamber, at = calibration.scene, calibration.chamber, list(calibration.chamber.reported)
     fills = chamber.reported_fill_ratio
-    return (
-        {
-            "fill_ratio": _listed(fills),
-            "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
-            "row_status": [str(status) for status in chamber_status(calibration)],
+    document = {
+        "fill_ratio": _listed(fills),
+        "free_surface_radius_m": _listed(chamber.ring.surface_radius[at]),
+        "row_status": [str(status) for status in chamber_status(calibration)],
+    }
+    for curve, name, unit in (
+        (chamber.wall_pressure, "wall_pressure", "Pa"),
+        (chamber.hydrostatic_pressure, "hydrostatic_pressure", "Pa"),
+        (chamber.moment, "moment", "kg_m"),
+    ):
+        document |= {
+            f"{name}_{unit}": _listed(curve.value[at]),
+            f"{name}_status": str(curve.status.code),
+            f"{name}_uncertainty": _listed(curve.uncertainty[at]),
+            f"{name}_input_uncertainty": _listed(curve.inputs[at]),
+            f"{name}_uncertainty_parts": {
+                "numerical": _listed(curve.numerical[at]),
+                "unmodelled_terms": _listed(curve.unmodelled[at]),
+            },
         }
-        | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
-        | _curve(chamber.hydrostatic_pressure, at, "hydrostatic_pressure", "Pa")
-        | _curve(chamber.moment, at, "moment", "kg_m")
-        | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
-        | {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
-        | {"lambda_per_transferred_mass_m": _listed(calibration.lambda_over_fill(fill_ratio=fills))}
-    )
+    pressure, moment = paper_closed_forms(scene, fills)
+    return document | {
+        "wall_pressure_paper_Pa": _listed(pressure),
+        "moment_paper_kg_m": _listed(moment),
+        "moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills))),
+        "lambda_per_transferred_mass_m": _listed(calibration.lambda_over_fill(fill_ratio=fills)),
+    }
 
 
 def _check(check: ElementCheck) -> dict[str, Any]:
     """Finite elements at a few fills; differences are closed form less finite elements."""
-    found: dict[str, Any] = {
+    document: dict[str, Any] = {
         "by": "finite elements",
         "gravity": check.gravity,
         "fill_ratio": _listed(check.elements.fill_ratio),
@@ -111,35 +130,10 @@ def _check(check: ElementCheck) -> dict[str, Any]:
         if name not in check.difference:
             continue
         estimate = getattr(check.elements, name)
-        found[f"{name}_{unit}"] = _listed(estimate.value)
-        found[f"{name}_uncertainty"] = _listed(estimate.uncertainty)
-        found[f"{name}_difference"] = _listed(check.difference[name])
-    return found
-
-
-def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[str, FloatArray]:
-    """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
-
-    Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,).
-    """
-    pressure, moment = paper_closed_forms(calibration.scene, fill_ratio)
-    return {"wall_pressure_paper_Pa": pressure, "moment_paper_kg_m": moment}
-
-
-def _tube(calibration: Calibration) -> dict[str, Any]:
-    tube = calibration.tube
-    return {
-        "velocity_m_s": _listed(tube.velocity),
-        "reynolds": _listed(tube.reynolds),
-        "rotation_reynolds": tube.rotation_reynolds,
-        "k": _listed(tube.k.value),
-        "k_uncertainty": _listed(tube.k.uncertainty),
-        "flow_state": _listed(tube.flow_state),
-        "in_range": _listed(tube.in_range),
-        "range_notes": list(tube.range_notes),
-        "terms": {name: _listed(term) for name, term in tube.terms.items()},
-        "uncertainty_parts": {name: _listed(part) for name, part in tube.uncertainty_parts.items()},
-    }
+        document[f"{name}_{unit}"] = _listed(estimate.value)
+        document[f"{name}_uncertainty"] = _listed(estimate.uncertainty)
+        document[f"{name}_difference"] = _listed(check.difference[name])
+    return document
 
 
 def _law(calibration: Calibration) -> dict[str, Any]:
@@ -159,7 +153,7 @@ def _law(calibration: Calibration) -> dict[str, Any]:
 
 
 def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
-    """What limits a chamber at the reported fill ratios."""
+    """Limits of a chamber's answers at the reported fill ratios."""
     scene, chamber = calibration.scene, calibration.chamber
     fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
     closed = computed & closed_ring(scene, fills)
@@ -167,7 +161,7 @@ def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
-    """What limits a velocity out of a chamber at fill ratios, under the scene's gas pressure."""
+    """Limits of the velocity out of a chamber at fill ratios, under the scene's gas pressure."""
     scene = calibration.scene
     return _row_status(
         scene,
@@ -178,24 +172,8 @@ def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[R
     )
 
 
-def _holding(calibration: Calibration) -> dict[str, Any]:
-    found = calibration.holding
-    return {"holds": found.holds, "largest_hump_radius_m": found.largest_hump_radius}
-
-
-def _instability(calibration: Calibration) -> dict[str, Any] | None:
-    found = calibration.instability
-    if found is None:
-        return None
-    return {
-        "fill_ratio": found.fill_ratio,
-        "critical_speed_rad_s": found.critical_speed,
-        "growth_over_critical_speed": found.growth,
-    }
-
-
 class RowStatus(StrEnum):
-    """What limits a row at its fill ratio; the first that applies. Each is the code of a finding."""
+    """Limit of a row at its fill ratio, the first that applies; each is the code of a finding."""
 
     OK = "ok"
     NO_RING = "no_ring"

@@ -14,29 +14,29 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Disc, Scene
 
 NEARLY_EMPTY: Final = 1e-6
-"""Share of a pair's liquid with which a chamber's last liquid is looked at."""
-_NOTHING: Final = 1e-9
-"""Below this a fill ratio is not told from zero."""
-_ROUNDS: Final = 60
-_STEEPEST: Final = 0.9
-_GENTLE: Final = 0.1
-"""dg/dx before it is known, about."""
+"""Share of a pair's liquid that counts as a chamber's last liquid."""
+_ZERO_FILL: Final = 1e-9
+"""Fill ratio that counts as zero."""
+_MAX_STEPS: Final = 60
+_STEEPEST_SLOPE: Final = 0.9
+_FIRST_SLOPE: Final = 0.1
+"""Estimate of dg/dx before the first two values."""
 _SAME_FILL: Final = 1e-8
 """Error of a fill, of which the last step leaves a hundredth."""
 _ROUNDING: Final = 1e-12
-_PLACES: Final = 17
-"""Of the scan for the first fill at which nothing moves."""
+_SCAN_POINTS: Final = 17
+"""Fills of the scan for the first one at which nothing moves."""
 _QUARTERINGS: Final = 12
-"""Of the step in which that lies: 4e-9 of the way is left."""
+"""Quarterings of the step in which that fill lies: 4e-9 of the way is left."""
 Drawn = Callable[[IntArray, FloatArray], FloatArray]
-"""Fill down to which the flow at a fill draws gas, of some rows."""
+"""Function of rows and their fills: fill down to which the flow at a fill draws gas."""
 
 
 def _fill_at(disc: Disc, radius: npt.ArrayLike) -> FloatArray:
     """Fill ratio whose surface lies at a radius, or nearest to it."""
     level = np.clip(radius, disc.inner_radius, disc.outer_radius)
-    whole = liquid_area(disc=disc, surface_radius=disc.inner_radius)
-    return np.clip(liquid_area(disc=disc, surface_radius=level) / whole, 0.0, 1.0)
+    full = liquid_area(disc=disc, surface_radius=disc.inner_radius)
+    return np.clip(liquid_area(disc=disc, surface_radius=level) / full, 0.0, 1.0)
 
 
 def drawn_fill(scene: Scene, *, flow_rate: FloatArray) -> FloatArray:
@@ -45,7 +45,9 @@ def drawn_fill(scene: Scene, *, flow_rate: FloatArray) -> FloatArray:
     return np.minimum(_fill_at(scene.disc, scene.tube.port_radius - depth), scene.disc.max_fill_ratio)
 
 
-def first_gas(scene: Scene, drawn: Drawn, *, top: FloatArray, about: Drawn | None = None) -> FloatArray:
+def first_gas(
+    scene: Scene, draws_down_to: Drawn, *, top: FloatArray, about: Drawn | None = None
+) -> FloatArray:
     """Fill at which gas enters the port of a chamber that a running tube empties: the largest such fill.
 
     x = g(x), g the fill that the flow at x draws gas down to: from the top down g falls with the flow, so the
@@ -57,31 +59,33 @@ def first_gas(scene: Scene, drawn: Drawn, *, top: FloatArray, about: Drawn | Non
     covered = top - _fill_at(scene.disc, scene.tube.port_radius)
     covered = np.where(covered < top, covered * (1 - _ROUNDING), top)
     start = top if about is None else _fixed_point(about, top, covered, start=top)
-    x = _fixed_point(drawn, top, covered, start=start)
-    return np.where(x > _NOTHING, x, 0.0)
+    x = _fixed_point(draws_down_to, top, covered, start=start)
+    return np.where(x > _ZERO_FILL, x, 0.0)
 
 
-def _fixed_point(drawn_by: Drawn, top: FloatArray, covered: FloatArray, *, start: FloatArray) -> FloatArray:
+def _fixed_point(
+    draws_down_to: Drawn, top: FloatArray, covered: FloatArray, *, start: FloatArray
+) -> FloatArray:
     x, high, low = start.copy(), top.copy(), np.zeros_like(top)
-    before, drawn, rows = top.copy(), np.full(top.shape, np.nan), np.arange(top.size)
+    before, previous, rows = top.copy(), np.full(top.shape, np.nan), np.arange(top.size)
     done = np.zeros(top.shape, dtype=np.bool_)
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_STEPS):
         if rows.size == 0:
             break
-        here = x[rows]
-        now = drawn_by(rows, here)
-        least = np.where(here > covered[rows], covered[rows], 0.0)
-        high[rows] = np.where(now < here, np.clip(now, least, high[rows]), high[rows])
-        low[rows] = np.where(now > here, np.maximum(now, low[rows]), low[rows])
-        step = here - before[rows]
-        slope = (now - drawn[rows]) / np.where(step == 0, np.nan, step)
-        slope = np.where(np.isfinite(slope), np.clip(slope, 0.0, _STEEPEST), _GENTLE)
-        then = np.clip(here + (now - here) / (1 - slope), np.maximum(low[rows], least), high[rows])
+        at = x[rows]
+        value = draws_down_to(rows, at)
+        least = np.where(at > covered[rows], covered[rows], 0.0)
+        high[rows] = np.where(value < at, np.clip(value, least, high[rows]), high[rows])
+        low[rows] = np.where(value > at, np.maximum(value, low[rows]), low[rows])
+        step = at - before[rows]
+        slope = (value - previous[rows]) / np.where(step == 0, np.nan, step)
+        slope = np.where(np.isfinite(slope), np.clip(slope, 0.0, _STEEPEST_SLOPE), _FIRST_SLOPE)
+        following = np.clip(at + (value - at) / (1 - slope), np.maximum(low[rows], least), high[rows])
         # Gas at any fill above: the top itself, or where the other port is covered.
-        stays = (now >= here) & ((here == top[rows]) | (here == covered[rows]))
-        left = (np.abs(now - here) > _SAME_FILL) & ~stays
-        before[rows], drawn[rows] = here, np.where(then > least, now, np.nan)
-        x[rows] = np.where(stays | done[rows], here, then)
+        stays = (value >= at) & ((at == top[rows]) | (at == covered[rows]))
+        left = (np.abs(value - at) > _SAME_FILL) & ~stays
+        before[rows], previous[rows] = at, np.where(following > least, value, np.nan)
+        x[rows] = np.where(stays | done[rows], at, following)
         done[rows] |= ~left
         left = ~done[rows]
         if np.count_nonzero(left) <= rows.size / 2:
@@ -94,15 +98,15 @@ def first_stalled(
     *,
     start: FloatArray,
     end: FloatArray,
-    places: int = _PLACES,
+    points: int = _SCAN_POINTS,
 ) -> FloatArray:
     """Fill from `start` down to `end` at which liquid first stops moving; NaN where it moves at all.
 
-    By a scan of so many places, and by quarters of the step in which it stops.
+    By a scan of so many points, and by quarters of the step in which it stops.
     Args: `moves`: of some rows, whether liquid moves at fills of shape (k, rows).
     """
-    step = (end - start) / (places - 1)
-    moved = moves(np.arange(start.size), start + np.arange(places)[:, None] * step)
+    step = (end - start) / (points - 1)
+    moved = moves(np.arange(start.size), start + np.arange(points)[:, None] * step)
     stops, first = ~moved.all(axis=0), np.argmin(moved, axis=0)
     stalled = np.where(stops, start, np.nan)
     rows = np.flatnonzero(stops & (first > 0))

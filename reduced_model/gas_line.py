@@ -1,4 +1,4 @@
-"""What the valve and line of a chamber let through at the least, and at what valve-open time.
+"""Smallest effect that the valve and line of a chamber have, and the valve-open time of it.
 
 A line that a scene does not give is a range, not an absence: conductances of small valves behind a rotary
 distributor and their switching times, of which both ends are answered for.
@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from ringbalance.physics.gas import GasLine
-from ringbalance.scene.models import Gas, Scene
+from ringbalance.scene.models import Scene
 
-DEFAULT_CONDUCTANCES: Final = (0.2e-8, 1e-8)
-"""C of small valves with a rotary distributor, slow and fast, m^3/(s Pa): 0.2 and 1 l/(s bar)."""
-DEFAULT_LAGS: Final = (10e-3, 5e-3)
-"""Of small solenoid valves, slow and fast, s."""
-DEFAULT_CRITICAL_RATIO: Final = 0.3
+_DEFAULT_CONDUCTANCES_M3_S_PA: Final = (0.2e-8, 1e-8)
+"""C of small valves with a rotary distributor, slow and fast: 0.2 and 1 l/(s bar)."""
+_DEFAULT_LAGS_S: Final = (10e-3, 5e-3)
+"""Switching times of small solenoid valves, slow and fast."""
+_DEFAULT_CRITICAL_RATIO: Final = 0.3
 """Between 0.5 of a nozzle and 0.2 of a long line."""
 
 
@@ -33,7 +33,7 @@ class LineEnd:
 
 @dataclass(frozen=True, kw_only=True)
 class LineAnswer:
-    """What a pair at equal fills can do with one gas line."""
+    """Effect of one gas line on a pair at equal fills."""
 
     end: str
     conductance: float
@@ -44,7 +44,7 @@ class LineAnswer:
     filling_time: float
     """From ambient to the supply's pressure, s."""
     choked_filling_time: float
-    """The same if the line were choked to the end, a lower bound, s."""
+    """Filling time of a line that is choked to the end, a lower bound, s."""
     venting_time: float
     """Back to ambient, s."""
     shortest_opening: float | None
@@ -55,43 +55,51 @@ class LineAnswer:
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
     holds: bool | None = True
-    """Whether what an injection moves stays moved with the gas off; None: likely, as `TubePath.holds`."""
+    """True if what an injection moves stays moved with the gas off; None: likely, as `TubePath.holds`."""
 
 
 def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
     """The scene's gas line, or the slow and the fast end of the default range of what it does not give."""
     gas = scene.gas
+    ends = (("slow", 0), ("fast", 1))
     if gas.conductance is not None and gas.valve_lag is not None:
-        return (_end(gas, "given", 0),)
-    return _end(gas, "slow", 0), _end(gas, "fast", 1)
-
-
-def _end(gas: Gas, name: str, place: int) -> LineEnd:
-    line = GasLine.with_conductance(
-        gas,
-        conductance=DEFAULT_CONDUCTANCES[place] if gas.conductance is None else gas.conductance,
-        critical_ratio=DEFAULT_CRITICAL_RATIO if gas.critical_ratio is None else gas.critical_ratio,
-    )
-    return LineEnd(
-        name=name, line=line, valve_lag=DEFAULT_LAGS[place] if gas.valve_lag is None else gas.valve_lag
+        ends = (("given", 0),)
+    return tuple(
+        LineEnd(
+            name=name,
+            line=GasLine.with_conductance(
+                gas,
+                conductance=_DEFAULT_CONDUCTANCES_M3_S_PA[i] if gas.conductance is None else gas.conductance,
+                critical_ratio=_DEFAULT_CRITICAL_RATIO if gas.critical_ratio is None else gas.critical_ratio,
+            ),
+            valve_lag=_DEFAULT_LAGS_S[i] if gas.valve_lag is None else gas.valve_lag,
+        )
+        for name, i in ends
     )
 
 
 def line_text(answers: tuple[LineAnswer, ...]) -> str:
-    """What the shortest opening that primes the tube at equal fills corrects, in one phrase."""
+    """Correction by the shortest opening that primes the tube at equal fills, in one phrase."""
     if answers[0].holds is False:
         return "what an injection moves runs back while the gas is off"
     if any(answer.smallest_correction is None for answer in answers):
         return "the gas starts no flow at equal fills"
     whose = "the scene's" if answers[0].end == "given" else "not in the scene, default range"
-    each = [f"{1e6 * (answer.smallest_correction or 0.0):.2g} um{_which(answer)}" for answer in answers]
+    corrections = []
+    for answer in answers:
+        opening = f"{1e3 * (answer.shortest_opening or 0.0):.2g} ms"
+        line = f" in {opening}"
+        if answer.end != "given":
+            numbers = f"{1e8 * answer.conductance:.2g} l/(s bar), {1e3 * answer.valve_lag:.2g} ms lag"
+            line = f" ({answer.end}: {opening}; {numbers})"
+        corrections.append(f"{1e6 * (answer.smallest_correction or 0.0):.2g} um{line}")
     what = "the shortest opening that primes the tube at equal fills corrects"
     lasts = "" if answers[0].holds else "; whether it lasts hangs on the pressure of a cavity over the crest"
-    return f"{whose}: {what} {' or '.join(each)}, shorter ones less{lasts}"
+    return f"{whose}: {what} {' or '.join(corrections)}, shorter ones less{lasts}"
 
 
 def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
-    """For JSON, in SI."""
+    """Answers as a JSON object, in SI units."""
     return {
         "given": answers[0].end == "given",
         "holds": answers[0].holds,
@@ -112,11 +120,3 @@ def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
         ],
         "text": line_text(answers),
     }
-
-
-def _which(answer: LineAnswer) -> str:
-    opening = f"{1e3 * (answer.shortest_opening or 0.0):.2g} ms"
-    if answer.end == "given":
-        return f" in {opening}"
-    numbers = f"{opening}; {1e8 * answer.conductance:.2g} l/(s bar), {1e3 * answer.valve_lag:.2g} ms lag"
-    return f" ({answer.end}: {numbers})"

@@ -16,7 +16,7 @@ from ringbalance.physics.gas import vented_pressure
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import column_pressure, column_radius
 from ringbalance.reduced_model.tube.heads import BACK_SHARE, SHARE, roots_of
 from ringbalance.reduced_model.tube.path import (
@@ -40,8 +40,6 @@ from ringbalance.reduced_model.tube.regime import (
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 
-_Filled = Callable[[float, float], tuple[float, float]]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HumpProfile:
@@ -57,9 +55,9 @@ class HumpProfile:
     pressure: FloatArray
     """Gauge, Pa; of the gas or the cavity where the tube is not full.  First and last: in the chamber."""
     full: BoolArray
-    """Whether liquid fills the bore."""
+    """True where liquid fills the bore."""
     regime: Regime
-    """Of the flow."""
+    """Regime of the flow."""
     velocity: float
     """u, m/s, negative in reverse; zero when blocked."""
     hump_path: float | None
@@ -111,21 +109,41 @@ class HumpProfile:
         flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
         ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas)
         reverse = bool(driving_pressure(law.path, ends) < 0)
-        tube, along = (reversed_tube(scene.tube), ends.reversed()) if reverse else (scene.tube, ends)
-        width = None
+        tube, from_upstream = (reversed_tube(scene.tube), ends.reversed()) if reverse else (scene.tube, ends)
+        humped, velocity, half_width = scene.tube.hump_radius is not None, float(flow.velocity), None
         if law.half_widths is not None:
             # The gas of the driven chamber holds a reverse flow back: seen from upstream none drives it.
             fill = np.asarray(other if reverse else fill_ratio)
-            wall = along.upstream_hydrostatic if reverse else ends.upstream_pressure()
-            width = float(law.half_widths.at(fill, wall, np.asarray(True))[1])
+            wall = from_upstream.upstream_hydrostatic if reverse else ends.upstream_pressure()
+            half_width = float(law.half_widths.at(fill, wall, np.asarray(True))[1])
         if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
             line = _blocked(scene, law, ends, primed, points)
         else:
-            cavity = _pressure_over_crest(law, along, reverse, abs(float(flow.velocity)))
-            line = _flowing(scene, law.path, tube, abs(float(flow.velocity)), along, cavity, points)
+            cavity = _pressure_over_crest(law, from_upstream, reverse, abs(velocity))
+            line = _flowing(scene, law.path, tube, abs(velocity), from_upstream, cavity, points)
             if reverse:
                 line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
-        return _profile(scene, law, flow, along, reverse, width, line)
+        crest, cavity, margin = crest_span(scene.tube)[0 if reverse else 1], None, None
+        if humped:
+            cavity = float(cavity_pressure(law.path, from_upstream))
+            driving = np.maximum(driving_pressure(law.path, from_upstream), 0.0)
+            column = BACK_SHARE if reverse and law.heads.return_hump else SHARE
+            lost = law.heads.siphon.cubic((driving / law.density) ** 0.125, column) * driving
+            resting = resting_pressure(law.path, from_upstream)
+            margin = float(resting - cavity_pressure(law.path, from_upstream) - lost)
+        return cls(
+            path=line.share * scene.tube.length,
+            radius=path_radius(tube=scene.tube, share=line.share),
+            pressure=line.pressure,
+            full=line.full,
+            regime=Regime(int(flow.regime)),
+            velocity=velocity,
+            hump_path=crest * scene.tube.length if humped else None,
+            hump_pressure=float(line.pressure[np.argmin(np.abs(line.share - crest))]) if humped else None,
+            cavity_pressure=cavity,
+            cavitation_margin=margin,
+            cavitation_margin_uncertainty=half_width if humped else None,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,47 +155,13 @@ class _Line:
     full: BoolArray
 
 
-def _profile(
-    scene: Scene,
-    law: CalibratedLaw,
-    flow: Flow,
-    ends: TubeEnds,
-    reverse: bool,
-    width: float | None,
-    line: _Line,
-) -> HumpProfile:
-    tube, humped = scene.tube, scene.tube.hump_radius is not None
-    start, end = crest_span(tube)
-    crest = start if reverse else end
-    place = int(np.argmin(np.abs(line.share - crest)))
-    margin = None
-    if humped:
-        driving = np.maximum(driving_pressure(law.path, ends), 0.0)
-        column = BACK_SHARE if reverse and law.heads.return_hump else SHARE
-        lost = law.heads.siphon.cubic((driving / law.density) ** 0.125, column) * driving
-        margin = float(resting_pressure(law.path, ends) - cavity_pressure(law.path, ends) - lost)
-    return HumpProfile(
-        path=line.share * tube.length,
-        radius=path_radius(tube=tube, share=line.share),
-        pressure=line.pressure,
-        full=line.full,
-        regime=Regime(int(flow.regime)),
-        velocity=float(flow.velocity),
-        hump_path=crest * tube.length if humped else None,
-        hump_pressure=float(line.pressure[place]) if humped else None,
-        cavity_pressure=float(cavity_pressure(law.path, ends)) if humped else None,
-        cavitation_margin=margin,
-        cavitation_margin_uncertainty=width if humped else None,
-    )
-
-
 def _pressure_over_crest(law: CalibratedLaw, ends: TubeEnds, reverse: bool, velocity: float) -> float | None:
-    """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
+    """Gauge pressure of the cavity or gas that a flowing column spills into, Pa; None: full, or at rest."""
     way = law.heads.to_crest(reverse=reverse)
     if way is None or velocity == 0:
         return None
-    whole, part = (law.density * float(roots_of(table, velocity)) ** 8 for table in (law.heads.siphon, way))
-    if whole > driving_pressure(law.path, ends) * (1 - 1e-9):
+    full, part = (law.density * float(roots_of(table, velocity)) ** 8 for table in (law.heads.siphon, way))
+    if full > driving_pressure(law.path, ends) * (1 - 1e-9):
         return None
     return float(resting_pressure(law.path, ends)) - part
 
@@ -313,21 +297,18 @@ def _rest(scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None) ->
     elif scene.tube.hump_gas == "vented":
         between = 0.0
     else:
-        between = _trapped(vented_pressure(scene), path, ends, filled)
+        # The gas that fills the tube between the columns is kept.
+        ambient, largest = vented_pressure(scene), max(far - path.port_pressure, 0.0)
+        first, last = filled(0.0, ends.upstream_hydrostatic)
+
+        def excess(pressure: float) -> float:
+            start, stop = filled(pressure, near)
+            return float((ambient + pressure) * (stop - start) - ambient * (last - first))
+
+        between = 0.0
+        if largest > 0:
+            root = (
+                largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else brentq(excess, 0.0, largest)
+            )
+            between = float(np.clip(max(root, near - path.column_pressure), 0.0, largest))
     return *filled(between, near), between
-
-
-def _trapped(ambient: float, path: TubePath, ends: TubeEnds, filled: _Filled) -> float:
-    """Pressure of the trapped gas, gauge; the gas that fills the tube between the columns is kept."""
-    near_pressure = ends.upstream_pressure()
-    largest = max(ends.downstream_pressure() - path.port_pressure, 0.0)
-    first, last = filled(0.0, ends.upstream_hydrostatic)
-
-    def excess(pressure: float) -> float:
-        near, far = filled(pressure, near_pressure)
-        return float((ambient + pressure) * (far - near) - ambient * (last - first))
-
-    if largest <= 0:
-        return 0.0
-    root = largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else brentq(excess, 0.0, largest)
-    return float(np.clip(max(root, near_pressure - path.column_pressure), 0.0, largest))

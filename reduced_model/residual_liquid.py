@@ -1,4 +1,4 @@
-"""What keeps a chamber from being emptied, gas in its port or too little, and whether a full one holds."""
+"""Limits of emptying a chamber, gas in its port or too little, and of keeping a full one with the gas off."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
-_PLACES: Final = 257
-"""Of a scan of a single row, for which a long one costs little."""
+_SCAN_POINTS: Final = 257
+"""Fills of the scan of a single row, for which a long one costs little."""
 
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
@@ -56,14 +56,15 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs:
 
     lowest = max(0.0, total - law.max_fill_ratio)
     end = np.array([max(lowest, NEARLY_EMPTY * total)])
-    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end, places=_PLACES)[0])
+    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end, points=_SCAN_POINTS)[0])
     return lowest if math.isnan(stalled) else stalled
 
 
 @dataclass(frozen=True, kw_only=True)
 class Holding:
-    """What becomes of the fullest chamber's liquid with the gas off, by the pressure of a cavity over the
-    crest: vapour alone is sure to be reached, and runs of nominal parts take `TubePath.released`.
+    """Fate of the fullest chamber's liquid with the gas off, by the pressure of a cavity over the crest.
+
+    Vapour alone is sure to be reached, and runs of nominal parts take `TubePath.released`.
     """
 
     sure_speed: float | None
@@ -71,9 +72,9 @@ class Holding:
     likely_speed: float | None
     """Lowest speed at which it stays under the pressure that runs take, likewise."""
     hump_radius: float | None
-    """Of the scene's crest, m; None without one."""
+    """Radius of the scene's crest, m; None without one."""
     largest_hump_radius: float | None
-    """Of a crest that holds it whatever the pressure of a cavity there, m; None: no crest does."""
+    """Largest radius of a crest that holds it whatever the pressure of a cavity there, m; None: no crest."""
 
     @classmethod
     def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
@@ -89,10 +90,10 @@ class Holding:
 
         def lowest(tension: float) -> float | None:
             """The column parts under a tension D_m - P, and D_m - P grows with the square of the speed."""
-            here = path.column_pressure - level
-            if not path.crest or here < tension:
+            at_speed = path.column_pressure - level
+            if not path.crest or at_speed < tension:
                 return None
-            return speed * math.sqrt(tension / here) if tension > 0 else 0.0
+            return speed * math.sqrt(tension / at_speed) if tension > 0 else 0.0
 
         return cls(
             sure_speed=lowest(sure),
@@ -103,12 +104,12 @@ class Holding:
 
     @property
     def holds(self) -> bool:
-        """Whether it is sure to stay there."""
+        """True if the liquid is sure to stay in the fullest chamber."""
         return self.sure_speed is not None
 
     @property
     def finding(self) -> Finding | None:
-        """That a correction does not or may not last, and the crest that holds it; None where it is sure."""
+        """Warning that a correction may not last, with the crest that holds it; None: it lasts."""
         if self.holds:
             return None
         if self.largest_hump_radius is None:

@@ -26,7 +26,7 @@ from ringbalance.scene.errors import by_group, uncertainties
 from ringbalance.scene.models import Disc, Scene
 
 FILL_STEP: Final = 0.05
-"""Of the fill ratios that a calibration reports."""
+"""Step of the fill ratios that a calibration reports."""
 ROUND_OFF: Final = 16 * float(np.finfo(np.float64).eps)
 """Relative floor of a numerical half-width."""
 
@@ -41,7 +41,7 @@ class Curve:
     value: FloatArray
     """By closed forms, or by quadrature where gravity is modelled."""
     numerical: FloatArray
-    """Expanded uncertainty (95 %) by rounding, quadrature, and what finite elements contradict."""
+    """Expanded uncertainty (95 %) by rounding, quadrature, and contradictions of finite elements."""
     unmodelled: FloatArray
     """95 % uncertainty for what no model holds: surface tension, friction at walls, high waves."""
     inputs: FloatArray
@@ -52,7 +52,7 @@ class Curve:
     """Expanded uncertainty (95 %) of the table about each of the fills that are nodes, between which a table
     may have more knots."""
     status: Status
-    """That of the whole range of fills."""
+    """Status over the whole range of fills."""
 
     @property
     def uncertainty(self) -> FloatArray:
@@ -110,7 +110,7 @@ class ChamberCalibration:
     reported_fill_ratio: FloatArray
     """0, 0.05, ... max_fill_ratio."""
     reported: tuple[int, ...]
-    """Where these stand in `fill_ratio`."""
+    """Indices of `reported_fill_ratio` in `fill_ratio`."""
     wall_pressure: Curve
     """Liquid part, mean over the outer wall, Pa: a load."""
     hydrostatic_pressure: Curve
@@ -120,13 +120,13 @@ class ChamberCalibration:
     moment_per_mass: Estimate
     """lambda at equal fills, per transferred mass, m, shape (); half-width without the inputs."""
     moment_per_mass_numerical: float
-    """Its numerical part, m."""
+    """Numerical part of the half-width of lambda, m."""
     moment_per_mass_inputs: float
     """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
     input_effects: Mapping[str, _InputEffect]
     """Effect of each uncertain input; empty where they were not varied."""
     status: Status
-    """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
+    """Status of the solves or, where these are sound, of the ring's waves over the range of fills."""
     statistics: Statistics
 
     @property
@@ -170,35 +170,39 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
         held = gravity_shares(scene).mean > scene.tolerance
         compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
         check = ElementCheck.of(scene, values=compared, gravity=held)
-    unmodelled = unmodelled_fractions(scene, fills)
-    ring = _as_measured(scene.disc.moment_factor, ring)
-    waves = chamber_status(scene)
+    # The finite elements check the geometry, so before the factor that was measured.
+    factor, unmodelled = scene.disc.moment_factor, unmodelled_fractions(scene, fills)
+    moment, slope = (
+        replace(each, value=factor * each.value, uncertainty=factor * each.uncertainty)
+        for each in (ring.moment, ring.moment_per_volume)
+    )
+    ring, waves = replace(ring, moment=moment, moment_per_volume=slope), chamber_status(scene)
 
-    def excess_of(quantity: str) -> float:
-        return check.excess_of(quantity) if check else 0.0
-
-    def status_of(quantity: str) -> Status:
-        return check.status_of(quantity) if check else Status()
+    def checked_by(quantity: str) -> tuple[float, Status]:
+        excess, contradicted = (
+            (check.excess_of(quantity), check.status_of(quantity)) if check else (0.0, Status())
+        )
+        return excess, _first(ring.status, contradicted, waves)
 
     def curve(quantity: str, share: str) -> Curve:
-        value: Estimate = getattr(ring, quantity)
-        at_nodes = value.value[: nodes.size]
-        level = quantity == "hydrostatic_pressure"
-        return _curve(
-            replace(value, status=_first(ring.status, status_of(quantity), waves)),
-            *(pressure_table(scene, nodes, at_nodes) if level else _even_table(nodes, at_nodes)),
-            excess=excess_of(quantity),
-            unmodelled=unmodelled[share],
-            inputs=[getattr(each, quantity) for each in effects.values()],
+        estimate: Estimate = getattr(ring, quantity)
+        value, (excess, status) = estimate.value, checked_by(quantity)
+        at_nodes, level = value[: nodes.size], quantity == "hydrostatic_pressure"
+        table, missed = pressure_table(scene, nodes, at_nodes) if level else _even_table(nodes, at_nodes)
+        inputs = (getattr(each, quantity) ** 2 for each in effects.values())
+        return Curve(
+            value=value,
+            numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
+            unmodelled=unmodelled[share] * np.abs(value),
+            inputs=np.sqrt(sum(inputs, start=np.zeros_like(value))),
+            table=table,
+            interpolation=missed,
+            status=status,
         )
 
-    central, numerical = _central(
-        scene,
-        nodes,
-        replace(ring.moment_per_volume, status=_first(ring.status, status_of("moment_per_volume"), waves)),
-        excess_of("moment_per_volume"),
-        unmodelled["moments"],
-        ring.moment.value,
+    excess, status = checked_by("moment_per_volume")
+    ratio, numerical, missing = _lambda_at_equal_fills(
+        scene, nodes, slope, excess, unmodelled["moments"], moment.value
     )
     return ChamberCalibration(
         volume=chamber_volume(disc=scene.disc),
@@ -210,7 +214,9 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
         wall_pressure=curve("wall_pressure", "pressures"),
         hydrostatic_pressure=curve("hydrostatic_pressure", "heads"),
         moment=curve("moment", "moments"),
-        moment_per_mass=central,
+        moment_per_mass=Estimate(
+            value=np.asarray(ratio), uncertainty=np.asarray(math.hypot(numerical, missing)), status=status
+        ),
         moment_per_mass_numerical=numerical,
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
@@ -220,12 +226,12 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
 
 
 def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, _InputEffect]:
-    """By quantity, "fitted" for those that were fitted together; by closed forms."""
-    places = np.append(fills, scene.disc.max_fill_ratio / 2)[:, None]
+    """Effects by uncertain input, "fitted" for those that were fitted together; by closed forms."""
+    points = np.append(fills, scene.disc.max_fill_ratio / 2)[:, None]
 
     def values(designs: Designs) -> FloatArray:
-        wall, moment, ratio = measured_closed_forms(scene=designs.scene, fill_ratio=places)
-        level = chamber_pressure(scene=designs.scene, fill_ratio=places)
+        wall, moment, ratio = measured_closed_forms(scene=designs.scene, fill_ratio=points)
+        level = chamber_pressure(scene=designs.scene, fill_ratio=points)
         return np.array(np.broadcast_arrays(wall, level, moment, ratio))
 
     errors = uncertainties(scene, among=CHAMBER_INPUTS, models=False, fitted_models=False)
@@ -242,49 +248,19 @@ def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, _InputEffect]:
 
 
 def _first(*statuses: Status) -> Status:
-    """The first that is not OK."""
+    """First status that is not OK."""
     return next((each for each in statuses if not each.ok), statuses[-1])
 
 
-def _as_measured(factor: float, ring: RingValues) -> RingValues:
-    """Moments times a measured factor; finite elements check the geometry, so before it."""
-    moment, slope = (
-        replace(each, value=factor * each.value, uncertainty=factor * each.uncertainty)
-        for each in (ring.moment, ring.moment_per_volume)
-    )
-    return replace(ring, moment=moment, moment_per_volume=slope)
-
-
-def _curve(
-    estimate: Estimate,
-    table: Table,
-    missed: FloatArray,
-    *,
-    excess: float,
-    unmodelled: FloatArray,
-    inputs: list[FloatArray],
-) -> Curve:
-    value = estimate.value
-    return Curve(
-        value=value,
-        numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
-        unmodelled=unmodelled * np.abs(value),
-        inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
-        table=table,
-        interpolation=missed,
-        status=estimate.status,
-    )
-
-
-def _central(
+def _lambda_at_equal_fills(
     scene: Scene,
     nodes: FloatArray,
     slope: Estimate,
     excess: float,
     unmodelled: FloatArray,
     moment: FloatArray,
-) -> tuple[Estimate, float]:
-    """lambda at equal fills, 2 (dU/dV')/rho, and the numerical part of its uncertainty.
+) -> tuple[float, float, float]:
+    """lambda at equal fills, 2 (dU/dV')/rho, m, and its numerical and its unmodelled half-width, m.
 
     Shares of the moment count by how they change with the fill.
     """
@@ -294,18 +270,13 @@ def _central(
     mass = density * chamber_volume(disc=scene.disc) * float(nodes[m + 1] - nodes[m - 1])
     share = unmodelled * moment
     missing = max(2 * abs(float(share[m + 1] - share[m - 1])) / mass, float(unmodelled[m]) * value)
-    central = Estimate(
-        value=np.asarray(value),
-        uncertainty=np.asarray(math.hypot(numerical, missing)),
-        status=slope.status,
-    )
-    return central, numerical
+    return value, numerical, missing
 
 
 _PIECES: Final = 1000
-"""Of the table of an imported chamber, at least."""
-_PLACES: Final = np.arange(1, 8) / 8
-"""Within a piece, at which the table is compared."""
+"""Least number of pieces of an imported chamber's table."""
+_WITHIN_PIECE: Final = np.arange(1, 8) / 8
+"""Fractions of a piece at which the table is compared."""
 
 
 def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray]:
@@ -317,7 +288,7 @@ def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray
 
 
 def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray]:
-    """The same for the pressure at R2, Pa; of an imported chamber with the closed form at more fills.
+    """Table of the pressure at R2, Pa, and its error; an imported chamber has the closed form at more fills.
 
     Args: `nodes`: equally spaced from zero. `value`: with gravity, where that is modelled.
     """
@@ -349,7 +320,7 @@ def _samples(disc: Disc, count: int, largest: float) -> tuple[FloatArray, FloatA
     fills = np.linspace(0.0, largest, every * (count - 1) + 1)
     squares = _square(disc, fills)
     curve = spline(fills, squares - squares[0])
-    between = fills[:-1, None] + np.diff(fills)[:, None] * _PLACES
+    between = fills[:-1, None] + np.diff(fills)[:, None] * _WITHIN_PIECE
     missed = np.abs(curve(between) + squares[0] - _square(disc, between)).reshape(count - 1, -1).max(axis=1)
     return squares, np.maximum(np.append(missed[:1], missed), np.append(missed, missed[-1:]))
 

@@ -1,4 +1,4 @@
-"""What each thing that a chamber's model may leave out is worth, before any solve, and where models hold."""
+"""A-priori estimates of neglected effects in a chamber, and the fills at which its models hold."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ringbalance.reduced_model.chamber.values import (
 )
 from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
 
 
@@ -40,26 +40,18 @@ def percent(fraction: float) -> str:
     return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"
 
 
-SURFACE_TENSION: Final = 0.073
-"""Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
-METAL_SURFACE_TENSION: Final = 0.72
-"""Of gallium, N/m: taken above `METAL_DENSITY`."""
+_WATER_TENSION_N_M: Final = 0.073
+"""Surface tension of water at 20 degC against air: taken for every ordinary liquid, as an upper bound.
+Source: IAPWS R1-76(2014)."""
+_METAL_TENSION_N_M: Final = 0.72
+"""Surface tension of gallium near its melting point: taken above `METAL_DENSITY`."""
 _MODES: Final = 24
-"""Of a chamber; what higher ones hold of gravity's tilt falls with the square of their number."""
-_SWING_FLOOR: Final = 0.2
-"""Of the moment's ripple: by so much the estimate of the amplification may be off."""
-_CORIOLIS: Final = 2.0
-"""Of the pressure's ripple, times the swing: 2 omega times the flux along the ring, which is about that under
+"""Modes of a chamber that count: the part of gravity's tilt in a mode falls with its number squared."""
+_SWING_ERROR: Final = 0.2
+"""Error of the estimated amplification, as a fraction of the moment's ripple."""
+_CORIOLIS_FACTOR: Final = 2.0
+"""Ripple of the pressure over the swing: 2 omega times the flux along the ring, which is about that under
 which a free particle follows gravity however thin the ring."""
-
-
-def _surface_tension(density: float) -> float:
-    """Surface tension to include; no scene gives one.
-
-    Returns: N/m, an upper bound.
-    Source: IAPWS R1-76(2014) for water; gallium near its melting point for metals.
-    """
-    return METAL_SURFACE_TENSION if density > METAL_DENSITY else SURFACE_TENSION
 
 
 def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
@@ -73,7 +65,8 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]
     a = surface_radius(disc=disc, fill_ratio=fills)
     alpha = half_angle(disc=disc, radius=a)
     pressure = density * square * (disc.outer_radius**2 - a**2) / 2
-    tension = _surface_tension(density)
+    # No scene gives a surface tension.
+    tension = _METAL_TENSION_N_M if density > METAL_DENSITY else _WATER_TENSION_N_M
     jump = tension * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
     # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
     length = np.sqrt(tension / (density * square * a))
@@ -102,23 +95,23 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
         liquid.
     Source: sum of the estimates, errors of one sign at worst.
     """
-    found, wet = {}, fills > 0
+    fractions, wet = {}, fills > 0
     common = wall_layers(scene, fills[wet])[0] + _wave_mean(scene, fills[wet])
-    drawn = drawing_shares(scene.disc, fills[wet])
-    aside = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
+    faceting = drawing_shares(scene.disc, fills[wet])
+    transverse = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
     tension = capillary_share(scene, fills[wet])
     a = surface_radius(disc=scene.disc, fill_ratio=fills[wet])
     # The same pressure of surface tension is more of a mean over a wall that is nearer to the surface.
     nearer = head_square(disc=scene.disc, surface_radius=a) / wall_square(disc=scene.disc, surface_radius=a)
     shares = {
-        "pressures": nearer * tension["pressures"] + common + drawn.wall_pressure,
-        "heads": tension["pressures"] + common + drawn.hydrostatic_pressure,
-        "moments": tension["moments"] + common + (drawn.moment + aside),
+        "pressures": nearer * tension["pressures"] + common + faceting.wall_pressure,
+        "heads": tension["pressures"] + common + faceting.hydrostatic_pressure,
+        "moments": tension["moments"] + common + (faceting.moment + transverse),
     }
     for part, share in shares.items():
-        found[part] = np.zeros(fills.shape)
-        found[part][wet] = share
-    return found
+        fractions[part] = np.zeros(fills.shape)
+        fractions[part][wet] = share
+    return fractions
 
 
 class _Swing(NamedTuple):
@@ -190,13 +183,13 @@ def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
     return np.minimum(_wave_height(scene, fills) ** 2 / 4, 1.0)
 
 
-FILLS: Final = (0.2, 0.5, 1.0)
-"""Shares of max_fill_ratio."""
+_FILL_SHARES: Final = (0.2, 0.5, 1.0)
+"""Fills at which a chamber is judged, as shares of max_fill_ratio."""
 
 
 @lru_cache(maxsize=64)
 def chamber_fills(scene: Scene) -> FloatArray:
-    """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
+    """Fill ratios of the range at which gravity leaves a closed ring: those at which a chamber is judged.
 
     Returns: x, shape (n,); empty where there is none.
     """
@@ -205,11 +198,21 @@ def chamber_fills(scene: Scene) -> FloatArray:
 
 
 def range_fills(scene: Scene) -> FloatArray:
-    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within."""
-    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), _resonant_fill(scene)
-    if resonant is None or not fills[0] < resonant < fills[-1]:
+    """Fill ratios over the range, with the one at which sloshing is resonant where that lies within.
+
+    At the resonant one the lowest mode meets the speed, s = 1: tanh(k ln(R2/a)) = 1/k; where k <= 1 the mode
+    stays below the speed at any fill.
+    """
+    disc, fills = scene.disc, scene.disc.max_fill_ratio * np.array(_FILL_SHARES)
+    k = np.pi / disc.central_angle
+    if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 or k <= 1:
         return fills
-    return np.unique(np.append(fills, resonant))
+    radius = disc.outer_radius * float(np.exp(-np.arctanh(1 / k) / k))
+    if radius < disc.inner_radius:
+        return fills
+    area = float(liquid_area(disc=disc, surface_radius=radius))
+    resonant = area * disc.axial_width / chamber_volume(disc=disc)
+    return np.unique(np.append(fills, resonant)) if fills[0] < resonant < fills[-1] else fills
 
 
 class _GravityShares(NamedTuple):
@@ -223,7 +226,7 @@ class _GravityShares(NamedTuple):
 
 @lru_cache(maxsize=8)
 def gravity_shares(scene: Scene) -> _GravityShares:
-    """Over `chamber_fills`; all of it where no ring is closed."""
+    """Estimate gravity's contributions over `chamber_fills`; 1 where no ring is closed."""
     if scene.environment.gravity == 0:
         return _GravityShares(mean=0.0, swing=0.0)
     fills = chamber_fills(scene)
@@ -237,10 +240,10 @@ def gravity_shares(scene: Scene) -> _GravityShares:
         2 * ring.moment_per_volume / scene.liquid.density / ratio,
     )
     parts = (
-        (ring.wall_pressure_ripple / wall, _CORIOLIS * np.maximum(1.0, largest)),
+        (ring.wall_pressure_ripple / wall, _CORIOLIS_FACTOR * np.maximum(1.0, largest)),
         (
             ring.moment_ripple / moment,
-            np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_FLOOR,
+            np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_ERROR,
         ),
     )
     return _GravityShares(
@@ -262,72 +265,46 @@ def compression(scene: Scene, fills: FloatArray) -> FloatArray:
 
 
 def chamber_status(scene: Scene) -> Status:
-    """Whether linear sloshing, a closed ring and one density hold over the range of fills, by estimates."""
+    """Validity of linear sloshing, a closed ring and one density over the range of fills, by estimates."""
     fills = chamber_fills(scene)
-    if fills.size == range_fills(scene).size:
-        dense = _dense(scene)
-        return _waves(scene, fills) if dense.ok else dense
-    lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
-    return Status(
-        code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
-        text=(
-            f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
-            "model describes it; turn faster or fill more"
-        ),
-    )
-
-
-def _dense(scene: Scene) -> Status:
+    if fills.size != range_fills(scene).size:
+        lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
+        return Status(
+            code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
+            text=(
+                f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and "
+                "no model describes it; turn faster or fill more"
+            ),
+        )
     share = float(compression(scene, np.array([scene.disc.max_fill_ratio]))[0])
-    if share <= LARGEST_COMPRESSION:
-        return Status()
-    pressure = share * bulk_modulus(scene.liquid)
-    return Status(
-        code=StatusCode.OUT_OF_RANGE,
-        text=(
-            f"up to {pressure / 1e6:.4g} MPa on the outer wall would make the liquid {percent(share)} denser "
-            f"there, and no model holds above {percent(LARGEST_COMPRESSION)}, velocities included: lower "
-            "rotor.speed, gas.pressure or disc.max_fill_ratio"
-        ),
-    )
-
-
-def _waves(scene: Scene, fills: FloatArray) -> Status:
-    """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
-    swing = _wave_height(scene, fills)
-    worst = int(np.argmax(swing))
-    if swing[worst] <= SMALL:
+    if share > LARGEST_COMPRESSION:
+        pressure = share * bulk_modulus(scene.liquid)
+        return Status(
+            code=StatusCode.OUT_OF_RANGE,
+            text=(
+                f"up to {pressure / 1e6:.4g} MPa on the outer wall would make the liquid {percent(share)} "
+                f"denser there, and no model holds above {percent(LARGEST_COMPRESSION)}, velocities "
+                "included: lower rotor.speed, gas.pressure or disc.max_fill_ratio"
+            ),
+        )
+    height = _wave_height(scene, fills)
+    worst = int(np.argmax(height))
+    if height[worst] <= SMALL:
         return Status()
     sector = "" if scene.disc.geometry is None else "in a plain sector of the same opening, "
     return Status(
         code=StatusCode.OUT_OF_RANGE,
         text=(
-            f"{sector}at a fill ratio of {fills[worst]:.3g} waves may reach about {swing[worst]:.2g} "
-            "of the ring's depth, too high for linear sloshing, the finest model: avoid that fill, or turn "
-            "faster"
+            f"{sector}at a fill ratio of {fills[worst]:.3g} waves may reach about {height[worst]:.2g} of the "
+            "ring's depth, too high for linear sloshing, the finest model: avoid that fill, or turn faster"
         ),
     )
 
 
-def _resonant_fill(scene: Scene) -> float | None:
-    """Fill ratio at which the lowest mode meets the speed, s = 1, by the same estimate.
-
-    Returns: x; None without gravity across the shaft, or where the mode stays below the speed at any fill.
-    Source: tanh(k ln(R2/a)) = 1/k.
-    """
-    disc, k = scene.disc, np.pi / scene.disc.central_angle
-    if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 or k <= 1:
-        return None
-    radius = disc.outer_radius * float(np.exp(-np.arctanh(1 / k) / k))
-    if radius < disc.inner_radius:
-        return None
-    return float(liquid_area(disc=disc, surface_radius=radius)) * disc.axial_width / chamber_volume(disc=disc)
-
-
-DAMPING: Final = 0.01
+_ROTOR_DAMPING_RATIO: Final = 0.01
 """Damping ratio that a rotor has at least, about: a growth below it is not worth a warning."""
-_FILLS: Final = np.linspace(0.1, 1.0, 19)
-"""Shares of max_fill_ratio."""
+_WHIRL_FILL_SHARES: Final = np.linspace(0.1, 1.0, 19)
+"""Fills at which whirl is estimated, as shares of max_fill_ratio."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -335,7 +312,7 @@ class AsynchronousInstability:
     """Critical speed that would be hit worst, and the growth of whirl there; orders of magnitude."""
 
     fill_ratio: float
-    """Of all chambers."""
+    """Fill ratio of all chambers at which whirl grows fastest."""
     critical_speed: float
     """(1 - s) omega, rad/s."""
     growth: float
@@ -355,14 +332,15 @@ class AsynchronousInstability:
         Source: derived; the mechanism after Wolf, J. Appl. Mech. 35 (1968) 676.
         """
         disc, omega = scene.disc, abs(scene.rotor.speed)
-        fills = _FILLS * disc.max_fill_ratio
+        fills = _WHIRL_FILL_SHARES * disc.max_fill_ratio
         k, radius = math.pi / disc.central_angle, surface_radius(disc=disc, fill_ratio=fills)
         square = k * np.tanh(k * np.log(disc.outer_radius / radius))
         slow = square < 1
         if not np.any(slow):
             return None
         s = np.sqrt(square[slow])
-        sides = 2 * _overlap(k, disc) ** 2 / disc.central_angle
+        integral = math.pi / 2 if abs(k - 1) < 1e-6 else 2 * math.cos(disc.central_angle / 2) / (k**2 - 1)
+        sides = 2 * integral**2 / disc.central_angle
         mass = scene.liquid.density * disc.axial_width * radius[slow] ** 2 * sides * s**2
         ratio = disc.chambers / 2 * mass * scene.rotor.influence_coefficient
         growth = np.sqrt(ratio * (1 - s) / s) / 2
@@ -375,15 +353,8 @@ class AsynchronousInstability:
 
     @property
     def finding(self) -> Finding | None:
-        """Where the growth exceeds what rotors damp; None elsewhere."""
-        if self.growth <= DAMPING:
+        """Warning that the growth exceeds what rotors damp; None elsewhere."""
+        if self.growth <= _ROTOR_DAMPING_RATIO:
             return None
         numbers = {"critical_speed": self.critical_speed, "fill_ratio": self.fill_ratio}
         return Finding(code="asynchronous_instability", values={**numbers, "damping_ratio": self.growth})
-
-
-def _overlap(k: float, disc: Disc) -> float:
-    """I, closed form."""
-    if abs(k - 1) < 1e-6:
-        return math.pi / 2
-    return 2 * math.cos(disc.central_angle / 2) / (k**2 - 1)

@@ -23,19 +23,19 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Disc, Scene
 
 CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume", "hydrostatic_pressure")
-"""Of an imported chamber all but the third; of the built-in sector, whose wall has one radius, all but the
-last."""
+"""Names of the checked quantities: of an imported chamber all but the third; of the built-in sector, whose
+wall has one radius, all but the last."""
+_CHECKED_ON_WALLS: Final = ("wall_pressure", "moment", "hydrostatic_pressure")
 _STAND_IN: Final = {"moment_per_volume": "moment", "hydrostatic_pressure": "wall_pressure"}
-"""What is checked in the place of a quantity that is not."""
-_SHARE: Final = 0.1
-"""Of the tolerance, that the mesh may leave at the thinnest ring checked, of an imported chamber's drawn
-surface everywhere."""
+"""Quantity that is checked instead, by the one that is not."""
+_MESH_SHARE: Final = 0.1
+"""Error that the mesh may leave at the thinnest ring checked, an imported chamber's surface at any fill, over
+the tolerance."""
 _RADIAL_CELLS: Final = 4
-"""The pressure is quadratic in the place and so are the cells: only the arcs need more."""
-_MOST_ANGLE: Final = math.pi / 48
-"""Central angle of the smallest cell, rad."""
-_CUT: Final = 1e-6
-"""Relative, of totals: walls that the surface cuts are drawn again by the parts of their cells."""
+"""Cells along the radius. The pressure is quadratic and so are the cells: only the arcs need more."""
+_SMALLEST_CELL_RAD: Final = math.pi / 48
+_CUT_ERROR: Final = 1e-6
+"""Relative error of totals: walls that the surface cuts are drawn again by the parts of their cells."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +45,7 @@ class ElementCheck:
     elements: RingQuantities | ImportedElements
     """At the checked fills, with the half-widths of its own grid convergence."""
     gravity: bool
-    """Whether it holds gravity."""
+    """True if the elements hold gravity."""
     difference: Mapping[str, FloatArray]
     """Closed form less finite elements, by `CHECKED`, SI, shape (n,)."""
     allowed: Mapping[str, FloatArray]
@@ -57,11 +57,11 @@ class ElementCheck:
 
     @property
     def excess(self) -> float:
-        """The largest of all quantities."""
+        """Largest relative difference of all quantities beyond what is allowed."""
         return max(self.excesses.values())
 
     def excess_of(self, quantity: str) -> float:
-        """That of one of `CHECKED`, or of what is checked in its place."""
+        """Relative excess of a quantity of `CHECKED`, or of the one that is checked instead."""
         return self.excesses[quantity if quantity in self.excesses else _STAND_IN[quantity]]
 
     def status_of(self, quantity: str) -> Status:
@@ -79,45 +79,44 @@ class ElementCheck:
             where the finite elements found no tilted surface.
         Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
         """
-        at = _checked_fills(values)
+        # The thinnest ring and the largest fill.
+        fills = values.fill_ratio
+        thinnest = float(fills[fills > 0].min())
+        at = np.array([int(np.argmin(np.abs(fills - x))) for x in (thinnest, fills.max())])
         if scene.disc.geometry is not None:
-            return _imported(scene, scene.disc.geometry, values.fill_ratio[at])
-        held = gravity and bool(np.any(values.closed[at]))
-        at = at[values.closed[at]] if held else at
+            fills = fills[at]
+            pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=np.append(fills, 1.0))
+            head = chamber_pressure(scene=scene, fill_ratio=np.append(fills, 1.0))
+            # The table of the integrals is good to a share of the whole chamber.
+            closed_forms = {
+                name: Estimate(value=value[:-1], uncertainty=np.full(fills.shape, TOLERANCE * value[-1]))
+                for name, value in zip(_CHECKED_ON_WALLS, (pressure, moment, head), strict=True)
+            }
+            solved = ImportedElements.of(scene, scene.disc.geometry, fill_ratio=fills)
+            return _compared(closed_forms, solved, gravity=False)
+        tilted = gravity and bool(np.any(values.closed[at]))
+        at = at[values.closed[at]] if tilted else at
         elements = scene_ring(
             scene,
             fill_ratio=values.fill_ratio[at],
-            gravity=held,
+            gravity=tilted,
             cells=_meshes(
                 scene.disc,
                 scene.tolerance,
                 float(values.fill_ratio[at].min()),
-                dimension=3 if held and scene.environment.shaft == "vertical" else 2,
+                dimension=3 if tilted and scene.environment.shaft == "vertical" else 2,
             ),
         )
-        closed_forms = {name: getattr(values, name) for name in CHECKED if hasattr(elements, name)}
-        here = {
-            name: Estimate(value=each.value[at], uncertainty=each.uncertainty[at])
-            for name, each in closed_forms.items()
-        }
-        return _compared(here, elements, gravity=held)
+        closed_forms = {}
+        for name in (name for name in CHECKED if hasattr(elements, name)):
+            estimate: Estimate = getattr(values, name)
+            closed_forms[name] = Estimate(value=estimate.value[at], uncertainty=estimate.uncertainty[at])
+        return _compared(closed_forms, elements, gravity=tilted)
 
     @property
     def solves(self) -> int:
         """Meshes times fills that were solved."""
         return len(self.elements.cells) * self.elements.fill_ratio.size
-
-
-def _imported(scene: Scene, geometry: ChamberGeometry, fills: FloatArray) -> ElementCheck:
-    """Without gravity, on the scene's own mesh."""
-    pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=np.append(fills, 1.0))
-    head = chamber_pressure(scene=scene, fill_ratio=np.append(fills, 1.0))
-    # The table of the integrals is good to a share of the whole chamber.
-    closed_forms = {
-        name: Estimate(value=value[:-1], uncertainty=np.full(fills.shape, TOLERANCE * value[-1]))
-        for name, value in (("wall_pressure", pressure), ("moment", moment), ("hydrostatic_pressure", head))
-    }
-    return _compared(closed_forms, ImportedElements.of(scene, geometry, fill_ratio=fills), gravity=False)
 
 
 def _compared(
@@ -140,18 +139,11 @@ def _compared(
     )
 
 
-def _checked_fills(values: RingValues) -> np.ndarray:
-    """Places in `values` of the thinnest ring and of the largest fill."""
-    fills = values.fill_ratio
-    thinnest = float(fills[fills > 0].min())
-    return np.array([int(np.argmin(np.abs(fills - x))) for x in (thinnest, fills.max())])
-
-
 def _meshes(disc: Disc, tolerance: float, thinnest: float, *, dimension: int) -> tuple[tuple[int, ...], ...]:
     """Cells of three meshes, finest first: an arc drawn by cells of angle h is off by (h/2)^4/32 R2/depth."""
     depth = disc.outer_radius - float(surface_radius(disc=disc, fill_ratio=thinnest))
-    angle = 2 * (32 * _SHARE * tolerance * depth / disc.outer_radius) ** 0.25
-    angular = 4 * math.ceil(disc.central_angle / max(angle, _MOST_ANGLE) / 4)
+    angle = 2 * (32 * _MESH_SHARE * tolerance * depth / disc.outer_radius) ** 0.25
+    angular = 4 * math.ceil(disc.central_angle / max(angle, _SMALLEST_CELL_RAD) / 4)
     finest = (_RADIAL_CELLS, max(8, angular), 4)[:dimension]
     return tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
 
@@ -215,15 +207,15 @@ class ImportedElements:
     moment: Estimate
     """kg m, shape (n,)."""
     volume: FloatArray
-    """Of the liquid as it is drawn, m^3, shape (n,)."""
+    """Volume of the liquid as it is drawn, m^3, shape (n,)."""
     cells: tuple[tuple[int, ...], ...]
-    """Of the scene's mesh."""
+    """Number of cells of the scene's mesh."""
     status: Status
     statistics: Statistics
 
     @classmethod
     def of(cls, scene: Scene, geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> ImportedElements:
-        """The pressure solved at a few fills; with the elements' error and the drawn volume's."""
+        """Solve the pressure at a few fills; the errors are those of the elements and of the drawn volume."""
         disc, density = scene.disc, scene.liquid.density
         rings = [
             solved_ring(
@@ -239,34 +231,28 @@ class ImportedElements:
         pressure = wet * np.array([float(ring.wall_pressure.value) for ring in rings])
         moment = np.array([ring.first_moment[0] for ring in rings])
         volume = np.array([ring.volume for ring in rings])
-        wanted = fill_ratio * chamber_volume(disc=disc)
-        drawn = np.abs(volume / wanted - 1)
+        surplus = volume - fill_ratio * chamber_volume(disc=disc)
+        volume_error = np.abs(volume / (fill_ratio * chamber_volume(disc=disc)) - 1)
+        # With the surface moved until the drawn liquid has lost its surplus: da^2 = 2 dV/A on a free surface
+        # of area a A, which is drawn by facets, to a share of the tolerance.
+        head = chamber_pressure(scene=scene, fill_ratio=fill_ratio)
+        area = chamber_table(geometry).surface(surface_radius(disc=disc, fill_ratio=fill_ratio))[0]
+        moved = density * scene.rotor.speed**2 * surplus / area
         status = next((ring.status for ring in rings if not ring.status.ok), Status())
         return cls(
             fill_ratio=fill_ratio,
             wall_pressure=Estimate(
                 value=pressure,
                 uncertainty=wet * np.array([float(ring.wall_pressure.uncertainty) for ring in rings])
-                + _CUT * pressure,
+                + _CUT_ERROR * pressure,
             ),
-            hydrostatic_pressure=_by_volume(scene, geometry, fill_ratio, volume - wanted),
+            hydrostatic_pressure=Estimate(
+                value=head - moved, uncertainty=_MESH_SHARE * scene.tolerance * head
+            ),
             # A free surface drawn by quadratic facets takes liquid off or adds some, all at the surface.
-            moment=Estimate(value=moment, uncertainty=(_CUT + 2 * drawn) * np.abs(moment)),
+            moment=Estimate(value=moment, uncertainty=(_CUT_ERROR + 2 * volume_error) * np.abs(moment)),
             volume=volume,
             cells=((len(geometry.cells),),),
             status=status,
             statistics=rings[-1].statistics,
         )
-
-
-def _by_volume(
-    scene: Scene, geometry: ChamberGeometry, fill_ratio: FloatArray, surplus: FloatArray
-) -> Estimate:
-    """Pressure at R2 with the surface moved until the drawn liquid has lost a surplus, m^3.
-
-    da^2 = 2 dV/A on a free surface of area a A; it is drawn by facets, to a share of the tolerance.
-    """
-    value = chamber_pressure(scene=scene, fill_ratio=fill_ratio)
-    area = chamber_table(geometry).surface(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))[0]
-    moved = scene.liquid.density * scene.rotor.speed**2 * surplus / area
-    return Estimate(value=value - moved, uncertainty=_SHARE * scene.tolerance * value)

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.chamber_table import ChamberTable, tilted_liquid
+from ringbalance.mesh.chamber_table import tilted_liquid
 from ringbalance.mesh.geometry import (
     half_angle,
     imported_table,
@@ -31,20 +31,19 @@ from ringbalance.scene.models import Disc, Scene
 POINTS: Final = 20
 """Gauss points along the angle or the axis."""
 RADIAL_POINTS: Final = 14
-_STEPS: Final = 12
-"""At most, of Newton's method."""
-_TURN: Final = (8, 96)
+_NEWTON_STEPS: Final = 12
+_TURN_SAMPLES: Final = (8, 96)
 """Fewest and most angles of gravity over a turn."""
-_AVERAGING: Final = 1e-12
-_ROUND_OFF: Final = 4 * float(np.finfo(np.float64).eps)
-"""Of an area, over R2^2."""
+_AVERAGING_ERROR: Final = 1e-12
+_AREA_ROUND_OFF: Final = 4 * float(np.finfo(np.float64).eps)
+"""Error of an area by rounding, over R2^2."""
 
 
 @cache
 def _rule(points: int) -> tuple[FloatArray, FloatArray]:
     """Gauss points within [-1, 1] and their weights; most runs need no rule of many points."""
-    places, weights = np.polynomial.legendre.leggauss(points)
-    return np.asarray(places, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    abscissae, weights = np.polynomial.legendre.leggauss(points)
+    return np.asarray(abscissae, dtype=np.float64), np.asarray(weights, dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +63,7 @@ class TiltedRing:
     moment_ripple: FloatArray
     """First harmonic over a turn, kg m zero-to-peak."""
     closed: BoolArray
-    """Whether the liquid covers the whole outer wall; where not, values of a sector mean nothing."""
+    """True where the liquid covers the whole outer wall; elsewhere values of a sector mean nothing."""
 
     @classmethod
     def of(cls, scene: Scene, fill_ratio: FloatArray) -> TiltedRing:
@@ -82,20 +81,29 @@ class TiltedRing:
         disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
         length, turn, shaft = scene.environment.gravity / square, turn_samples(scene), scene.environment.shaft
         if (table := imported_table(disc)) is not None:
-            found = _imported(disc, table, length, fill_ratio, turn if shaft == "horizontal" else 0)
+            samples = turn if shaft == "horizontal" else 0
+            fills = tuple(float(x) for x in fill_ratio)
+            liquid = tilted_liquid(table, length=length, vertical=samples == 0, turn=samples, fills=fills)
+            turned = _Turned(
+                wall_pressure=liquid.wall_square.copy(),
+                surface_square=liquid.surface_square.copy(),
+                moment=liquid.moment / disc.axial_width,
+                moment_per_volume=liquid.centroid.copy(),
+                closed=liquid.closed,
+            )
         elif shaft == "vertical":
-            found = _along(disc, length, fill_ratio)
+            turned = _on_vertical_shaft(disc, length, fill_ratio)
         else:
-            found = _across(disc, length, fill_ratio, turn)
+            turned = _on_horizontal_shaft(disc, length, fill_ratio, turn)
         scale = density * square / 2
         return cls(
-            wall_pressure=scale * found.wall_pressure.mean(axis=1),
-            hydrostatic_pressure=scale * (disc.outer_radius**2 - found.surface_square.mean(axis=1)),
-            moment=density * disc.axial_width * found.moment.mean(axis=1),
-            moment_per_volume=density * found.moment_per_volume.mean(axis=1),
-            wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
-            moment_ripple=density * disc.axial_width * _first_harmonic(found.moment),
-            closed=np.all(found.closed, axis=1),
+            wall_pressure=scale * turned.wall_pressure.mean(axis=1),
+            hydrostatic_pressure=scale * (disc.outer_radius**2 - turned.surface_square.mean(axis=1)),
+            moment=density * disc.axial_width * turned.moment.mean(axis=1),
+            moment_per_volume=density * turned.moment_per_volume.mean(axis=1),
+            wall_pressure_ripple=scale * _first_harmonic(turned.wall_pressure),
+            moment_ripple=density * disc.axial_width * _first_harmonic(turned.moment),
+            closed=np.all(turned.closed, axis=1),
         )
 
 
@@ -115,23 +123,9 @@ def turn_samples(scene: Scene) -> int:
     """Angles of gravity for means good to twelve digits: harmonics fall like (g/(omega^2 R1))^n."""
     tilt = scene.environment.gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
     if tilt < 1e-12:
-        return _TURN[0]
-    wanted = np.log(_AVERAGING) / np.log(min(tilt, 0.9))
-    return 2 * int(np.clip(np.ceil(wanted / 2), _TURN[0] // 2, _TURN[1] // 2))
-
-
-def _imported(disc: Disc, table: ChamberTable, length: float, fills: FloatArray, turn: int) -> _Turned:
-    """By integrals over the walls of a mesh, dry parts included. Args: `turn`: 0 on a vertical shaft."""
-    found = tilted_liquid(
-        table, length=length, vertical=turn == 0, turn=turn, fills=tuple(float(x) for x in fills)
-    )
-    return _Turned(
-        wall_pressure=found.wall_square.copy(),
-        surface_square=found.surface_square.copy(),
-        moment=found.moment / disc.axial_width,
-        moment_per_volume=found.centroid.copy(),
-        closed=found.closed,
-    )
+        return _TURN_SAMPLES[0]
+    wanted = np.log(_AVERAGING_ERROR) / np.log(min(tilt, 0.9))
+    return 2 * int(np.clip(np.ceil(wanted / 2), _TURN_SAMPLES[0] // 2, _TURN_SAMPLES[1] // 2))
 
 
 def _first_harmonic(values: FloatArray) -> FloatArray:
@@ -143,21 +137,21 @@ def _first_harmonic(values: FloatArray) -> FloatArray:
 
 
 def _held(disc: Disc, radius: FloatArray) -> FloatArray:
-    """Within what the chamber's formulas take."""
+    """Clip radii to the range of the chamber's formulas."""
     return np.asarray(np.clip(radius, disc.plate_thickness * 1.001 + 1e-12, disc.outer_radius))
 
 
-def _along(disc: Disc, length: float, fills: FloatArray) -> _Turned:
+def _on_vertical_shaft(disc: Disc, length: float, fills: FloatArray) -> _Turned:
     abscissa, weights = _rule(POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills) ** 2
     rise, weight = length * disc.axial_width * abscissa[None, :], weights[None, :] / 2
     target = liquid_area(disc=disc, surface_radius=np.sqrt(start))
     reach, square = length * disc.axial_width + outer**2 * 1e-12, start
-    for step in range(_STEPS + 1):
+    for step in range(_NEWTON_STEPS + 1):
         radius = _held(disc, np.sqrt(np.maximum(square[:, None] + rise, 0.0)))
         alpha = half_angle(disc=disc, radius=radius)
         excess = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=1) - target
-        if step < _STEPS:
+        if step < _NEWTON_STEPS:
             square = np.clip(square + excess / np.sum(weight * alpha, axis=1), start - reach, start + reach)
     level = square[:, None] + rise
     moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
@@ -171,7 +165,7 @@ def _along(disc: Disc, length: float, fills: FloatArray) -> _Turned:
     )
 
 
-def _across(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
+def _on_horizontal_shaft(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
     abscissa, weights = _rule(POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills)[:, None]
     psi = (2 * np.pi * np.arange(turn) / turn)[None, :, None]
@@ -182,13 +176,13 @@ def _across(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
     alpha = half_angle(disc=disc, radius=start)
     square = (start + length * np.sin(alpha) / alpha * np.cos(psi[..., 0])) ** 2
     reach = length**2 + 2 * outer * length + outer**2 * 1e-12
-    for _ in range(_STEPS):
+    for _ in range(_NEWTON_STEPS):
         for _ in range(3):
             level, slope = _level(disc, length, radius, eta, psi)
             radius = _held(disc, radius - (level - square[..., None]) / slope)
         opening = np.sum(weight * 2 * half_angle(disc=disc, radius=radius) * radius / slope, axis=2)
         excess = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=2) - target
-        if np.all(np.abs(excess) <= _ROUND_OFF * outer**2):
+        if np.all(np.abs(excess) <= _AREA_ROUND_OFF * outer**2):
             break
         square = np.clip(square + excess / opening, start**2 - reach, start**2 + reach)
     _, slope = _level(disc, length, radius, eta, psi)
@@ -196,10 +190,17 @@ def _across(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
     share = weight * half * radius / slope
     wall = outer**2 + 2 * outer * length * np.cos(eta * half_angle(disc=disc, radius=outer) - psi) + length**2
     depth = wall - square[..., None]
+    # 2 int r^2 cos(eta alpha) alpha dr from the surface to the wall; its mean over eta is int x dA.
+    points, radial_weights = _rule(RADIAL_POINTS)
+    middle = (outer - radius)[..., None] / 2
+    r = radius[..., None] + middle * (1 + points)
+    alpha = half_angle(disc=disc, radius=r)
+    levers = middle * radial_weights * r**2 * np.cos(eta[..., None] * alpha) * alpha
+    moment_on_rays = 2 * np.sum(levers, axis=-1)
     return _Turned(
         wall_pressure=np.sum(weight * depth, axis=2),
         surface_square=square - length**2,
-        moment=np.sum(weight * _moment_on_rays(disc, radius, eta), axis=2),
+        moment=np.sum(weight * moment_on_rays, axis=2),
         moment_per_volume=np.sum(share * radius * np.cos(eta * half), axis=2) / np.sum(share, axis=2),
         closed=np.all(depth > 0, axis=2),
     )
@@ -215,15 +216,6 @@ def _level(
     level = radius**2 + 2 * radius * length * np.cos(angle) + length**2
     slope = 2 * radius + 2 * length * (np.cos(angle) - radius * np.sin(angle) * bend)
     return level, slope
-
-
-def _moment_on_rays(disc: Disc, radius: FloatArray, eta: FloatArray) -> FloatArray:
-    """2 int r^2 cos(eta alpha) alpha dr from the surface to the wall, m^3; its mean over eta is int x dA."""
-    places, weights = _rule(RADIAL_POINTS)
-    half = (disc.outer_radius - radius)[..., None] / 2
-    r = radius[..., None] + half * (1 + places)
-    alpha = half_angle(disc=disc, radius=r)
-    return np.asarray(2 * np.sum(half * weights * r**2 * np.cos(eta[..., None] * alpha) * alpha, axis=-1))
 
 
 def check_ring(scene: Scene) -> None:
@@ -251,7 +243,7 @@ def check_ring(scene: Scene) -> None:
 
 
 def closed_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
-    """Whether the liquid still covers the whole outer wall under gravity; an empty chamber counts as closed.
+    """True where the liquid still covers the whole outer wall under gravity, and for an empty chamber.
 
     Source: `TiltedRing.of`.
     """

@@ -46,7 +46,7 @@ def chamber_closed_forms(
 
 
 def chamber_pressure(*, scene: Scene, fill_ratio: npt.ArrayLike) -> FloatArray:
-    """What a chamber's liquid presses with at the outer radius R2, rho omega^2 (R2^2 - a^2)/2; no gravity.
+    """Hydrostatic pressure at the outer radius R2 without gravity, rho omega^2 (R2^2 - a^2)/2.
 
     The head of a chamber of any shape is this over rho, from R2; a mean over its walls is a load.
     Returns: Pa, the shape of `fill_ratio`.
@@ -60,7 +60,7 @@ def chamber_pressure(*, scene: Scene, fill_ratio: npt.ArrayLike) -> FloatArray:
 def measured_closed_forms(
     *, scene: Scene, fill_ratio: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The same with moment and lambda as a measured factor corrects them.
+    """Wall pressure, and moment and lambda corrected by the measured factor.
 
     U and lambda times `Disc.moment_factor`; P as the geometry has it.
     Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
@@ -71,7 +71,7 @@ def measured_closed_forms(
 
 
 _EPSILON: Final = float(np.finfo(np.float64).eps)
-_QUADRATURE: Final = 1e-10
+_QUADRATURE_ERROR: Final = 1e-10
 """Relative error of the quadrature over the tilted ring, on the safe side."""
 
 
@@ -110,7 +110,7 @@ class RingValues:
     moment_per_volume: Estimate
     """dU/dV' as liquid is added, kg/m^2."""
     closed: BoolArray
-    """Whether gravity, where modelled, leaves a closed ring; where not, values are those without gravity."""
+    """True where gravity, if modelled, leaves a closed ring; elsewhere values are those without gravity."""
     status: Status
 
     @classmethod
@@ -132,7 +132,17 @@ class RingValues:
         # The square of the surface's radius is known to a few eps of R2^2, which counts against the depth.
         depth = np.where(fill_ratio > 0, disc.outer_radius - surface, disc.outer_radius)
         widths = _EPSILON * (4 + 4 * disc.outer_radius / depth) * np.abs(values) + extra
-        status = _status(scene, fill_ratio, closed)
+        status = Status()
+        if not np.all(closed):
+            x = fill_ratio[~closed][:1]
+            where, change = "run dry on the outer wall", "raise the speed or the fill ratio"
+            if _spilling_ring(scene, x)[0]:
+                where, change = "pass the inner radius", "raise the speed or lower the fill ratio"
+            status = Status(
+                code=StatusCode.NO_RING,
+                text=f"at a fill ratio of {x[0]:.4g}: the free surface would {where}: {change}; "
+                "values there are without gravity",
+            )
         parts = [Estimate(value=v, uncertainty=w, status=status) for v, w in zip(values, widths, strict=True)]
         return cls(
             fill_ratio=fill_ratio,
@@ -149,51 +159,28 @@ class RingValues:
 def _under_gravity(
     scene: Scene, fills: FloatArray, plain: FloatArray
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """Values, whether the ring is closed, and half-widths of the quadrature or of what gravity could do."""
-    gravity, wet = scene.environment.gravity, fills > 0
+    """Values in the rows of `plain`, closed rings, half-widths of the quadrature or of gravity's effect."""
+    disc, density, gravity, wet = scene.disc, scene.liquid.density, scene.environment.gravity, fills > 0
     ring = TiltedRing.of(scene, fills[wet])
-    found = plain.copy()
-    found[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume, ring.hydrostatic_pressure]
+    values = plain.copy()
+    values[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume, ring.hydrostatic_pressure]
     closed = ~_spilling_ring(scene, fills) | ~wet
     closed[wet] &= ring.closed
-    tilt = gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
-    quadrature = (_QUADRATURE + min(tilt, 1.0) ** turn_samples(scene)) * np.abs(plain)
-    displaced = _displaced_by_gravity(scene, fills)
-    certain = closed & wet
-    return np.where(closed, found, plain), closed, np.where(certain, quadrature, displaced)
-
-
-def _displaced_by_gravity(scene: Scene, fills: FloatArray) -> FloatArray:
-    """Bound of what gravity could do to a chamber's liquid: take it from the middle to a corner, or back.
-
-    Returns: Of the rows of `_under_gravity`, shape (4, n); of an empty chamber of dU/dV' alone.
-    """
-    disc, density = scene.disc, scene.liquid.density
+    tilt = gravity / (scene.rotor.speed**2 * disc.inner_radius)
+    quadrature = (_QUADRATURE_ERROR + min(tilt, 1.0) ** turn_samples(scene)) * np.abs(plain)
+    # At most gravity takes a chamber's liquid from the middle to a corner, or back; an imported chamber may
+    # have corners beyond the half-angle that is as large as its surface.
     a = surface_radius(disc=disc, fill_ratio=fills)
-    # An imported chamber may have corners beyond the half-angle that is as large as its surface.
     corner = half_angle(disc=disc, radius=a) if disc.geometry is None else disc.central_angle / 2
     reach = disc.outer_radius - a * np.cos(corner)
-    pressure = np.where(fills > 0, 2 * density * scene.environment.gravity * disc.outer_radius, 0.0)
+    pressure = np.where(wet, 2 * density * gravity * disc.outer_radius, 0.0)
     moment = density * fills * chamber_volume(disc=disc) * reach
-    return np.array([pressure, moment, density * reach, pressure])
-
-
-def _status(scene: Scene, fills: FloatArray, closed: BoolArray) -> Status:
-    if np.all(closed):
-        return Status()
-    x = fills[~closed][:1]
-    where, change = "run dry on the outer wall", "raise the speed or the fill ratio"
-    if _spilling_ring(scene, x)[0]:
-        where, change = "pass the inner radius", "raise the speed or lower the fill ratio"
-    return Status(
-        code=StatusCode.NO_RING,
-        text=f"at a fill ratio of {x[0]:.4g}: the free surface would {where}: {change}; "
-        "values there are without gravity",
-    )
+    displaced = np.array([pressure, moment, density * reach, pressure])
+    return np.where(closed, values, plain), closed, np.where(closed & wet, quadrature, displaced)
 
 
 def _spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
-    """Whether gravity tilts the free surface past the inner radius, shape (n,).
+    """True where gravity tilts the free surface past the inner radius, shape (n,).
 
     Horizontal shaft: a - delta [(cos(alpha) - s)^2 + sin^2(alpha)]^(1/2) < R1, s = sin(alpha)/alpha;
     vertical: a^2 - delta B/2 < R1^2; delta = g/omega^2.
@@ -217,11 +204,11 @@ class _DrawingShares:
     wall_pressure: FloatArray
     hydrostatic_pressure: FloatArray
     moment: FloatArray
-    """Of the moment or of lambda, whichever is larger."""
+    """Larger one of the moment's and of lambda's."""
 
 
 def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
-    """Shares at fill ratios above zero; zeros for the sector of the keys."""
+    """Uncertainties by faceting at fill ratios above zero; zeros for the sector of the keys."""
     if disc.geometry is None:
         none = np.zeros(fills.shape)
         return _DrawingShares(volume=0.0, wall_pressure=none, hydrostatic_pressure=none, moment=none)
@@ -243,5 +230,6 @@ def share_across(disc: Disc, fills: FloatArray) -> FloatArray:
     """
     if disc.geometry is None:
         return np.zeros(fills.shape)
-    _, along, across = chamber_table(disc.geometry).surface(surface_radius(disc=disc, fill_ratio=fills))
-    return np.asarray(across / along)
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    _, along_middle, across_middle = chamber_table(disc.geometry).surface(a)
+    return np.asarray(across_middle / along_middle)

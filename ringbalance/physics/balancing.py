@@ -14,10 +14,10 @@ from ringbalance.scene.arrays import FloatArray
 
 ZONES: Final = ((3.0, "A"), (4.0, "B"), (5.0, "C"), (math.inf, "D"))
 """Largest peak sensitivity of each zone of ISO 14839-3: A as new, B acceptable, C not for long."""
-_ANGLES: Final[FloatArray] = np.concatenate(
+_ANGLES_RAD: Final[FloatArray] = np.concatenate(
     [np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi - 1e-6, 1600)]
 )
-"""Of z on the unit circle, rad."""
+"""Arguments of z on the unit circle."""
 
 
 def unbalance_reduction_ratio(*, before: float, after: float) -> float:
@@ -59,7 +59,7 @@ def peak_sensitivity(*, loop_factor: float, integral: float = 0.0, derivative: f
     L = -h (1 + q (1 - 1/z))/(z + 1).
     Source: ISO 14839-3:2006, which judges the loops of magnetic bearings by it; used here for comparison.
     """
-    z = np.exp(1j * _ANGLES)
+    z = np.exp(1j * _ANGLES_RAD)
     shape = 1.0 + derivative * (1.0 - 1.0 / z)
     if loop_factor > 1.0:
         loop = -loop_factor * shape / (z + 1.0)

@@ -1,4 +1,4 @@
-"""How far a number is from its limit of vanishing mesh size, judged from three meshes.
+"""Distance of a number from its limit of vanishing mesh size, judged from three meshes.
 
 The procedure of Celik et al. (2008), with the order capped at the formal one of the quantity at hand.
 Differences that are only round-off, oscillate or grow are said to be so; none of them is dressed up as an
@@ -45,7 +45,7 @@ class GridConvergence:
 
     verdict: GridVerdict
     observed_order: float
-    """As found, with its sign and before any cap; zero where none can be seen."""
+    """Observed order with its sign and before any cap; zero where none can be seen."""
     order: float
     """The order that the uncertainty rests on, within [0.5, formal order]; zero where none was used."""
     extrapolated: float
@@ -59,7 +59,7 @@ class GridConvergence:
     uncertainty: float
     """Expanded uncertainty (95 %) about the finest value, in its own unit."""
     text: str
-    """What was seen and what to do next."""
+    """Kind of convergence and what to do next."""
 
 
 def gci(
@@ -87,28 +87,37 @@ def gci(
     Source: Celik et al. (2008), doi:10.1115/1.2960953.
     """
     phi, h = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
-    _check(phi, h, formal_order)
-    noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
-    if _is_noise(phi, h, formal_order, noise):
-        change = abs(float(phi[1] - phi[0]))
-        return _record(GridVerdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + change)
-    return _from_three(phi, h, formal_order, noise, safety)
-
-
-def _check(phi: FloatArray, h: FloatArray, formal_order: float) -> None:
     if not phi.shape == h.shape == (3,):
         raise ValueError("values and sizes must be two sequences of three")
     if not (np.all(np.isfinite(phi)) and np.all(np.isfinite(h)) and formal_order > 0):
         raise ValueError("values and sizes must be finite, and formal_order positive")
     if h[0] <= 0 or np.any(np.diff(h) <= 0):
         raise ValueError("sizes must be positive and grow from the finest mesh to the coarsest")
-
-
-def _is_noise(phi: FloatArray, h: FloatArray, formal_order: float, noise: float) -> bool:
-    """True when the last change is rounding, not errors that cross zero by accident on the finest meshes."""
-    first, second = np.abs(np.diff(phi[:3]))
-    foretold = second / ((h[2] / h[1]) ** formal_order - 1) / (h[1] / h[0]) ** formal_order
-    return bool(first <= noise and foretold <= 10 * noise)
+    noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
+    e21, e32 = float(phi[1] - phi[0]), float(phi[2] - phi[1])
+    r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
+    # The last change is rounding if the coarser pair foretells it, and not if errors cross zero by accident.
+    foretold = abs(e32) / (r32**formal_order - 1) / r21**formal_order
+    if abs(e21) <= noise and foretold <= 10 * noise:
+        return _record(GridVerdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + abs(e21))
+    if abs(e32) <= noise:
+        return _record(GridVerdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
+    observed = _celik_order(e21, e32, r21, r32)
+    if observed <= 0:
+        half_width = 3 * max(abs(e21), abs(e32)) + noise
+        return _record(GridVerdict.DIVERGING, phi, observed, 0.0, phi[0], 0.0, half_width)
+    gain = r21**observed - 1
+    order = float(np.clip(observed, _LOWEST_ORDER, formal_order))
+    # An order above the formal one means that leading errors cancel here; the coarser pair still sees them.
+    foretold = abs(e32) / (r32**order - 1) / r21**order
+    error = max(abs(e21) / (r21**order - 1), foretold if observed > formal_order else 0.0)
+    verdict = GridVerdict.NOT_ASYMPTOTIC
+    if e21 * e32 < 0:
+        verdict, error = GridVerdict.OSCILLATORY, max(error, float(np.ptp(phi)) / 2)
+    elif 0.5 * formal_order <= observed <= 1.5 * formal_order:
+        verdict = GridVerdict.MONOTONE
+    half_width = safety * error + noise
+    return _record(verdict, phi, observed, order, phi[0] - e21 / gain, safety * abs(e21) / gain, half_width)
 
 
 def _celik_order(e21: float, e32: float, r21: float, r32: float) -> float:
@@ -132,37 +141,6 @@ def _celik_order(e21: float, e32: float, r21: float, r32: float) -> float:
             break
         p = update
     return float(np.clip(p, -_HIGHEST_ORDER, _HIGHEST_ORDER))
-
-
-def _from_three(
-    phi: FloatArray, h: FloatArray, formal_order: float, noise: float, safety: float
-) -> GridConvergence:
-    e21, e32 = float(phi[1] - phi[0]), float(phi[2] - phi[1])
-    r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
-    if abs(e32) <= noise:
-        return _record(GridVerdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
-    observed = _celik_order(e21, e32, r21, r32)
-    verdict = _verdict(observed, e21 * e32 < 0, formal_order)
-    if observed <= 0:
-        return _record(verdict, phi, observed, 0.0, phi[0], 0.0, 3 * max(abs(e21), abs(e32)) + noise)
-    gain = r21**observed - 1
-    order = float(np.clip(observed, _LOWEST_ORDER, formal_order))
-    # An order above the formal one means that leading errors cancel here; the coarser pair still sees them.
-    foretold = abs(e32) / (r32**order - 1) / r21**order
-    error = max(abs(e21) / (r21**order - 1), foretold if observed > formal_order else 0.0)
-    if verdict is GridVerdict.OSCILLATORY:
-        error = max(error, float(np.ptp(phi)) / 2)
-    half_width = safety * error + noise
-    return _record(verdict, phi, observed, order, phi[0] - e21 / gain, safety * abs(e21) / gain, half_width)
-
-
-def _verdict(observed: float, oscillates: bool, formal_order: float) -> GridVerdict:
-    if observed <= 0:
-        return GridVerdict.DIVERGING
-    if oscillates:
-        return GridVerdict.OSCILLATORY
-    near = 0.5 * formal_order <= observed <= 1.5 * formal_order
-    return GridVerdict.MONOTONE if near else GridVerdict.NOT_ASYMPTOTIC
 
 
 def _record(

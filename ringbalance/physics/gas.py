@@ -31,18 +31,18 @@ from ringbalance.scene.models import Gas, GasProcess, Scene
 from ringbalance.scene.rules.working import AIR_CONSTANT
 
 REFERENCE_PRESSURE: Final = 1e5
-"""Of the reference atmosphere of ISO 6358, Pa."""
+"""Pressure of the reference atmosphere of ISO 6358, Pa."""
 REFERENCE_TEMPERATURE: Final = 293.15
-"""Of the same, K."""
+"""Temperature of the reference atmosphere of ISO 6358, K."""
 HEAT_CAPACITY_RATIO: Final = 1.4
 """gamma of air."""
 LAMINAR_RATIO: Final = 0.999
 """Pressure ratio above which the conductance is taken as laminar."""
 VENTED: Final = 1 - LAMINAR_RATIO
 """Gauge pressure over ambient pressure below which a chamber counts as vented."""
-_NORMAL_PRESSURE: Final = 101325.0
-_NORMAL_TEMPERATURE: Final = 273.15
-"""Of a normal litre, Pa and K: DIN 1343."""
+_NORMAL_PRESSURE_PA: Final = 101325.0
+"""Pressure of a normal litre: DIN 1343."""
+_NORMAL_TEMPERATURE_K: Final = 273.15
 
 
 def flow_shape(ratio: float, critical_ratio: float) -> float:
@@ -75,7 +75,7 @@ class GasLine:
     ambient_pressure: float
     """Absolute, Pa."""
     temperature: float
-    """Of the supply and the surroundings, K."""
+    """Temperature of the supply and the surroundings, K."""
     conductance: float
     """C, m^3/(s Pa)."""
     critical_ratio: float
@@ -189,7 +189,7 @@ def vented_pressure(scene: Scene) -> float:
 
 def normal_volume(*, pressure_volume: float, temperature: float) -> float:
     """Normal volume (m^3, at 0 degC and 101.325 kPa) of the gas with a given p V (J) at a temperature."""
-    return pressure_volume / _NORMAL_PRESSURE * _NORMAL_TEMPERATURE / temperature
+    return pressure_volume / _NORMAL_PRESSURE_PA * _NORMAL_TEMPERATURE_K / temperature
 
 
 def compression_work(*, pressure_volume: float, pressure: float, ambient_pressure: float) -> float:

@@ -1,4 +1,4 @@
-"""What every solve returns: a value, a status whose text says what to do next, and statistics."""
+"""Result of a solve: a value, a status whose text says what to do next, and statistics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ringbalance.scene.arrays import FloatArray
 
 
 class StatusCode(StrEnum):
-    """How a solve ended."""
+    """Kinds of end of a solve."""
 
     OK = "ok"
     OUT_OF_RANGE = "out_of_range"
@@ -20,7 +20,7 @@ class StatusCode(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """How a solve ended and, when it did not succeed, what to do next."""
+    """End of a solve and, when it did not succeed, what to do next."""
 
     code: StatusCode = StatusCode.OK
     text: str = "solved"

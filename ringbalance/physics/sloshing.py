@@ -27,7 +27,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
 FORMAL_ORDER: Final = 4.0
-"""Of an eigenvalue of quadratic elements: twice the order of its mode in the energy's norm."""
+"""Order of an eigenvalue of quadratic elements: twice that of its mode in the energy's norm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,14 +108,14 @@ def sloshing_modes(
     if len(meshes) != 3:
         raise ValueError("cells must list three meshes, finest first")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    found = np.array(
+    ratios = np.array(
         [[_lowest(system, modes) for system, _ in _systems(disc, float(a), meshes)] for a in radii]
     )
-    widths = [_half_widths(disc, float(a), meshes, at) for a, at in zip(radii, found, strict=True)]
+    widths = [_half_widths(disc, float(a), meshes, at) for a, at in zip(radii, ratios, strict=True)]
     return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
-        frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=np.array(widths)),
+        frequency_ratio=Estimate(value=ratios[:, 0].copy(), uncertainty=np.array(widths)),
     )
 
 
@@ -152,13 +152,13 @@ def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ..
         system, _ = next(_systems(disc, a, meshes))
         return float(_lowest(system, modes)[mode - 1] - 1)
 
-    found = []
+    fills = []
     low, high = np.log(1e-4 * top), float(np.log(top))
     for mode in range(1, modes + 1):
         if excess(high, mode) > 0 > excess(low, mode):
             high = float(brentq(excess, low, high, args=(mode,), xtol=tolerance))
-            found.append((mode, float(np.exp(high))))
-    return tuple(found)
+            fills.append((mode, float(np.exp(high))))
+    return tuple(fills)
 
 
 def _lowest(system: SloshingSystem, modes: int) -> FloatArray:
@@ -180,13 +180,13 @@ are slower in deep liquid and faster in shallow one.  The case `measured_waves` 
 LOWEST_TRUE: Final = 1 - FREQUENCY_UNCERTAINTY
 """Lower end of a natural frequency, over that of linear theory."""
 HIGHEST_TRUE: Final = 1 + FREQUENCY_UNCERTAINTY
-_GRID: Final = 25
-_ROUNDS: Final = 3
-_WITHIN: Final = 9
-"""Points between the neighbours of an extreme, in each round."""
+_GRID_POINTS: Final = 25
+_REFINEMENTS: Final = 3
+_REFINED_POINTS: Final = 9
+"""Points between the neighbours of an extreme, in each refinement."""
 
 
-def _swept(
+def _extremes(
     response: Callable[[FloatArray], FloatArray], *, natural: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Extremes of a forced response while all natural frequencies vary within `FREQUENCY_UNCERTAINTY`.
@@ -199,17 +199,16 @@ def _swept(
     """
     low, high = 1 / HIGHEST_TRUE, 1 / LOWEST_TRUE
     peaks = natural[(natural > low) & (natural < high)]
-    places = np.unique([*np.linspace(low, high, _GRID), *peaks])
-    values = response(places)
-    for _ in range(_ROUNDS):
-        found = np.unique([*values.argmin(axis=0), *values.argmax(axis=0)])
-        ends = zip(
-            places[np.maximum(found - 1, 0)], places[np.minimum(found + 1, places.size - 1)], strict=True
-        )
-        between = np.setdiff1d([x for end in ends for x in np.linspace(*end, _WITHIN)], places)
-        order = np.argsort(np.append(places, between))
+    ratios = np.unique([*np.linspace(low, high, _GRID_POINTS), *peaks])
+    values = response(ratios)
+    for _ in range(_REFINEMENTS):
+        extremes = np.unique([*values.argmin(axis=0), *values.argmax(axis=0)])
+        before, after = np.maximum(extremes - 1, 0), np.minimum(extremes + 1, ratios.size - 1)
+        ends = zip(ratios[before], ratios[after], strict=True)
+        between = np.setdiff1d([x for end in ends for x in np.linspace(*end, _REFINED_POINTS)], ratios)
+        order = np.argsort(np.append(ratios, between))
         values = np.concatenate([values, response(between)])[order]
-        places = np.append(places, between)[order]
+        ratios = np.append(ratios, between)[order]
     return values.min(axis=0), values.max(axis=0)
 
 
@@ -226,16 +225,16 @@ class SloshingResponse:
 
     Half-widths are those of the solution alone, here and below; the intervals hold them, too."""
     amplification_interval: FloatArray
-    """Its lower and upper end (95 %), shape (n, 2), natural frequencies being known to
+    """Lower and upper end (95 %) of the amplification, shape (n, 2), natural frequencies being known to
     `FREQUENCY_UNCERTAINTY` only.  Where a mode may meet the force, the upper end rests on the damping."""
     pressure_amplification: Estimate
     """Change of the mean pressure on the outer wall over that under such a surface, shape (n,)."""
     pressure_amplification_interval: FloatArray
-    """The same of it, shape (n, 2)."""
+    """Lower and upper end (95 %) of the pressure's amplification, shape (n, 2)."""
     surface_amplitude: Estimate
     """Largest displacement of the surface, m zero-to-peak, shape (n,)."""
     surface_amplitude_interval: FloatArray
-    """The same of it, m, shape (n, 2)."""
+    """Lower and upper end (95 %) of the surface's amplitude, m, shape (n, 2)."""
     status: Status
 
 
@@ -265,11 +264,16 @@ def sloshing_response(
     Source: derived in `section_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
-    _check(fills, angular_velocity, kinematic_viscosity, gravity)
+    if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)):
+        raise ValueError("fill_ratio must lie within (0, 1], and there must be at least one")
+    if not (np.isfinite(angular_velocity) and angular_velocity > 0):
+        raise ValueError("angular_velocity must be finite and above zero")
+    if not (np.isfinite([kinematic_viscosity, gravity]).all() and kinematic_viscosity >= 0 and gravity >= 0):
+        raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     meshes = cells or default_sloshing_cells(disc=disc)
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
-    found = np.array(
+    answers = np.array(
         [
             [
                 _answers(system, np.array([1.0]), ekman)[0] * [1.0, unit / disc.outer_radius, 1.0]
@@ -278,41 +282,34 @@ def sloshing_response(
             for a in radii
         ]
     )
-    widths = np.array([_half_widths(disc, float(a), meshes, at) for a, at in zip(radii, found, strict=True)])
+    widths = np.array(
+        [_half_widths(disc, float(a), meshes, at) for a, at in zip(radii, answers, strict=True)]
+    )
     scale = gravity / angular_velocity**2
-    amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
+    amplitude = Estimate(value=scale * answers[:, 0, 1], uncertainty=scale * widths[:, 1])
     # Peaks are looked for on the mesh in the middle, if there are three.
     middle = 0 if disc.geometry is not None else len(meshes) // 3
     systems = (next(islice(_systems(disc, float(a), meshes), middle, None))[0] for a in radii)
     ends = np.array(
         [
-            _swept(partial(_answers, system, ekman=ekman), natural=system.natural_frequencies())
+            _extremes(partial(_answers, system, ekman=ekman), natural=system.natural_frequencies())
             for system in systems
         ]
     )
     # At either end the solution errs by about the same share as in the middle.
-    share = widths / found[:, 0]
+    share = widths / answers[:, 0]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
     return SloshingResponse(
         fill_ratio=fills,
         surface_radius=radii,
-        amplification=Estimate(value=found[:, 0, 0].copy(), uncertainty=widths[:, 0]),
+        amplification=Estimate(value=answers[:, 0, 0].copy(), uncertainty=widths[:, 0]),
         amplification_interval=ends[:, :, 0].copy(),
-        pressure_amplification=Estimate(value=found[:, 0, 2].copy(), uncertainty=widths[:, 2]),
+        pressure_amplification=Estimate(value=answers[:, 0, 2].copy(), uncertainty=widths[:, 2]),
         pressure_amplification_interval=ends[:, :, 2].copy(),
         surface_amplitude=amplitude,
         surface_amplitude_interval=scale * ends[:, :, 1],
         status=_status(fills, disc.outer_radius - radii, scale * ends[:, 1, 1], scale - radii),
     )
-
-
-def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float) -> None:
-    if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)):
-        raise ValueError("fill_ratio must lie within (0, 1], and there must be at least one")
-    if not (np.isfinite(omega) and omega > 0):
-        raise ValueError("angular_velocity must be finite and above zero")
-    if not (np.isfinite([viscosity, gravity]).all() and viscosity >= 0 and gravity >= 0):
-        raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
 
 
 def _answers(system: SloshingSystem, ratios: FloatArray, ekman: float) -> FloatArray:

@@ -62,7 +62,7 @@ class SloshingSystem:
     flux: FloatArray
     """Rows that take psi to q at points of the free surface, shape (m, n)."""
     nodes: IntArray
-    """Of the mesh, to which the values of psi belong, shape (n,)."""
+    """Nodes of the mesh to which the values of psi belong, shape (n,)."""
     potential: FloatArray
     """Row that takes psi to the mean of phi over the outer wall less that over the surface, shape (n,)."""
     surface_mean: FloatArray
@@ -107,7 +107,7 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
 def imported_system(
     geometry: ChamberGeometry, *, surface_radius: float, width: float, coarse: bool
 ) -> tuple[SloshingSystem, float]:
-    """The problem in the middle section of an imported chamber, and its unit of length, m.
+    """Assemble the problem in the middle section of an imported chamber; its unit of length is in m.
 
     Args: `coarse`: on the corners of the cells alone.
     Raises: ValueError: as `middle_section`.
@@ -123,49 +123,62 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
         `ends`: area of the two ends over that of the section, times outer radius over width: 2 R2/B.
     Source: the equations at the head of this module, derived there.
     """
-    near, element = _near(mesh)
-    basis = Basis(mesh, element, mapping=near, intorder=4)
+    mapping: Any = mesh.mapping()
+    element: Any = ElementTriP2()
+    if isinstance(mapping, MappingIsoparametric):
+        mapping, element = _FilmMapping(mesh, mapping.elem, mapping.bndelem), ElementQuad2()
+    basis = Basis(mesh, element, mapping=mapping, intorder=4)
 
-    def along(facets: Any) -> Any:
-        return FacetBasis(mesh, element, mapping=near, facets=facets, intorder=6)
+    def on_facets(facets: Any) -> Any:
+        return FacetBasis(mesh, element, mapping=mapping, facets=facets, intorder=6)
 
-    top, sides = (
-        along(FREE_SURFACE),
-        along(np.setdiff1d(mesh.boundary_facets(), mesh.boundaries[FREE_SURFACE])),
-    )
+    top = on_facets(FREE_SURFACE)
+    sides = on_facets(np.setdiff1d(mesh.boundary_facets(), mesh.boundaries[FREE_SURFACE]))
     surface, walls = basis.get_dofs(top.find).all(), basis.get_dofs(sides.find).all()
-    kept, inner = np.setdiff1d(surface, walls), np.setdiff1d(np.arange(basis.N), np.union1d(surface, walls))
+    free, inner = np.setdiff1d(surface, walls), np.setdiff1d(np.arange(basis.N), np.union1d(surface, walls))
     matrix = stiffness(basis)
     # Harmonic continuation into the liquid of each unknown on the surface.
-    extension = np.zeros((basis.N, kept.size))
-    extension[kept] = np.eye(kept.size)
-    into = matrix[inner][:, kept].toarray()
+    extension = np.zeros((basis.N, free.size))
+    extension[free] = np.eye(free.size)
+    into = matrix[inner][:, free].toarray()
     extension[inner] = -splu(matrix[inner][:, inner].tocsc()).solve(into)
-    condensed = matrix[kept] @ extension
+    condensed = matrix[free] @ extension
     kinetic = np.asarray((condensed + condensed.T) / 2, dtype=np.float64)
-    means = [load / load.sum() for load in (unit_load.assemble(along(OUTER_WALL)), unit_load.assemble(top))]
-    difference, places = means[0] - means[1], basis.doflocs[0] + 1j * basis.doflocs[1]
+    # The Stokes layers on the two ends see all of the flow, so their share is the kinetic energy's. Along the
+    # sides it is the integral of the squared velocity, from the flux through them, zero at the edges.
+    wetted, flux = np.setdiff1d(walls, surface), matrix @ extension
+    inverse = splu(mass.assemble(sides)[wetted][:, wetted].tocsc())
+    wall_loss = ends * kinetic + np.asarray(flux[wetted].T @ inverse.solve(flux[wetted]))
+    # q at the quadrature points of the surface.
+    normal, facets = top.normals, np.arange(top.nelems)
+    rows = np.zeros((top.nelems, top.dx.shape[1], top.N))
+    for numbers, (function,) in zip(top.element_dofs, top.basis, strict=True):
+        rows[facets, :, numbers] += normal[0] * function.grad[1] - normal[1] * function.grad[0]
+    means = [load / load.sum() for load in map(unit_load.assemble, (on_facets(OUTER_WALL), top))]
+    difference, points = means[0] - means[1], basis.doflocs[0] + 1j * basis.doflocs[1]
+    # The difference of means of phi, from psi, whose conjugate phi is.
+    adjoint = np.zeros(basis.N)
+    adjoint[1:] = splu(matrix[1:][:, 1:].tocsc()).solve(difference[1:])
 
     def on_surface(form: Any) -> FloatArray:
-        return np.asarray(form.assemble(top)[kept][:, kept].toarray())
+        return np.asarray(form.assemble(top)[free][:, free].toarray())
 
     return SloshingSystem(
         kinetic=kinetic,
         coriolis=on_surface(_coriolis),
         centrifugal=on_surface(_centrifugal),
-        # The Stokes layers on the two ends see all of the flow, so their share is the kinetic energy's.
-        wall_loss=ends * kinetic + _loss_at_sides(sides, np.setdiff1d(walls, surface), matrix @ extension),
-        outflow=np.stack([form.assemble(top)[kept] for form in _OUTFLOW]),
-        flux=_flux_rows(top, kept),
-        nodes=kept,
-        potential=_conjugate(basis, matrix, difference) @ extension,
-        surface_mean=means[1][kept],
-        wall_drive=complex(difference @ places),
+        wall_loss=wall_loss,
+        outflow=np.stack([form.assemble(top)[free] for form in _OUTFLOW]),
+        flux=rows.reshape(-1, top.N)[:, free],
+        nodes=free,
+        potential=np.asarray(_turned.assemble(basis).T @ adjoint) @ extension,
+        surface_mean=means[1][free],
+        wall_drive=complex(difference @ points),
     )
 
 
-class _Near(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
-    """In a film rounding exceeds the 1e-12 where scikit-fem's Newton method ends; it is quadratic.
+class _FilmMapping(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
+    """Mapping for films, where rounding exceeds the 1e-12 at which scikit-fem's Newton method ends.
 
     Shape functions are evaluated once for all components, and points of a facet are looked for once.
     """
@@ -201,14 +214,6 @@ class _Near(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no ty
         return total
 
 
-def _near(mesh: Any) -> tuple[Any, Any]:
-    """Mapping and element of a section's mesh."""
-    own = mesh.mapping()
-    if isinstance(own, MappingIsoparametric):
-        return _Near(mesh, own.elem, own.bndelem), ElementQuad2()
-    return own, ElementTriP2()
-
-
 def _outward(psi: Any, w: Any) -> Any:
     """q = n . rot psi, the flow out of the liquid."""
     return w.n[0] * grad(psi)[1] - w.n[1] * grad(psi)[0]
@@ -234,28 +239,3 @@ _OUTFLOW = (
     LinearForm(lambda v, w: w.x[0] * _outward(v, w)),
     LinearForm(lambda v, w: w.x[1] * _outward(v, w)),
 )
-
-
-def _flux_rows(top: Any, kept: IntArray) -> FloatArray:
-    """Rows that take psi to q at the quadrature points of the surface."""
-    normal, facets = top.normals, np.arange(top.nelems)
-    rows = np.zeros((top.nelems, top.dx.shape[1], top.N))
-    for numbers, (function,) in zip(top.element_dofs, top.basis, strict=True):
-        rows[facets, :, numbers] += normal[0] * function.grad[1] - normal[1] * function.grad[0]
-    return rows.reshape(-1, top.N)[:, kept]
-
-
-def _loss_at_sides(sides: Any, nodes: IntArray, flux: FloatArray) -> FloatArray:
-    """Integral of the squared velocity along the plates and the outer wall, from the flux through them.
-
-    The surface's two edges belong to the free surface, too; there the velocity is taken as zero.
-    """
-    inverse = splu(mass.assemble(sides)[nodes][:, nodes].tocsc())
-    return np.asarray(flux[nodes].T @ inverse.solve(flux[nodes]))
-
-
-def _conjugate(basis: Any, matrix: Any, row: FloatArray) -> FloatArray:
-    """Row that takes psi to the value that a row, whose sum is zero, takes from its potential phi."""
-    adjoint = np.zeros(basis.N)
-    adjoint[1:] = splu(matrix[1:][:, 1:].tocsc()).solve(row[1:])
-    return np.asarray(_turned.assemble(basis).T @ adjoint)

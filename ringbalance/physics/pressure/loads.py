@@ -1,4 +1,4 @@
-"""What the pressure in one chamber adds up to: volume, moment, wall pressure, force and torque on walls.
+"""Integrals of the pressure in one chamber: volume, moment, wall pressure, force and torque on walls.
 
 In an imported chamber it is solved here: laplace(p) = 2 rho omega^2 in the liquid, p = 0 on the free surface
 and n . grad p = rho omega^2 r e_r . n on walls, by quadratic tetrahedra on a mesh that follows the surface.
@@ -65,35 +65,8 @@ def liquid_integrals(*, solution: PressureSolution, density: float, axial_width:
     """
     chamber, basis, unit = solution.chamber, solution.basis, solution.chamber.length_scale
     depth = axial_width if chamber.dimension == 2 else unit
-    forces, torques = _wall_loads(solution, depth)
-    if chamber.dimension == 2:
-        pressure = float(unit**2 * np.sum(basis.dx * basis.interpolate(solution.pressure)))
-        push = np.array([0.0, 0.0, pressure])
-        forces |= {"end_back": -push, "end_front": push}
-        torques |= {"end_back": 0.0, "end_front": 0.0}
-    places = np.asarray(basis.global_coordinates())
-    moment = density * unit**3 * depth * np.sum(basis.dx * places, axis=(1, 2))
-    wall = solution.side(OUTER_WALL)
-    return _LiquidIntegrals(
-        volume=float(unit**2 * depth * basis.dx.sum()),
-        first_moment=np.pad(moment, (0, 3 - len(moment))),
-        wall_pressure=float(np.sum(wall.weights * wall.at_points(solution.pressure)) / wall.weights.sum()),
-        moment_per_volume=_moment_per_volume(solution, density),
-        force=forces,
-        torque=torques,
-    )
-
-
-def _moment_per_volume(solution: PressureSolution, density: float) -> float:
-    surface = solution.side(FREE_SURFACE)
-    speed = surface.weights / np.abs(solution.surface_flux(surface))
-    return float(density * solution.chamber.length_scale * np.sum(speed * surface.points[0]) / speed.sum())
-
-
-def _wall_loads(solution: PressureSolution, depth: float) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    unit = solution.chamber.length_scale
     forces, torques = {}, {}
-    for name in solution.chamber.mesh.boundaries:
+    for name in chamber.mesh.boundaries:
         if name == FREE_SURFACE:
             continue
         wall = solution.side(name)
@@ -102,7 +75,23 @@ def _wall_loads(solution: PressureSolution, depth: float) -> tuple[dict[str, Flo
         total = unit * depth * push.sum(axis=(1, 2))
         forces[name] = np.pad(total, (0, 3 - len(total)))
         torques[name] = float(unit**2 * depth * turn.sum())
-    return forces, torques
+    if chamber.dimension == 2:
+        pressure = float(unit**2 * np.sum(basis.dx * basis.interpolate(solution.pressure)))
+        push = np.array([0.0, 0.0, pressure])
+        forces |= {"end_back": -push, "end_front": push}
+        torques |= {"end_back": 0.0, "end_front": 0.0}
+    points = np.asarray(basis.global_coordinates())
+    moment = density * unit**3 * depth * np.sum(basis.dx * points, axis=(1, 2))
+    surface = solution.side(FREE_SURFACE)
+    speed = surface.weights / np.abs(solution.surface_flux(surface))
+    return _LiquidIntegrals(
+        volume=float(unit**2 * depth * basis.dx.sum()),
+        first_moment=np.pad(moment, (0, 3 - len(moment))),
+        wall_pressure=_mean(solution.side(OUTER_WALL), solution.pressure),
+        moment_per_volume=float(density * unit * np.sum(speed * surface.points[0]) / speed.sum()),
+        force=forces,
+        torque=torques,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

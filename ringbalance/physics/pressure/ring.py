@@ -1,4 +1,4 @@
-"""What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and force.
+"""Totals of the liquid ring in one chamber: volume, wall pressure, moment and force on the disc.
 
 Every number comes from finite elements on three meshes and carries the half-width that the grid
 convergence of exactly this number gives it, with the rounding that this cannot see.  With gravity across the
@@ -19,7 +19,7 @@ from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.physics.convergence import GridConvergence, gci
 from ringbalance.physics.pressure.loads import liquid_integrals
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
+from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.pressure.surface import refined_surface, solve_with_gravity
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -28,13 +28,13 @@ from ringbalance.scene.models import Disc
 
 QUANTITIES: Final = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume", "resultant_force")
 _FORMAL_ORDER: Final = 4.0
-"""Of integrals on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
-_SHALLOWEST: Final = 1e-10
+"""Order of integrals on quadratic geometry: twice that of the elements, and that of an arc's drawing."""
+_LEAST_DEPTH: Final = 1e-10
 """Depth over outer radius at which coordinates still resolve the nodes of a film."""
-_AVERAGING: Final = 1e-8
+_AVERAGING_ERROR: Final = 1e-8
 """Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
 _EPSILON: Final = float(np.finfo(np.float64).eps)
-_CANCELLED: Final = MappingProxyType({2: 20.0, 3: 1000.0})
+_ROUNDING_FACTORS: Final = MappingProxyType({2: 20.0, 3: 1000.0})
 """Rounding of a film's coordinates, by dimension, over eps R2/depth."""
 
 
@@ -66,8 +66,8 @@ class RingQuantities:
     cells: tuple[tuple[int, ...], ...]
     """Cells of the meshes, finest first."""
     solved: BoolArray
-    """Whether there are values, shape (n,): not where gravity leaves no closed ring, or where a solve failed;
-    zeros, no result, stand for them."""
+    """True where there are values, shape (n,); elsewhere, without a closed ring or after a failed solve, they
+    are zeros."""
     status: Status
     statistics: Statistics
 
@@ -112,8 +112,12 @@ def ring_quantities(
     if axial and len(meshes[0]) == 2:
         raise ValueError("gravity along the shaft needs dimension 3")
     liquid = RotatingLiquid(density=density, angular_velocity=angular_velocity)
-    angles = _angles(disc, liquid, gravity) if gravity and not axial else np.zeros(1)
-    turn = [replace(liquid, gravity=_pull(gravity, shaft, float(angle))) for angle in angles]
+    angles, turn = np.zeros(1), [liquid]
+    if axial:
+        turn = [replace(liquid, gravity=(0.0, 0.0, -gravity))]
+    elif gravity:
+        angles = _angles(disc, liquid, gravity)
+        turn = [replace(liquid, gravity=(gravity * np.cos(a), gravity * np.sin(a))) for a in angles.tolist()]
     samples = [_on_meshes(disc, turn, angles, float(x), meshes) for x in fills]
     return _collected(disc, liquid, fills, meshes, samples)
 
@@ -126,9 +130,9 @@ def _check(disc: Disc, fills: FloatArray, density: float, omega: float, gravity:
     if not (gravity >= 0 and np.isfinite(gravity)):
         raise ValueError("gravity must be zero or positive")
     depth = 1 - surface_radius(disc=disc, fill_ratio=fills) / disc.outer_radius
-    if (thin := fills[(fills > 0) & (depth < _SHALLOWEST)]).size:
+    if (thin := fills[(fills > 0) & (depth < _LEAST_DEPTH)]).size:
         raise ValueError(
-            f"fill_ratio {thin[0]:.3g} leaves a ring shallower than {_SHALLOWEST:g} of the outer radius, "
+            f"fill_ratio {thin[0]:.3g} leaves a ring shallower than {_LEAST_DEPTH:g} of the outer radius, "
             "which no mesh resolves; give zero instead"
         )
 
@@ -140,16 +144,8 @@ def _angles(disc: Disc, liquid: RotatingLiquid, gravity: float) -> FloatArray:
     the number of samples.
     """
     tilt = gravity / (liquid.angular_velocity**2 * disc.inner_radius)
-    harmonics = np.log(_AVERAGING) / np.log(min(tilt, 0.3))
+    harmonics = np.log(_AVERAGING_ERROR) / np.log(min(tilt, 0.3))
     return np.linspace(0, np.pi, max(2, int(np.ceil(harmonics / 2))) + 1)
-
-
-def _pull(gravity: float, shaft: Shaft, angle: float) -> tuple[float, ...]:
-    if gravity == 0:
-        return ()
-    if shaft == "vertical":
-        return (0.0, 0.0, -gravity)
-    return (gravity * np.cos(angle), gravity * np.sin(angle))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,11 +176,11 @@ def _on_meshes(
         half = float(half_angle(disc=disc, radius=disc.outer_radius))
         drop = turn[0].density * disc.outer_radius * np.sin(half) / half
         return (_TurnMeans(values=np.array([0.0, 0.0, 0.0, drop, 0.0])),) * len(meshes)
-    found: list[_TurnMeans] = []
+    samples: list[_TurnMeans] = []
     for cells, coarser in zip(meshes[::-1], (None, *meshes[:0:-1]), strict=True):
         halves = coarser is not None and all(n == 2 * m for n, m in zip(cells, coarser, strict=True))
-        found.append(_turn_mean(disc, turn, angles, x, cells, found[-1].surfaces if halves else ()))
-    return tuple(reversed(found))
+        samples.append(_turn_mean(disc, turn, angles, x, cells, samples[-1].surfaces if halves else ()))
+    return tuple(reversed(samples))
 
 
 def _turn_mean(
@@ -201,8 +197,14 @@ def _turn_mean(
     """
     solutions = []
     for k, liquid in enumerate(turn):
-        start = refined_surface(starts[k]) if starts else None
-        solution = _solved(disc, liquid, x, cells, start)
+        # Below a free surface that is concentric, or found where there is gravity.
+        if liquid.gravity:
+            start = refined_surface(starts[k]) if starts else None
+            solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=x, cells=cells, start=start)
+        else:
+            radius = surface_radius(disc=disc, fill_ratio=x)
+            chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+            solution = solve_pressure(chamber=chamber, problem=liquid.problem())
         if not solution.status.ok:
             return _TurnMeans(values=np.zeros(len(QUANTITIES)), status=solution.status)
         solutions.append(solution)
@@ -227,17 +229,6 @@ def _turn_mean(
         ),
         rounding=max(e.get("surface_rounding", 0.0) for e in extra),
     )
-
-
-def _solved(
-    disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...], start: FloatArray | None
-) -> PressureSolution:
-    """Below a free surface that is concentric, or found where there is gravity."""
-    if liquid.gravity:
-        return solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=x, cells=cells, start=start)
-    radius = surface_radius(disc=disc, fill_ratio=x)
-    chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
-    return solve_pressure(chamber=chamber, problem=liquid.problem())
 
 
 def _collected(
@@ -304,7 +295,7 @@ def _rounding(disc: Disc, cells: tuple[int, ...], x: float, moved: float) -> flo
     a = float(surface_radius(disc=disc, fill_ratio=x))
     depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
     stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
-    return _EPSILON * (_CANCELLED[len(cells)] * disc.outer_radius / depth + 0.2 * stiffness) + moved
+    return _EPSILON * (_ROUNDING_FACTORS[len(cells)] * disc.outer_radius / depth + 0.2 * stiffness) + moved
 
 
 def _natural_sizes(disc: Disc, liquid: RotatingLiquid, x: float) -> FloatArray:

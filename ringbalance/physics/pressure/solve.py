@@ -31,12 +31,12 @@ from ringbalance.scene.registry import registered
 
 MULTIGRID_FROM: Final = 10_000
 """Unknowns in three dimensions above which multigrid costs less than a factorisation."""
-_ACCEPTED: Final = 1e-10
+_MAX_RESIDUAL: Final = 1e-10
 _ROUNDING: Final = 8 * float(np.finfo(np.float64).eps)
-"""Of |A| |u| + |b|, that a backward-stable solve may leave of the residual."""
+"""Residual that a backward-stable solve may leave, over |A| |u| + |b|."""
 _MOST_ROUNDING: Final = 1e-6
 """Relative residual above which rounding has cost too many digits to call a system solved."""
-_MOST_STEPS: Final = 500
+_MULTIGRID_STEPS: Final = 500
 
 
 def quadratic_basis(mesh: Any) -> Any:
@@ -73,7 +73,7 @@ class BoundarySide:
     nodes: IntArray
     """Shape (functions, facets)."""
     values: FloatArray
-    """Of the functions at the points, shape (functions, points)."""
+    """Values of the functions at the points, shape (functions, points)."""
     points: FloatArray
     """Shape (dimension, facets, points)."""
     area: FloatArray
@@ -119,19 +119,16 @@ def side(mesh: Any, boundary: str) -> BoundarySide:
     # Differences first: a film's depth would cancel in the sums.
     local = mesh.doflocs[:, nodes] - mesh.doflocs[:, nodes[:1]]
     tangents = np.einsum("xnf,ntq->txfq", local, np.stack([slope for _, slope in functions]))
-    area = _normal(tangents) * weights
+    if len(tangents) == 1:
+        area = np.stack([tangents[0, 1], -tangents[0, 0]]) * weights
+    else:
+        area = np.cross(tangents[0], tangents[1], axis=0) * weights
     inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
     outward = mesh.p[:, corners[:, facets]].mean(axis=1) - inside
     area *= np.sign(np.einsum("xfq,xf->fq", area, outward))
     return BoundarySide(
         nodes=nodes, values=values, points=np.einsum("xnf,nq->xfq", mesh.doflocs[:, nodes], values), area=area
     )
-
-
-def _normal(tangents: FloatArray) -> FloatArray:
-    if len(tangents) == 1:
-        return np.stack([tangents[0, 1], -tangents[0, 0]])
-    return np.cross(tangents[0], tangents[1], axis=0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,12 +151,8 @@ def _solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = Fa
         make terms cancel that are larger than b by the square of their elongation.
     Source: smoothed aggregation of Vanek, Mandel and Brezina (1996), doi:10.1007/BF02238511, through pyamg.
     """
-    if multigrid and (found := _judged(matrix, right, *_by_multigrid(matrix, right))).status.ok:
-        return found
-    return _judged(matrix, right, _factorised(matrix, right), 0)
-
-
-def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
+    if multigrid and (solution := _judged(matrix, right, *_by_multigrid(matrix, right))).status.ok:
+        return solution
     # Symmetric mode halves the fill of the default ordering; a positive definite matrix needs no pivoting.
     try:
         factor = splu(
@@ -168,9 +161,10 @@ def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
+        values = np.asarray(factor.solve(right))
     except RuntimeError:  # singular: the residual of zeros says so
-        return np.zeros_like(right)
-    return np.asarray(factor.solve(right))
+        values = np.zeros_like(right)
+    return _judged(matrix, right, values, 0)
 
 
 def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, int]:
@@ -190,7 +184,7 @@ def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, in
         matrix,
         right,
         rtol=1e-12,
-        maxiter=_MOST_STEPS,
+        maxiter=_MULTIGRID_STEPS,
         M=hierarchy.aspreconditioner(),
         callback=lambda _: steps.append(None),
     )
@@ -200,7 +194,7 @@ def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, in
 def _judged(matrix: csr_matrix, right: FloatArray, values: FloatArray, iterations: int) -> _LinearSolution:
     size = float(np.linalg.norm(right)) or 1.0
     residual = float(np.linalg.norm(right - matrix @ values)) / size
-    limit = _ACCEPTED
+    limit = _MAX_RESIDUAL
     if residual > limit:
         terms = float(np.linalg.norm(abs(matrix) @ np.abs(values) + np.abs(right))) / size
         limit = max(limit, min(_ROUNDING * terms, _MOST_ROUNDING))

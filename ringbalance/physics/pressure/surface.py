@@ -39,6 +39,16 @@ _NEAREST = 1e-3
 """Gap to a wall, in mean depths, at which the search gives up: the surface wants to cross the wall."""
 
 
+_DRY = Status(
+    code=StatusCode.NO_RING,
+    text="the free surface would run dry on the outer wall: raise the speed or the fill ratio",
+)
+_SPILLS = Status(
+    code=StatusCode.NO_RING,
+    text="the free surface would pass the inner radius: raise the speed or lower the fill ratio",
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _FoundSurface:
     """A mesh whose free surface has constant pressure and holds the given volume."""
@@ -74,20 +84,20 @@ def solve_with_gravity(
     Raises: ValueError: a fill ratio outside (0, 1].
     Source: quasi-static balance, Eq. 9 of the liquid-ring paper with gravity.
     """
-    found = _find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
-    if not found.status.ok:
+    surface = _find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
+    if not surface.status.ok:
         return PressureSolution(
-            chamber=found.chamber,
-            basis=found.basis,
-            pressure=np.zeros(found.chamber.grid.size),
-            surface_gradient=np.zeros(found.chamber.grid[0].shape),
-            status=found.status,
-            statistics=found.statistics,
+            chamber=surface.chamber,
+            basis=surface.basis,
+            pressure=np.zeros(surface.chamber.grid.size),
+            surface_gradient=np.zeros(surface.chamber.grid[0].shape),
+            status=surface.status,
+            statistics=surface.statistics,
         )
-    solution = solve_pressure(chamber=found.chamber, problem=liquid.problem(), basis=found.basis)
+    solution = solve_pressure(chamber=surface.chamber, problem=liquid.problem(), basis=surface.basis)
     mismatch = {"surface_flux_mismatch": surface_flux_mismatch(solution=solution, liquid=liquid)}
-    extra = {**solution.statistics.extra, **found.statistics.extra, **mismatch}
-    steps = found.statistics.iterations
+    extra = {**solution.statistics.extra, **surface.statistics.extra, **mismatch}
+    steps = surface.statistics.iterations
     return replace(solution, statistics=replace(solution.statistics, iterations=steps, extra=extra))
 
 
@@ -110,19 +120,37 @@ def _find_surface(
     if not 0 < fill_ratio <= 1:
         raise ValueError("fill_ratio must lie within (0, 1] to search a surface")
     concentric = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
-    status, radius = _no_ring(liquid, concentric), concentric if start is None else start
-    first = chamber = chamber_mesh(disc=disc, surface_radius=radius if status.ok else concentric, cells=cells)
+    status, across = Status(), float(np.linalg.norm(liquid.gravity[:2]))
+    lowest = float(np.sqrt(across / concentric))
+    if abs(liquid.angular_velocity) <= lowest:
+        status = Status(
+            code=StatusCode.NO_RING,
+            text=f"gravity across the shaft exceeds the centrifugal force at {1e3 * concentric:.4g} mm: "
+            f"no ring forms; turn faster than {lowest:.4g} rad/s ({lowest * 30 / np.pi:.4g} rpm)",
+        )
+    radius = start if status.ok and start is not None else concentric
+    first = chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
     unmoved = basis = quadratic_basis(chamber.mesh)
     depth = disc.outer_radius - float(np.mean(first.surface_radius))
-    target = _target(disc, fill_ratio, len(cells))
+    # Area or volume in units of the mesh.
+    full = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
+    target = fill_ratio * full / disc.outer_radius**2
+    target = target if len(cells) == 2 else target * disc.axial_width / disc.outer_radius
     move, before, steps = np.inf, np.inf, 0
     while steps < _MAX_STEPS and status.ok and not _settled(move, before):
-        wanted = _wanted_move(chamber, basis, liquid, target)
-        radius = chamber.surface_radius + wanted * _damping(disc, chamber.surface_radius, wanted)
-        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+        step, radius = _newton_step(chamber, basis, liquid, target), chamber.surface_radius
+        # Every node stays off the outer wall and off the plates' inner edge.
+        room = np.where(step > 0, disc.outer_radius - radius, radius - max(disc.plate_thickness, 0.0))
+        with np.errstate(divide="ignore"):
+            damping = float(min(1.0, _SAFE_SHARE * np.min(room / np.abs(step))))
+        chamber = chamber_mesh(disc=disc, surface_radius=radius + step * damping, cells=cells)
         basis = quadratic_basis(chamber.mesh)
-        move, before, steps = float(np.abs(wanted).max()) / depth, move, steps + 1
-        status = _near_walls(disc, chamber.surface_radius, depth)
+        move, before, steps = float(np.abs(step).max()) / depth, move, steps + 1
+        if disc.outer_radius - float(chamber.surface_radius.max()) < _NEAREST * depth:
+            status = _DRY
+        # A surface that ends outside the inner radius may pass it on the way, so there is some room below.
+        elif float(chamber.surface_radius.min()) < max(disc.inner_radius / 2, 1.001 * disc.plate_thickness):
+            status = _SPILLS
     if status.ok and not _settled(move, before):
         status = Status(
             code=StatusCode.NOT_CONVERGED,
@@ -164,26 +192,7 @@ def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid)
     return float(np.sqrt(np.sum(surface.weights * difference**2) / np.sum(surface.weights * force**2)))
 
 
-def _target(disc: Disc, fill_ratio: float, dimension: int) -> float:
-    """Area or volume in units of the mesh."""
-    area = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius)) / disc.outer_radius**2
-    return area if dimension == 2 else area * disc.axial_width / disc.outer_radius
-
-
-def _no_ring(liquid: RotatingLiquid, radius: float) -> Status:
-    """Why there is no ring, where that is known without a search."""
-    across = float(np.linalg.norm(liquid.gravity[:2]))
-    lowest = float(np.sqrt(across / radius))
-    if abs(liquid.angular_velocity) <= lowest:
-        return Status(
-            code=StatusCode.NO_RING,
-            text=f"gravity across the shaft exceeds the centrifugal force at {1e3 * radius:.4g} mm: "
-            f"no ring forms; turn faster than {lowest:.4g} rad/s ({lowest * 30 / np.pi:.4g} rpm)",
-        )
-    return Status()
-
-
-def _wanted_move(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float) -> FloatArray:
+def _newton_step(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float) -> FloatArray:
     """Radial move of every surface node, m."""
     unit = chamber.length_scale
     # With the force given on the whole boundary the pressure is free by a constant: one node holds it.
@@ -199,13 +208,6 @@ def _wanted_move(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, targe
     return np.asarray((level - pressure[chamber.grid[0]]) / radial)
 
 
-def _damping(disc: Disc, radius: FloatArray, move: FloatArray) -> float:
-    """Share of a step that keeps every node off the outer wall and off the plates' inner edge."""
-    room = np.where(move > 0, disc.outer_radius - radius, radius - max(disc.plate_thickness, 0.0))
-    with np.errstate(divide="ignore"):
-        return float(min(1.0, _SAFE_SHARE * np.min(room / np.abs(move))))
-
-
 def _hold_volume(disc: Disc, chamber: ChamberMesh, basis: Any, target: float) -> tuple[ChamberMesh, Any]:
     """Take the last rounding out of the volume by equal moves of all nodes."""
     for _ in range(3):
@@ -216,22 +218,3 @@ def _hold_volume(disc: Disc, chamber: ChamberMesh, basis: Any, target: float) ->
         chamber = chamber_mesh(disc=disc, surface_radius=chamber.surface_radius + move, cells=chamber.cells)
         basis = quadratic_basis(chamber.mesh)
     return chamber, basis
-
-
-_DRY = Status(
-    code=StatusCode.NO_RING,
-    text="the free surface would run dry on the outer wall: raise the speed or the fill ratio",
-)
-_SPILLS = Status(
-    code=StatusCode.NO_RING,
-    text="the free surface would pass the inner radius: raise the speed or lower the fill ratio",
-)
-
-
-def _near_walls(disc: Disc, radius: FloatArray, depth: float) -> Status:
-    if disc.outer_radius - float(radius.max()) < _NEAREST * depth:
-        return _DRY
-    # A surface that ends outside the inner radius may pass it on the way, so there is some room below.
-    if float(radius.min()) < max(disc.inner_radius / 2, 1.001 * disc.plate_thickness):
-        return _SPILLS
-    return Status()

@@ -1,4 +1,4 @@
-"""How deep the liquid over a port must be to keep the gas out of it."""
+"""Depth of the liquid over a port that keeps the gas out of it."""
 
 from __future__ import annotations
 
@@ -11,41 +11,10 @@ import numpy.typing as npt
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-_POINT_SINK: Final = 1.25 / (2 * math.pi**2) ** 0.2
+_POINT_SINK_FACTOR: Final = 1.25 / (2 * math.pi**2) ** 0.2
 """0.6884; Lubin and Springer print 0.69."""
 _MEAN_OF_LAYER: Final = 0.75
-"""What the draining of the layer itself, 1/2, and its mean in place of its edge, 1/4, take off ln(R/r)."""
-
-
-def _point_sink_depth(*, flow_rate: npt.ArrayLike, acceleration: float) -> FloatArray:
-    """Depth over a point in a flat wall at which gas reaches it, h = 0.6884 (Q^2/g_c)^(1/5), m.
-
-    Bernoulli's equation from the surface at rest to the axis of a point sink,
-    h = y + [Q/(2 pi y^2)]^2/(2 g_c), has a solution y only for h at or above its minimum, which lies at
-    y^5 = Q^2/(2 pi^2 g_c).
-    Args: `flow_rate`: Q, m^3/s, any shape. `acceleration`: g_c towards the port, m/s^2.
-    Range: inviscid liquid without swirl about the port's axis. A bathtub vortex draws gas from deeper; the
-        rotation of a disc makes none, because its axis lies in the surface.
-    Source: derived; the same power and factor as Lubin and Springer, "The formation of a dip on the surface
-        of a liquid draining from a tank", J. Fluid Mech. 29 (1967) 385, who found it in experiments.
-    """
-    rate = np.asarray(flow_rate, dtype=np.float64)
-    return np.asarray(_POINT_SINK * (rate**2 / acceleration) ** 0.2)
-
-
-def _rim_depth(*, flow_rate: npt.ArrayLike, acceleration: float, bore: float) -> FloatArray:
-    """Depth that lets a flow over the rim of a port as over a weir, h = (3/2) [Q/(pi d sqrt(g_c))]^(2/3), m.
-
-    The flow over a rim of length pi d is at most that at critical depth 2 h/3,
-    Q = pi d (2/3)^1.5 sqrt(g_c) h^1.5. Of a deeper layer more would fall into the port than the tube takes:
-    it stays drowned.
-    Args: as `_point_sink_depth`; `bore`: d of the round port, m.
-    Source: the broad-crested weir, bent into a circle. That the level over an outlet which lets gas in
-        follows from the flow alone, and that such a model bounds the level over one that runs full: abstract
-        of Proc. IMechE 198 (1984), doi:10.1243/PIME_PROC_1984_198_016_02.
-    """
-    width = np.asarray(flow_rate, dtype=np.float64) / (math.pi * bore * np.sqrt(acceleration))
-    return np.asarray(1.5 * width ** (2 / 3))
+"""Reduction of ln(R/r) by the draining of the layer, 1/2, and by its mean in place of its edge, 1/4."""
 
 
 def _draw_down_depth(
@@ -59,26 +28,40 @@ def _draw_down_depth(
 ) -> FloatArray:
     """Mean depth of a layer over a port at which gas enters it, m.
 
-    Near the port h is the smaller one of `_point_sink_depth` and `_rim_depth`, each of which suffices; they
-    cross at u = 1.2 sqrt(g_c d), so that wide ports follow the rim and narrow ones the sink. Around it the
-    liquid comes as a viscous layer of depth y on the wall, Q(s) = 2 pi s (g_c/(3 nu)) y^3 dy/ds. With
-    Q(s) = Q (1 - s^2/R^2), as the whole layer drains, from s = r = max(h, d/2) on
+    Near the port h is the smaller of two depths, each of which suffices; they cross at u = 1.2 sqrt(g_c d),
+    so that narrow ports follow the first and wide ones the second:
+
+    - over a point sink, h = 0.6884 (Q^2/g_c)^(1/5): Bernoulli's equation from the surface at rest to its
+      axis, h = y + [Q/(2 pi y^2)]^2/(2 g_c), has a solution y only above this h, at y^5 = Q^2/(2 pi^2 g_c);
+    - over the rim as over a weir, h = (3/2) [Q/(pi d sqrt(g_c))]^(2/3), critical depth 2 h/3 along pi d: of a
+      deeper layer more would fall into the port than the tube takes, and it stays drowned.
+
+    Around it the liquid comes as a viscous layer of depth y on the wall,
+    Q(s) = 2 pi s (g_c/(3 nu)) y^3 dy/ds. With Q(s) = Q (1 - s^2/R^2), as the whole layer drains, from
+    s = r = max(h, d/2) on
     y^4 = h^4 + (6 nu Q/(pi g_c)) [ln(s/r) - s^2/(2 R^2)], whose mean over the wall is
     H = (h^4 + (6 nu Q/(pi g_c)) [ln(R/r) - 3/4])^(1/4).
-    Args: as `_rim_depth`; `kinematic_viscosity`: nu, m^2/s. `feed_radius`: R, of the circle with the wall's
+    Args: `flow_rate`: Q, m^3/s, any shape. `acceleration`: g_c towards the port, m/s^2. `bore`: d of the
+        round port, m. `kinematic_viscosity`: nu, m^2/s. `feed_radius`: R, of the circle with the wall's
         area, m; needed with a viscosity. `below`: liquid under the port, c, which makes the layer y + c deep.
     Raises: ValueError: an acceleration that is not positive and finite.
     Range: a port in the middle of its wall; a laminar layer, thin against R. Of a turbulent one, which water
-        can form, friction is larger and its share of the depth still below a hundredth.
-    Source: derived: lubrication theory for the layer.
+        can form, friction is larger and its share of the depth still below a hundredth. The sink is inviscid
+        and without swirl about the port's axis. A bathtub vortex draws gas from deeper; the rotation of a
+        disc makes none, because its axis lies in the surface.
+    Source: derived; the sink's power and factor are those of Lubin and Springer, "The formation of a dip on
+        the surface of a liquid draining from a tank", J. Fluid Mech. 29 (1967) 385, who found it in
+        experiments; the rim is the broad-crested weir, bent into a circle: that the level over an outlet
+        which lets gas in follows from the flow alone, and that such a model bounds the level over one that
+        runs full, says the abstract of Proc. IMechE 198 (1984), doi:10.1243/PIME_PROC_1984_198_016_02; the
+        layer is lubrication theory.
     """
     if not np.all((np.asarray(acceleration) > 0) & np.isfinite(acceleration)):
         raise ValueError("acceleration must be positive and finite: a disc at rest holds no liquid")
     rate = np.asarray(flow_rate, dtype=np.float64)
-    h = np.minimum(
-        _point_sink_depth(flow_rate=rate, acceleration=acceleration),
-        _rim_depth(flow_rate=rate, acceleration=acceleration, bore=bore),
-    )
+    sink = np.asarray(_POINT_SINK_FACTOR * (rate**2 / acceleration) ** 0.2)
+    rim = np.asarray(1.5 * (rate / (math.pi * bore * np.sqrt(acceleration))) ** (2 / 3))
+    h = np.minimum(sink, rim)
     if np.all(np.asarray(kinematic_viscosity) == 0):
         return h
     way = np.maximum(np.log(feed_radius / np.maximum(h, bore / 2)) - _MEAN_OF_LAYER, 0.0)

@@ -17,7 +17,7 @@ from ringbalance.scene.arrays import FloatArray, clipped
 STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
 """Critical Re without rotation: the recalled formula at its lower end, R_Om = 28, about 2303."""
 _TURBULENT_JOIN: Final = 500.0
-_EQUAL_FORCE: Final = (1.0, 0.25)
+_CURVED_RATIOS: Final = (1.0, 0.25)
 """T of the curved tube that is like the turning one, over Kt: by equal forces, and by equal gradients."""
 
 
@@ -45,7 +45,7 @@ def turbulent_ratio_uncertainty(*, reynolds: npt.ArrayLike, rotation_reynolds: n
     """
     kt = np.asarray(rotation_reynolds, dtype=np.float64) ** 2 / np.asarray(reynolds, dtype=np.float64)
     ratio = turbulent_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
-    bends = [_curved_friction_ratio(curvature_number=share * kt) for share in _EQUAL_FORCE]
+    bends = [_curved_friction_ratio(curvature_number=share * kt) for share in _CURVED_RATIOS]
     return np.asarray(np.max(np.abs([ratio - other for other in (np.ones_like(kt), *bends)]), axis=0))
 
 
@@ -148,23 +148,18 @@ def friction_uncertainty(
     smooth = friction_factor(reynolds=re, relative_roughness=0.0, **shape)
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio, sharpness=6.0)
     grain = re * np.sqrt(f / 8) * relative_roughness
+    # The turbulent branch without its onset term; below Re = 1000 its logarithm changes sign.
+    onset = _log_power(clipped(re, 1000.0, 1e12), relative_roughness)
+    turbulent = 8 * np.asarray(turbulent_ratio) * onset**-0.125
+    # Where rotation has raised the laminar branch above the turbulent one there is no jump to be early or
+    # late for: what was measured in rotating ducts lies at the laminar branch or above it.
+    branch_gap = np.maximum(turbulent - 64 * np.asarray(laminar_ratio, dtype=np.float64) / re, 0.0)
     parts = (
         (0.01 + 0.035 * turned) * f,
-        4 * turned * (1 - turned) * _branch_gap(re, relative_roughness, laminar_ratio, turbulent_ratio),
+        4 * turned * (1 - turned) * branch_gap,
         turned * (f - smooth) * np.exp(-((grain / 35) ** 2)),
     )
     return np.asarray(np.sqrt(sum(p**2 for p in parts)), dtype=np.float64)
-
-
-def _branch_gap(
-    re: FloatArray, relative_roughness: float, laminar_ratio: npt.ArrayLike, turbulent_ratio: npt.ArrayLike
-) -> FloatArray:
-    # The turbulent branch without its onset term; below Re = 1000 its logarithm changes sign.
-    bounded = clipped(re, 1000.0, 1e12)
-    turbulent = 8 * np.asarray(turbulent_ratio) * _log_power(bounded, relative_roughness) ** -0.125
-    # Where rotation has raised the laminar branch above the turbulent one there is no jump to be early or
-    # late for: what was measured in rotating ducts lies at the laminar branch or above it.
-    return np.maximum(turbulent - 64 * np.asarray(laminar_ratio, dtype=np.float64) / re, 0.0)
 
 
 def turbulent_share(

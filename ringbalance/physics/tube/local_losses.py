@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Final
 
 import numpy as np
@@ -39,12 +39,12 @@ _TURBULENT_KINETIC_FACTOR: Final = 1.06
 _CREEPING: Final = 6 * np.pi
 _OTHER_ENTRANCE: Final = 0.15
 """Spread of the laminar loss of an entrance that is not sharp: published excesses run from 0.2 to 0.33."""
-_SCALE, _LIMIT = 5.0, 2000.0
-_DOMAIN = 1e-3
-"""Relative: reservoir and tube are cut off at a distance, the edge is resolved down to 1e-4 of the bore."""
+_REYNOLDS_SCALE, _LARGEST_REYNOLDS = 5.0, 2000.0
+_DOMAIN_ERROR = 1e-3
+"""Relative error of K: reservoir and tube are cut off at a distance, the edge is resolved to 1e-4 d."""
 _BEYOND_TABLE = 0.3
 """Expanded uncertainty (95 %) of K added above the table, where steady laminar flow is not to be expected."""
-_FULL: Final = 2500.0
+_FULL_REYNOLDS: Final = 2500.0
 """Re at which it is whole, rising from the end of the table on: errors of k, a share of it, do not step."""
 
 
@@ -89,27 +89,33 @@ def _end_value(end: str, reynolds: npt.ArrayLike) -> FloatArray:
     re = np.asarray(reynolds, dtype=np.float64)
     if not (np.all(re > 0.0) and np.all(np.isfinite(re))):
         raise ValueError("reynolds must be finite and above zero")
-    table, inside = _end_table(end), np.minimum(re, _LIMIT)
-    grown = 1 + inside / _SCALE
+    table, inside = _end_table(end), np.minimum(re, _LARGEST_REYNOLDS)
+    grown = 1 + inside / _REYNOLDS_SCALE
     return np.asarray(table.scaled(np.log(grown)) * grown**table.power / inside)
 
 
 def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
     re, value, table = np.asarray(reynolds, dtype=np.float64), _end_value(end, reynolds), _end_table(end)
-    inside = np.minimum(re, _LIMIT)
-    a = np.log1p(inside / _SCALE)
+    inside = np.minimum(re, _LARGEST_REYNOLDS)
+    a = np.log1p(inside / _REYNOLDS_SCALE)
     uncertainty_95 = np.interp(a, table.nodes, table.numerical) + table.interpolation_error * np.exp(a)
-    beyond, risen = re > _LIMIT, clipped((re - _LIMIT) / (_FULL - _LIMIT), 0.0, 1.0)
+    beyond, risen = (
+        re > _LARGEST_REYNOLDS,
+        clipped((re - _LARGEST_REYNOLDS) / (_FULL_REYNOLDS - _LARGEST_REYNOLDS), 0.0, 1.0),
+    )
     status = Status()
     if np.any(beyond):
         text = (
-            f"above Re = {_LIMIT:.0f} the value there is kept; use the turbulent loss where flow is turbulent"
+            f"above Re = {_LARGEST_REYNOLDS:.0f} the value there is kept; use the turbulent loss where flow "
+            "is turbulent"
         )
         status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
     return Estimate(
         value=value,
         uncertainty=np.asarray(
-            uncertainty_95 / inside + _DOMAIN * np.abs(value) + _BEYOND_TABLE * risen**2 * (3 - 2 * risen),
+            uncertainty_95 / inside
+            + _DOMAIN_ERROR * np.abs(value)
+            + _BEYOND_TABLE * risen**2 * (3 - 2 * risen),
             dtype=np.float64,
         ),
         status=status,
@@ -160,11 +166,7 @@ def _laminar_kinetic_factor(friction_ratio: FloatArray) -> FloatArray:
     return np.asarray(1.2 + 0.8 * friction_ratio**-1.5)
 
 
-def _rounded(bore: float, radius: float) -> float:
-    return float(entrance_rounded(Di=bore, rc=radius, method="Rennels"))
-
-
-_ROUNDED: Final = np.vectorize(_rounded, otypes=[np.float64])
+_ROUNDED_ENTRANCE: Final = np.vectorize(partial(entrance_rounded, method="Rennels"), otypes=[np.float64])
 
 
 def _turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
@@ -179,7 +181,7 @@ def _turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
     if tube.entrance == "sharp":
         return float(entrance_sharp(method="Rennels")), 0.08
     if tube.entrance == "rounded":
-        loss: float = plain(_ROUNDED(tube.bore, tube.entrance_radius))
+        loss: float = plain(_ROUNDED_ENTRANCE(tube.bore, tube.entrance_radius))
         return loss, 0.03 + 0.2 * loss
     return float(entrance_distance(Di=tube.bore, method="Crane")), 0.3
 
@@ -246,7 +248,7 @@ def exit_uncertainty(
 _BEND_UNCERTAINTY: Final = 0.25
 """Expanded uncertainty (95 %) of a turbulent bend's loss, relative: the spread of the published methods."""
 _LAMINAR_BEND_UNCERTAINTY: Final = 0.6
-"""The same of what a laminar bend adds at rest: for shapes other than the one that was computed."""
+"""Expanded uncertainty (95 %) of a laminar bend's loss at rest, relative: one shape was computed."""
 _LARGEST_EXCESS: Final = 1.25
 """K_0, for 90 degrees and r = 2 d."""
 _HALF_WAY_DEAN: Final = 28.0

@@ -6,7 +6,7 @@ what their sources state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -40,7 +40,7 @@ from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
 
 INPUT_PART: Final = "input: "
-"""What the names of parts by inputs begin with."""
+"""Prefix of the names of parts by inputs."""
 MODEL_CAUSES: Final[Mapping[str, str]] = {
     "friction correlation": "friction",
     "rotation model": "rotation",
@@ -77,10 +77,10 @@ _TERMS: Final = {**MODEL_CAUSES, **{cause: term for cause, (term, _) in BUILT_CA
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
-_LARGEST_ERROR: Final = 0.5
-"""Of a constant k."""
-_LEAST_LEFT: Final = 0.1
-"""Of another k, whatever the errors of its models."""
+_LARGEST_ERROR_SHARE: Final = 0.5
+"""Largest error of a constant k, over k."""
+_LEAST_SHARE: Final = 0.1
+"""Least fraction of another k that the errors of its models leave."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -94,10 +94,17 @@ def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -
     """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
     of squares.
     Args: `state`: the terms of k of the scene's tube at these velocities.
-    Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
+    Returns: Half-width of k by cause, each the shape of `velocity`; "input: fitted" of all inputs that were
+        fitted together. Parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
-    by_input = _input_parts(scene, k_of=lambda designs: corrected_state(designs.scene, velocity[..., None]).k)
+
+    def k_of(designs: Designs) -> FloatArray:
+        return corrected_state(designs.scene, velocity[..., None]).k
+
+    errors = uncertainties(scene, among=TUBE_INPUTS, models=False)
+    effects = by_group(errors, changes_of(scene, k_of, errors)[1])
+    by_input = {f"{INPUT_PART}{name}": effect for name, effect in effects.items()}
     by_model = model_parts(tube=scene.tube, state=state)
     # The scene's joint distribution holds the errors of these causes.
     fitted = fitted_causes(scene)
@@ -145,10 +152,17 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         )
         for bend in tube.bends
     )
+    development = _development_uncertainty(
+        length=tube.length,
+        bore=tube.bore,
+        developing=developing_length(friction_ratio=lam.value, **numbers),
+        rotation_loss=state.terms["rotation"],
+    )
+    laminar = 1 - turbulent_share(reynolds=re, critical_ratio=ratio)
     return {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
-        "rotation entry": _development_part(tube, state, lam.value),
+        "rotation entry": laminar * development,
         "ends": np.sqrt(sum(e**2 for e in ends)),
         # One cause, so those of all bends add up.
         "bends": np.asarray(sum(bends, start=np.zeros(state.reynolds.shape))),
@@ -190,47 +204,22 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
         terms[term] = terms[term] + error
     if "decree" in terms:
         # Below the largest error, and unchanged while it is small against that.
-        largest = _LARGEST_ERROR * state.k
+        largest = _LARGEST_ERROR_SHARE * state.k
         terms["decree"] = terms["decree"] + lumped * (1 + (lumped / largest) ** 4) ** -0.25
-    return _still_a_loss(state, replace(state, terms=terms, bends=bends))
-
-
-def _still_a_loss(right: TubeState, wrong: TubeState) -> TubeState:
-    """The state with errors, all of them made smaller by one factor where they leave too little of k."""
-    most, change = (1 - _LEAST_LEFT) * right.k, right.k - wrong.k
+    # One factor makes all errors smaller where they leave too little of k.
+    wrong = replace(state, terms=terms, bends=bends)
+    most, change = (1 - _LEAST_SHARE) * state.k, state.k - wrong.k
     if not np.any(change > most):
         return wrong
     part = np.where(change > most, most / np.where(change > most, change, 1.0), 1.0)
-    terms = {name: right.terms[name] + part * (wrong.terms[name] - right.terms[name]) for name in right.terms}
-    bends = tuple(one + part * (other - one) for one, other in zip(right.bends, wrong.bends, strict=True))
-    return replace(wrong, terms=terms, bends=bends)
+    terms = {name: term + part * (terms[name] - term) for name, term in state.terms.items()}
+    bends = tuple(k + part * (with_error - k) for k, with_error in zip(state.bends, bends, strict=True))
+    return replace(state, terms=terms, bends=bends)
 
 
 def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:
     """`tube_state` with the scene's corrections of its models."""
     return with_errors(tube=scene.tube, state=tube_state(scene, velocity))
-
-
-def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:
-    """Largest addition to k by laminar flow that is still developing."""
-    laminar = 1 - turbulent_share(reynolds=state.reynolds, critical_ratio=state.critical_ratio)
-    developing = developing_length(
-        reynolds=state.reynolds, rotation_reynolds=state.rotation_reynolds, friction_ratio=friction_ratio
-    )
-    return laminar * _development_uncertainty(
-        length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
-    )
-
-
-def _input_parts(scene: Scene, *, k_of: Callable[[Designs], FloatArray]) -> dict[str, FloatArray]:
-    """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
-
-    Args: `k_of`: k of designs at given velocities, which are held; the last axis runs over the designs.
-    Returns: Half-width of k by input, each without that axis; "input: fitted" of all fitted together.
-    """
-    errors = uncertainties(scene, among=TUBE_INPUTS, models=False)
-    effects = by_group(errors, changes_of(scene, k_of, errors)[1])
-    return {f"{INPUT_PART}{name}": effect for name, effect in effects.items()}
 
 
 def developing_length(
@@ -303,9 +292,9 @@ class TubeLoss:
     k: Estimate
     """k with its expanded uncertainty (95 %), all parts combined as the root of the sum of their squares."""
     terms: Mapping[str, FloatArray]
-    """What k is the sum of: entrance, friction, rotation, bends, exit, extra; or "decree" alone."""
+    """Summands of k: entrance, friction, rotation, bends, exit, extra; or "decree" alone."""
     uncertainty_parts: Mapping[str, FloatArray]
-    """What k's half-width is made of."""
+    """Expanded uncertainties (95 %) of k, by cause."""
     flow_state: npt.NDArray[np.str_]
     """Values of `FlowState`."""
     in_range: BoolArray
@@ -313,7 +302,7 @@ class TubeLoss:
     range_notes: Mapping[str, BoolArray]
     """Why not: a sentence, and where it holds."""
     state: TubeState
-    """Of the same velocities."""
+    """State of the tube at these velocities."""
 
 
 def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
@@ -335,29 +324,24 @@ def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
     parts = uncertainty_parts(scene, velocity=u, state=state)
     notes = range_notes(tube=scene.tube, state=state, velocity=u)
     outside = np.any(np.array([np.zeros(u.shape, dtype=np.bool_), *notes.values()]), axis=0)
+    half_width = np.sqrt(np.asarray(sum(p**2 for p in parts.values()), dtype=np.float64))
+    status = Status()
+    if np.any(outside):
+        text = (
+            "a correlation is used outside its stated range at some velocities: see in_range and range_notes"
+        )
+        status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
     return TubeLoss(
         velocity=u,
         reynolds=state.reynolds,
         rotation_reynolds=float(state.rotation_reynolds),
-        k=_estimate(right, parts, bool(np.any(outside))),
+        k=Estimate(value=right.k, uncertainty=half_width, status=status),
         terms=dict(right.terms),
         uncertainty_parts=dict(parts),
         flow_state=flow_states(state),
         in_range=np.asarray(~outside),
         range_notes=dict(notes),
         state=right,
-    )
-
-
-def _estimate(state: TubeState, parts: Mapping[str, FloatArray], stretched: bool) -> Estimate:
-    half_width = np.sqrt(np.asarray(sum(p**2 for p in parts.values()), dtype=np.float64))
-    if not stretched:
-        return Estimate(value=state.k, uncertainty=half_width)
-    text = "a correlation is used outside its stated range at some velocities: see in_range and range_notes"
-    return Estimate(
-        value=state.k,
-        uncertainty=half_width,
-        status=Status(code=StatusCode.OUT_OF_RANGE, text=text),
     )
 
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +32,7 @@ KL_SCALE, ROTATION_SCALE = 300.0, 20.0
 KL_LIMIT, ROTATION_LIMIT = 1e7, 1e5
 FAST_S, FAST_KL = 2.0, 1.05e7
 _JOIN = (2.5, 4.5)
-_OUTSIDE = 0.3
+_OUTSIDE_UNCERTAINTY = 0.3
 """Relative expanded uncertainty (95 %) far outside the table: no source holds there."""
 _STEADY_KL, _UNSTEADY = 3e6, 0.244
 """Kl up to which flow was found steady, and what is added for flow that is not, relative, per decade above.
@@ -84,9 +83,9 @@ class _FrictionTable:
     interpolation_error: float
     """Largest relative gap to the points solved between nodes for Kl up to 1e6; R up to 1e4 at least."""
     edge_interpolation_error: float
-    """The same, towards the edge of the table."""
+    """Largest relative gap to the points solved towards the edge of the table."""
     rows: tuple[Mapping[str, str], ...]
-    """As they stand in the file."""
+    """Rows of the file."""
 
 
 def _base_at(table: str, a: FloatArray, b: FloatArray) -> FloatArray:
@@ -130,39 +129,40 @@ def _rectangle(table: str, rows: Rows) -> Rectangle:
 
 def _logarithm(rectangle: Rectangle, a: FloatArray, b: FloatArray, *, where: BoolArray) -> FloatArray:
     """ln F at the nearest point of the rectangle; zero without rotation, and where it does not count."""
-    logarithm, here = np.zeros(a.shape), where & (a > 0.0)
-    a, b = clipped(a[here], 0.0, rectangle.a_limit), clipped(b[here], 0.0, rectangle.b_limit)
-    logarithm[here] = _base_at(rectangle.table, a, b) + rectangle.difference.ev(a, b)
+    logarithm, counts = np.zeros(a.shape), where & (a > 0.0)
+    a, b = clipped(a[counts], 0.0, rectangle.a_limit), clipped(b[counts], 0.0, rectangle.b_limit)
+    logarithm[counts] = _base_at(rectangle.table, a, b) + rectangle.difference.ev(a, b)
     return logarithm
 
 
 def _discretisation(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Relative discretisation uncertainty there."""
+    """Relative discretisation uncertainty at the nearest point of the rectangle."""
     return np.asarray(
         rectangle.numerical.ev(clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit))
     )
 
 
-def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
-    """Relative gaps of the interpolant to points solved between the nodes."""
-    a, b, fine, _ = _columns(rows)
-    return np.asarray(np.abs(np.exp(_logarithm(rectangle, a, b, where=a > 0)) / fine - 1), dtype=np.float64)
-
-
 @lru_cache(maxsize=1)
 def _friction_table() -> _FrictionTable:
-    """The table that comes with the package. Returns: The table, read once."""
+    """Read the table that comes with the package, once."""
     rows = packaged_rows("ringbalance.physics", "data", "rotating_friction.csv")
     part = {name: [r for r in rows if r["table"] == name] for name in {row["table"] for row in rows}}
     slow, fast = (_rectangle(name, part[name]) for name in ("slow", "fast"))
-    inner = {"slow_check": float(slow_first(1e6)), "fast_check": float(fast_first(1e4))}
-    gaps = {name: _gap(slow if name == "slow_check" else fast, part[name]) for name in inner}
-    near = {name: np.array([float(r["a"]) <= inner[name] for r in part[name]]) for name in inner}
+    inner_gaps, edge_gaps = [], []
+    # Relative gaps of the interpolants to points solved between the nodes.
+    for name, rectangle, inner in (
+        ("slow_check", slow, float(slow_first(1e6))),
+        ("fast_check", fast, float(fast_first(1e4))),
+    ):
+        a, b, fine, _ = _columns(part[name])
+        gaps = np.abs(np.exp(_logarithm(rectangle, a, b, where=a > 0)) / fine - 1)
+        inner_gaps.append(float(gaps[a <= inner].max()))
+        edge_gaps.append(float(gaps[a > inner].max(initial=0.0)))
     return _FrictionTable(
         slow=slow,
         fast=fast,
-        interpolation_error=max(float(gaps[n][near[n]].max()) for n in inner),
-        edge_interpolation_error=max(float(gaps[n][~near[n]].max(initial=0.0)) for n in inner),
+        interpolation_error=max(inner_gaps),
+        edge_interpolation_error=max(edge_gaps),
         rows=tuple(rows),
     )
 
@@ -180,15 +180,8 @@ def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.Arr
     return np.asarray((kl <= KL_LIMIT) & (rotation <= ROTATION_LIMIT))
 
 
-def _carried_on(slow: FloatArray, fast: FloatArray, kl: FloatArray, rotation: FloatArray) -> Any:
-    """F of both rectangles, beyond the edge with the growth that Ito and Nanbu, and fast rotation, have."""
-    growth = _ito_nanbu_laminar(kl=np.maximum(kl, KL_LIMIT)) / _ito_nanbu_laminar(kl=KL_LIMIT)
-    more = 0.07863 * (np.sqrt(np.maximum(rotation, ROTATION_LIMIT)) - np.sqrt(ROTATION_LIMIT))
-    return np.exp(slow) * growth, np.exp(fast) + more
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Place:
+class _TablePoint:
     """Point at which the two rectangles are looked up: two coordinates in each, and the fast one's weight."""
 
     slow: tuple[FloatArray, FloatArray]
@@ -197,13 +190,13 @@ class _Place:
     weight: FloatArray
 
 
-def _place(re: FloatArray, rotation: FloatArray) -> _Place:
+def _table_point(re: FloatArray, rotation: FloatArray) -> _TablePoint:
     kl, turns = rotation * re, rotation > 0.0
     share = rotation / np.where(rotation + re > 0.0, rotation + re, 1.0)
     # Without rotation 1/S is taken as 0, where F = 1 for any S.
     inverse = np.where(turns, re / np.where(turns, rotation, 1.0), 0.0)
     s = share / np.maximum(1 - share, 1e-300)
-    return _Place(
+    return _TablePoint(
         slow=(slow_first(kl), share),
         fast=(fast_first(rotation), inverse * least_s(rotation)),
         kl=kl,
@@ -223,18 +216,17 @@ def _checked(reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> tuple
 def laminar_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> FloatArray:
     """The value of `rotating_friction_ratio` alone, at half its cost."""
     re, rotation = _checked(reynolds, rotation_reynolds)
-    return _ratio(_place(re, rotation), rotation)
+    return _ratio(_table_point(re, rotation), rotation)
 
 
-def _ratio(at: _Place, rotation: FloatArray) -> FloatArray:
+def _ratio(at: _TablePoint, rotation: FloatArray) -> FloatArray:
     table = _friction_table()
-    slow, fast = _carried_on(
-        _logarithm(table.slow, *at.slow, where=at.weight < 1),
-        _logarithm(table.fast, *at.fast, where=at.weight > 0),
-        at.kl,
-        rotation,
-    )
-    return np.asarray((1 - at.weight) * slow + at.weight * fast)
+    slow = np.exp(_logarithm(table.slow, *at.slow, where=at.weight < 1))
+    fast = np.exp(_logarithm(table.fast, *at.fast, where=at.weight > 0))
+    # Beyond the edge with the growth that Ito and Nanbu, and fast rotation, have.
+    growth = _ito_nanbu_laminar(kl=np.maximum(at.kl, KL_LIMIT)) / _ito_nanbu_laminar(kl=KL_LIMIT)
+    more = 0.07863 * (np.sqrt(np.maximum(rotation, ROTATION_LIMIT)) - np.sqrt(ROTATION_LIMIT))
+    return np.asarray((1 - at.weight) * (slow * growth) + at.weight * (fast + more))
 
 
 def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> Estimate:
@@ -250,18 +242,24 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
     Source: finite elements, `rotating_section`; the limits are exact.
     """
     re, rotation = _checked(reynolds, rotation_reynolds)
-    table, at = _friction_table(), _place(re, rotation)
+    table, at = _friction_table(), _table_point(re, rotation)
     ratio, inside = _ratio(at, rotation), rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
+    # The measured interpolation error rises from its inner to its edge value over half a decade.
+    near_edge = np.maximum(at.kl / 1e6, rotation / 1e4)
+    weight = _smooth_step(np.log10(np.maximum(near_edge, 1e-300)) / 0.5)
+    inner, edge = table.interpolation_error, max(table.edge_interpolation_error, table.interpolation_error)
     uncertainty_95 = (
         (1 - at.weight) * _discretisation(table.slow, *at.slow)
         + at.weight * _discretisation(table.fast, *at.fast)
-        + _interpolation_uncertainty(table, at.kl, rotation)
+        + ((1 - weight) * inner + weight * edge)
     )
     # Both vanish with the excess: without rotation F is 1 exactly.
     relative = uncertainty_95 * np.minimum((ratio - 1) / 0.05, 1.0)
     # Flow that fluctuates may need more than the steady solution.
     decades = np.log10(np.maximum(at.kl, _STEADY_KL) / _STEADY_KL)
-    relative += np.where(rotation > ROTATION_LIMIT, _OUTSIDE, np.minimum(_UNSTEADY * decades, _OUTSIDE))
+    relative += np.where(
+        rotation > ROTATION_LIMIT, _OUTSIDE_UNCERTAINTY, np.minimum(_UNSTEADY * decades, _OUTSIDE_UNCERTAINTY)
+    )
     status = Status()
     if not np.all(inside):
         text = (
@@ -270,14 +268,6 @@ def rotating_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.A
         )
         status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
     return Estimate(value=ratio, uncertainty=np.asarray(ratio * relative), status=status)
-
-
-def _interpolation_uncertainty(table: _FrictionTable, kl: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Measured interpolation error, rising from its inner to its edge value over half a decade."""
-    near_edge = np.maximum(kl / 1e6, rotation / 1e4)
-    weight = _smooth_step(np.log10(np.maximum(near_edge, 1e-300)) / 0.5)
-    inner, edge = table.interpolation_error, max(table.edge_interpolation_error, table.interpolation_error)
-    return np.asarray((1 - weight) * inner + weight * edge, dtype=np.float64)
 
 
 def _ito_nanbu_laminar(*, kl: npt.ArrayLike) -> FloatArray:

@@ -26,9 +26,9 @@ from ringbalance.physics.tube.local_losses import (
 )
 from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Bend, Scene, Tube
+from ringbalance.scene.models import Scene, Tube
 
-_SPREAD: Final = ("friction", "rotation", "extra", "decree")
+_SPREAD_TERMS: Final = ("friction", "rotation", "extra", "decree")
 """Terms that are spread evenly along the path."""
 
 
@@ -49,7 +49,7 @@ class TubeState:
     kinetic_factor: FloatArray
     """alpha."""
     terms: Mapping[str, FloatArray]
-    """What k is the sum of."""
+    """Summands of k."""
 
     @property
     def k(self) -> FloatArray:
@@ -59,7 +59,7 @@ class TubeState:
     @property
     def along(self) -> FloatArray:
         """The part of k that is spread evenly along the path."""
-        spread = (self.terms[name] for name in _SPREAD if name in self.terms)
+        spread = (self.terms[name] for name in _SPREAD_TERMS if name in self.terms)
         return np.asarray(sum(spread), dtype=np.float64)
 
     def upstream_loss(self, share: float) -> FloatArray:
@@ -70,12 +70,12 @@ class TubeState:
         numbers; the crest halves the middle one of an odd number.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
-        along = share * self.along
+        spread = share * self.along
         if "decree" in self.terms:
-            return np.asarray(along)
+            return np.asarray(spread)
         before = len(self.bends) / 2
         bends = sum(min(max(before - i, 0.0), 1.0) * bend for i, bend in enumerate(self.bends))
-        return np.asarray(self.terms["entrance"] + along + bends, dtype=np.float64)
+        return np.asarray(self.terms["entrance"] + spread + bends, dtype=np.float64)
 
 
 def tube_state(scene: Scene, velocity: npt.ArrayLike, *, tube: Tube | None = None) -> TubeState:
@@ -104,8 +104,29 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     re, rotation = (np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
     rough = tube.roughness / tube.bore
     straight = friction_factor(reynolds=re, relative_roughness=rough)
-    turning, laminar, critical = _rotation(re, rotation, rough)
-    bends = _bends(tube, re, rotation, critical, straight)
+    critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
+    laminar = laminar_ratio(reynolds=re, rotation_reynolds=rotation)
+    turning = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=laminar,
+        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation),
+        critical_ratio=critical,
+    )
+    # Bends of one shape are evaluated once. Numbers of many designs are arrays, which have no hash.
+    shapes = [(np.asarray(b.angle).tobytes(), np.asarray(b.radius).tobytes()) for b in tube.bends]
+    losses = {
+        shape: bend_loss(
+            bend=bend,
+            bore=tube.bore,
+            friction_factor=straight,
+            reynolds=re,
+            rotation_reynolds=rotation,
+            critical_ratio=critical,
+        )
+        for shape, bend in dict(zip(shapes, tube.bends, strict=True)).items()
+    }
+    bends = tuple(losses[shape] for shape in shapes)
     if tube.drag_coefficient is not None:
         terms = {"decree": np.zeros(re.shape) + tube.drag_coefficient}
     else:
@@ -127,40 +148,3 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
         terms=terms,
     )
-
-
-def _rotation(
-    re: FloatArray, rotation: FloatArray, rough: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """f with rotation, F, and the critical Re over the straight tube's."""
-    critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
-    laminar = laminar_ratio(reynolds=re, rotation_reynolds=rotation)
-    turning = friction_factor(
-        reynolds=re,
-        relative_roughness=rough,
-        laminar_ratio=laminar,
-        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation),
-        critical_ratio=critical,
-    )
-    return turning, laminar, critical
-
-
-def _bends(
-    tube: Tube, re: FloatArray, rotation: FloatArray, critical: FloatArray, straight: FloatArray
-) -> tuple[FloatArray, ...]:
-    """K of each bend; bends of one shape are evaluated once."""
-
-    def loss(bend: Bend) -> FloatArray:
-        return bend_loss(
-            bend=bend,
-            bore=tube.bore,
-            friction_factor=straight,
-            reynolds=re,
-            rotation_reynolds=rotation,
-            critical_ratio=critical,
-        )
-
-    # Numbers of many designs are arrays, which have no hash.
-    shapes = [(np.asarray(b.angle).tobytes(), np.asarray(b.radius).tobytes()) for b in tube.bends]
-    known = {shape: loss(bend) for shape, bend in dict(zip(shapes, tube.bends, strict=True)).items()}
-    return tuple(known[shape] for shape in shapes)

@@ -37,7 +37,7 @@ SIDES: Mapping[str, tuple[int, int]] = MappingProxyType(
 )
 """Boundaries: axis of the grid (radial, angular, axial), and which of its ends; the last two in 3-D only."""
 _ORDER = MappingProxyType({2: (1, 0), 3: (0, 1, 2)})
-"""In which scikit-fem takes the axes so that its cells come out right-handed in a VTK file."""
+"""Order of the axes for scikit-fem, by dimension: its cells come out right-handed in a VTK file."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,25 +111,22 @@ def chamber_mesh(
     if not np.all((surface > max(disc.plate_thickness, 0.0)) & (surface < disc.outer_radius)):
         raise ValueError("surface_radius must lie inside the outer radius and outside the plate's edge")
     unit, steps, grid = _topology(counts)
-    places = np.stack([each[steps] for each in _positions(disc, surface, counts)]) / disc.outer_radius
+    # Coordinates of the grid, m: axis, radial, angular and, in three dimensions, axial.
+    t, outer = disc.plate_thickness, disc.outer_radius
+    lines = np.ix_(*(np.linspace(0.0, 1.0, 2 * n + 1) for n in counts))
+    face_inner, face_outer = np.sqrt(surface**2 - t**2), np.sqrt(outer**2 - t**2)
+    radius = np.hypot(face_inner + lines[0] * (face_outer - face_inner), t)
+    angle = (2 * lines[1] - 1) * half_angle(disc=disc, radius=radius)
+    axial = [np.broadcast_to(disc.axial_width * (z - 0.5), radius.shape) for z in lines[2:]]
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), *axial])
+    nodes = np.stack([each[steps] for each in points]) / outer
     return ChamberMesh(
-        mesh=type(unit)(places, unit.t, unit.boundaries),
+        mesh=type(unit)(nodes, unit.t, unit.boundaries),
         length_scale=disc.outer_radius,
         cells=counts,
         grid=grid,
         surface_radius=surface,
     )
-
-
-def _positions(disc: Disc, surface: FloatArray, cells: tuple[int, ...]) -> FloatArray:
-    """Coordinates (axis, radial, angular[, axial]) of the grid, m."""
-    t, outer = disc.plate_thickness, disc.outer_radius
-    lines = np.ix_(*(np.linspace(0.0, 1.0, 2 * n + 1) for n in cells))
-    face_inner, face_outer = np.sqrt(surface**2 - t**2), np.sqrt(outer**2 - t**2)
-    radius = np.hypot(face_inner + lines[0] * (face_outer - face_inner), t)
-    angle = (2 * lines[1] - 1) * half_angle(disc=disc, radius=radius)
-    axial = [np.broadcast_to(disc.axial_width * (z - 0.5), radius.shape) for z in lines[2:]]
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), *axial])
 
 
 @lru_cache(maxsize=16)

@@ -34,18 +34,18 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
 
 TOLERANCE: Final = 1e-9
-"""Of a table between its nodes: of the whole volume and of the whole moment."""
+"""Error of a table between its nodes, over the whole volume and over the whole moment."""
 SLOPE_TOLERANCE: Final = 1e-5
-"""The same of the free surface's area and its moment, of the largest."""
-_START: Final = 9
+"""Error of the free surface's area and of its moment, over the largest."""
+_FIRST_NODES: Final = 9
 _EMPTY: Final = 1 - 4 * float(np.finfo(np.float64).eps)
-"""Of the outermost L: a radius is a root, whose square falls short of it by rounding."""
+"""Share of the outermost L that counts as empty: the square of a root falls short of it by rounding."""
 _SLIVER: Final = 1e-3
-"""Of the volume, nearer to empty or full than which a free surface is that of this fill."""
+"""Share of the volume: a free surface nearer to empty or full is that of this fill."""
 _SLIVER_FACTOR: Final = 100.0
-"""On the tolerance of values there: chords of an arc cost most where nothing asks."""
-_ROUNDS: Final = 16
-"""Of halving: where the area jumps or has a kink, at a step in the walls, to 2e-6 of the range."""
+"""Factor on the tolerance of values there: chords of an arc cost most where nothing asks."""
+_HALVINGS: Final = 16
+"""Rounds of halving: where the area jumps or has a kink, at a step in the walls, to 2e-6 of the range."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,12 +59,12 @@ class ChamberTable:
     """V, m^3, its moments along x and y, m^4, and the mean of max(r^2 - L, 0) over the outer wall, m^2; then
     their derivatives by L."""
     wall_area: float
-    """Of the outer wall, m^2."""
+    """Area of the outer wall, m^2."""
     wall_start: float
     """Least r^2 on the outer wall, m^2."""
     error: FloatArray
-    """Of values and slopes between two nodes, shape (8, nodes - 1): difference in the middle of the interval
-    that was halved last, of which a sixteenth (slopes: an eighth) is left where the walls are smooth."""
+    """Error of values and slopes between two nodes, shape (8, nodes - 1): difference in the middle of the
+    interval that was halved last, of which a sixteenth (slopes: an eighth) is left where the walls are smooth."""
 
     @cached_property
     def patches(self) -> tuple[FloatArray, BoolArray]:
@@ -101,8 +101,8 @@ class ChamberTable:
         An empty or a full chamber has none; there, and next to it, that of a nearby fill counts.
         """
         _, slopes = self.at(np.clip(np.asarray(radius, dtype=np.float64) ** 2, *self._ends))
-        area, along, across = slopes[:3]
-        return np.asarray(-2 * area), np.asarray(along / area), np.asarray(across / area)
+        area, moment_x, moment_y = slopes[:3]
+        return np.asarray(-2 * area), np.asarray(moment_x / area), np.asarray(moment_y / area)
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
@@ -132,7 +132,7 @@ class ChamberTable:
 
 _NEWTON_STEPS: Final = 60
 _SETTLED: Final = 1e-15
-"""Of the largest level: a few times the round-off, below which a step changes nothing."""
+"""Step over the largest level, a few times the round-off, below which it changes nothing."""
 
 
 def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:
@@ -154,7 +154,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
     def exact(levels: FloatArray) -> FloatArray:
         return np.asarray(integrals(walls, levels) * scale)
 
-    start = np.linspace(inner, outermost, _START)
+    start = np.linspace(inner, outermost, _FIRST_NODES)
     nodes, columns, error = _refined(start, exact(start), exact)
     columns[:COLUMNS, -1] = 0.0  # no liquid, but for rounding
     return ChamberTable(
@@ -181,10 +181,15 @@ def _refined(
     nodes: FloatArray, columns: FloatArray, exact: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Nodes, columns there, and the differences found in the intervals."""
-    allowed, whole = _allowed(columns)[:, None], columns[0, 0]
+    # Slopes count but for the wall's, which nothing asks for.
+    size, volume = np.abs(columns).max(axis=1), columns[0, 0]
+    moment, turning = size[1:3].max(), size[COLUMNS + 1 : COLUMNS + 3].max()
+    values = TOLERANCE * np.array([size[0], moment, moment, size[3]])
+    slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, np.inf])
+    allowed = np.concatenate([values, slopes])[:, None]
     error = np.full((len(columns), nodes.size - 1), np.inf)
-    for _ in range(_ROUNDS):
-        sliver = (columns[0, 1:] > (1 - _SLIVER) * whole) | (columns[0, :-1] < _SLIVER * whole)
+    for _ in range(_HALVINGS):
+        sliver = (columns[0, 1:] > (1 - _SLIVER) * volume) | (columns[0, :-1] < _SLIVER * volume)
         far = error > np.where(sliver, _SLIVER_FACTOR * allowed, allowed)
         far[COLUMNS:, sliver] = False
         cell = np.flatnonzero(np.any(far, axis=0))
@@ -199,15 +204,6 @@ def _refined(
         columns = np.insert(columns, cell + 1, result, axis=1)
         error = np.insert(error, cell + 1, error[:, cell], axis=1)
     return nodes, columns, error
-
-
-def _allowed(columns: FloatArray) -> FloatArray:
-    """Of values; of slopes, but for the wall's, which nothing asks for."""
-    size = np.abs(columns).max(axis=1)
-    moment, turning = size[1:3].max(), size[COLUMNS + 1 : COLUMNS + 3].max()
-    values = TOLERANCE * np.array([size[0], moment, moment, size[3]])
-    slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, np.inf])
-    return np.concatenate([values, slopes])
 
 
 def _stretched(geometry: ChamberGeometry, stretch: Stretch) -> ChamberTable:
@@ -227,13 +223,13 @@ def _stretched(geometry: ChamberGeometry, stretch: Stretch) -> ChamberTable:
     def slopes(level: FloatArray) -> FloatArray:
         half = table.surface(np.sqrt(level))[0] / (2 * before["axial_width"])
         turned = np.sin(angle * half) / np.sin(half) * moved(level) / np.sqrt(level)
-        one = np.ones_like(level)
-        factors = np.stack([angle * width * one, width * turned, angle * width * turned, one])
+        ones = np.ones_like(level)
+        factors = np.stack([angle * width * ones, width * turned, angle * width * turned, ones])
         return np.asarray(factors * table.at(level)[1])
 
-    nodes, (places, weights) = table.nodes, gauss(4)
+    nodes, (points, weights) = table.nodes, gauss(4)
     steps = np.diff(nodes)
-    within = nodes[:-1, None] + steps[:, None] * places
+    within = nodes[:-1, None] + steps[:, None] * points
     rise = 2 * moved(within) * pull / (2 * np.sqrt(within)) * steps[:, None] * weights
     pieces = (slopes(within) * rise).sum(axis=-1)
     values = -np.append(np.cumsum(pieces[:, ::-1], axis=1)[:, ::-1], np.zeros((COLUMNS, 1)), axis=1)
@@ -248,11 +244,11 @@ def _stretched(geometry: ChamberGeometry, stretch: Stretch) -> ChamberTable:
     )
 
 
-_CLOSE: Final = 1e-8
-"""Of the volume; what is left is put right to first order, but for the slopes by L."""
-_STEPS: Final = 12
-_WET: Final = 1e-7
-"""Of the outer wall, that may look dry by rounding."""
+_VOLUME_ERROR: Final = 1e-8
+"""Error over the volume; the rest is put right to first order, but for the slopes by L."""
+_TILTED_STEPS: Final = 12
+_DRY_SHARE: Final = 1e-7
+"""Share of the outer wall that may look dry by rounding."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -269,8 +265,8 @@ class _TiltedLiquid:
     centroid: FloatArray
     """dU/dV', mean of x over the surface, each part by how much of the liquid enters there, m."""
     closed: BoolArray
-    """Whether the whole outer wall is wet; where it is partly dry without gravity as well, whether the liquid
-    is deeper at its deepest than G."""
+    """True where the whole outer wall is wet; if it is partly dry without gravity as well, where the liquid is
+    deeper at its deepest than G."""
 
 
 @lru_cache(maxsize=16)
@@ -289,19 +285,16 @@ def tilted_liquid(
         at_angles = [_at_angle(table, fill, -length * np.array([np.cos(p), np.sin(p)]), 0.0) for p in angles]
         shift = length**2
     *columns, level = np.stack(at_angles, axis=-1)
+    # Liquid that leaves a part of the outer wall dry without gravity may be deeper than G.
+    plain = table.level_of(fill * table.volume)
+    deep = (plain > table.wall_start) & (np.sqrt(table.nodes[-1]) - np.sqrt(plain) > length)
     return _TiltedLiquid(
         wall_square=columns[3] / table.wall_area,
         surface_square=level - shift,
         moment=columns[1],
         centroid=columns[COLUMNS + 1] / columns[COLUMNS],
-        closed=(columns[COLUMNS + 3] <= -(1 - _WET) * table.wall_area) | _deep(table, fill, length)[:, None],
+        closed=(columns[COLUMNS + 3] <= -(1 - _DRY_SHARE) * table.wall_area) | deep[:, None],
     )
-
-
-def _deep(table: ChamberTable, fills: FloatArray, length: float) -> BoolArray:
-    """True where liquid that leaves a part of the outer wall dry without gravity is deeper than G."""
-    level = table.level_of(fills * table.volume)
-    return np.asarray((level > table.wall_start) & (np.sqrt(table.nodes[-1]) - np.sqrt(level) > length))
 
 
 def _at_angle(table: ChamberTable, fills: FloatArray, centre: FloatArray, slope: float) -> FloatArray:
@@ -313,11 +306,11 @@ def _at_angle(table: ChamberTable, fills: FloatArray, centre: FloatArray, slope:
     # To first order the surface turns about its own centroid.
     level = start - 2 * (slopes[1:3] / slopes[0]).T @ centre + centre @ centre
     reach = float(np.ptp(walls.highest)) if walls.highest.size else 0.0
-    for _ in range(_STEPS):
+    for _ in range(_TILTED_STEPS):
         columns = integrals(walls, level)
         excess = columns[0] - wanted
         step = -excess / np.minimum(columns[COLUMNS], -1e-300)
-        if np.all(np.abs(excess) <= _CLOSE * table.volume):
+        if np.all(np.abs(excess) <= _VOLUME_ERROR * table.volume):
             break
         level = level + np.clip(step, -reach, reach)
     columns[:COLUMNS] += step * columns[COLUMNS:]

@@ -1,4 +1,4 @@
-"""How much a curved wall may differ from its drawing by facets, as far as the mesh alone shows it.
+"""Error of drawing curved walls by facets, as far as the mesh alone shows it.
 
 Where two facets meet at a small angle delta, the wall is taken for a smooth one through their nodes.  An arc
 of angle delta over a facet of width h then stands off by h delta/12 on average where the facet is flat, and
@@ -17,26 +17,26 @@ import numpy as np
 
 from ringbalance.mesh.chamber_table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
 from ringbalance.mesh.wall_integrals import gauss, wall_patches
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 SMOOTH: Final = np.pi / 6
 """Angle between two facets above which their edge is taken for one of the chamber."""
 COARSE: Final = np.radians(65)
-"""The same of a mesh without any curved edge, which may draw a round pillar as a hexagon."""
+"""Angle of that kind in a mesh without any curved edge, which may draw a round pillar as a hexagon."""
 SAFETY: Final = 1.5
-"""On the estimate: an arc drawn by few facets has one edge less than facets."""
+"""Factor on the estimate: an arc drawn by few facets has one edge less than facets."""
 _FLAT: Final = 1 / 12
 _QUADRATIC: Final = 1 / 60
 _STRAIGHT: Final = 1e-6
 """Distance of a middle node from the middle of its edge, over the edge."""
 _MIDDLES: Final = {3: ((0.5, 0), (1, 0.5), (0, 0.5)), 4: ((0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5))}
-"""Of the edges, (u, v)."""
+"""Middles of the edges, (u, v), by number of corners."""
 _ROUND: Final = 1e-4
 """Departure of r^2, over its mean, up to which a wall counts as round about the shaft."""
 _BETTER: Final = 0.01
-"""Of the departure about the shaft, that is left about an axis of the wall's own."""
+"""Departure about a better axis, over that about the shaft, up to which the wall counts as round."""
 _INWARD: Final = -0.05
 """Radial part of a normal below which a wall faces the shaft, and not by rounding."""
 
@@ -46,10 +46,10 @@ class _Faceting:
     """Volumes that the drawing may miss along each smooth edge, all counted as of one sign."""
 
     radius: FloatArray
-    """Of the edge, m."""
+    """Radius of the edge, m."""
     volume: FloatArray
     """m^3."""
-    place: FloatArray
+    x: FloatArray
     """x of the edge, m."""
     wall: float
     """Error of the mean of r^2 over the outer wall, m^2."""
@@ -89,7 +89,14 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     normals = _normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
-    shares = _share(geometry, facets, corners)
+    # Share of h delta by which a wall stands off a facet; quadratic ones of straight edges are flat.
+    shares = np.full(len(facets), _FLAT)
+    if facets.shape[1] > corners:
+        at = geometry.points[facets[:, : 2 * corners]]
+        start, stop = at[:, :corners], np.roll(at[:, :corners], -1, axis=1)
+        sag = np.linalg.norm(at[:, corners:] - (start + stop) / 2, axis=-1)
+        straight = np.all(sag < _STRAIGHT * np.linalg.norm(stop - start, axis=-1), axis=1)
+        shares = np.where(straight, _FLAT, _QUADRATIC)
     bend = np.where(bend < (COARSE if np.all(shares == _FLAT) else SMOOTH), bend, 0.0)
     sides = np.stack([first, second]) // corners
     # A triangle's height is twice its area over the edge; a quadrilateral has two edges across the bend.
@@ -102,7 +109,7 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     return _Faceting(
         radius=radius,
         volume=missed,
-        place=middle[:, 0],
+        x=middle[:, 0],
         wall=float(2 * (radius * missed)[on_wall].sum() / areas[outer].sum()),
         steepest=float(bend.max(initial=0.0)),
     )
@@ -110,22 +117,11 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
 
 def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
     """X_u x X_v at points, shape (patches, points, 3)."""
-    one, zero = np.ones_like(u), np.zeros_like(u)
-    at = [np.stack([one, t, t**2]) for t in (u, v)]
-    slopes = [np.stack([zero, one, 2 * t]) for t in (u, v)]
-    along = np.einsum("nijx,ip,jp->npx", patches, slopes[0], at[1])
-    return np.cross(along, np.einsum("nijx,ip,jp->npx", patches, at[0], slopes[1]))
-
-
-def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatArray:
-    """Share of h delta by which a wall stands off a facet; quadratic ones of straight edges are flat."""
-    if facets.shape[1] == corners:
-        return np.full(len(facets), _FLAT)
-    at = geometry.points[facets[:, : 2 * corners]]
-    start, stop = at[:, :corners], np.roll(at[:, :corners], -1, axis=1)
-    sag = np.linalg.norm(at[:, corners:] - (start + stop) / 2, axis=-1)
-    straight = np.all(sag < _STRAIGHT * np.linalg.norm(stop - start, axis=-1), axis=1)
-    return np.where(straight, _FLAT, _QUADRATIC)
+    ones, zeros = np.ones_like(u), np.zeros_like(u)
+    at = [np.stack([ones, t, t**2]) for t in (u, v)]
+    slopes = [np.stack([zeros, ones, 2 * t]) for t in (u, v)]
+    by_u = np.einsum("nijx,ip,jp->npx", patches, slopes[0], at[1])
+    return np.cross(by_u, np.einsum("nijx,ip,jp->npx", patches, at[0], slopes[1]))
 
 
 def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _DrawingError:
@@ -142,14 +138,14 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _Draw
     missed = SAFETY * walls.volume
     # dV = -(area/2) dL on a concentric surface of area a times `area`.
     moved = 2 * (np.abs(wet - x) @ missed + TOLERANCE * table.volume) / area
-    turned = np.abs(wet * (walls.place - centroid[:, None]) + x * centroid[:, None]) @ missed
-    aside = np.abs(
+    turned = np.abs(wet * (walls.x - centroid[:, None]) + x * centroid[:, None]) @ missed
+    shifted = np.abs(
         [table.surface(np.sqrt(np.maximum(level + s * moved, 0.0)))[1] - centroid for s in (-1, 1)]
     )
     return _DrawingError(
         volume=float(missed.sum()) + TOLERANCE * table.volume,
         moment=turned + TOLERANCE * table.columns[1, 0],
-        centroid=aside.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
+        centroid=shifted.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
         wall_square=wetness * (moved + SAFETY * walls.wall),
         level=moved,
     )
@@ -166,28 +162,29 @@ def axis_beside_shaft(geometry: ChamberGeometry) -> FloatArray | None:
     points = geometry.points[np.unique(geometry.boundaries[OUTER_WALL])]
     square = points[:, 0] ** 2 + points[:, 1] ** 2
     size = float(np.sqrt(square.max()))
-    along = points[:, 2:] / size
-    about_shaft = np.concatenate([np.ones_like(along), along, along**2], axis=1)
-    about_own = np.concatenate([2 * points[:, :2] / size, about_shaft], axis=1)
-    found, own = _fitted(about_own, square)
-    _, shaft = _fitted(about_shaft, square)
-    centre = found[:2] / size
-    encloses = found[2] > 0  # k_0 = R^2 - c^2
-    beside = shaft > _ROUND and own < _BETTER * shaft
-    return np.asarray(centre) if beside and encloses else None
+    z = points[:, 2:] / size
+    about_shaft = np.concatenate([np.ones_like(z), z, z**2], axis=1)
+    about_better = np.concatenate([2 * points[:, :2] / size, about_shaft], axis=1)
+    coefficients, departure = _fitted(about_better, square)
+    _, departure_shaft = _fitted(about_shaft, square)
+    centre = coefficients[:2] / size
+    encloses = coefficients[2] > 0  # k_0 = R^2 - c^2
+    off_shaft = departure_shaft > _ROUND and departure < _BETTER * departure_shaft
+    return np.asarray(centre) if off_shaft and encloses else None
 
 
 def _fitted(terms: FloatArray, square: FloatArray) -> tuple[FloatArray, float]:
     """Coefficients, and the largest departure over the mean."""
-    found = np.linalg.lstsq(terms, square, rcond=None)[0]
-    return np.asarray(found, dtype=np.float64), float(np.abs(terms @ found - square).max() / square.mean())
+    coefficients = np.linalg.lstsq(terms, square, rcond=None)[0]
+    departure = float(np.abs(terms @ coefficients - square).max() / square.mean())
+    return np.asarray(coefficients, dtype=np.float64), departure
 
 
 def inward_share(geometry: ChamberGeometry) -> float:
     """Share of the outer wall's area whose normal, out of the chamber, points towards the shaft."""
     patches, outer = wall_patches(geometry)
-    places, weights = gauss(3)
-    u, v = np.repeat(places, 3), np.tile(places, 3)
+    points, weights = gauss(3)
+    u, v = np.repeat(points, 3), np.tile(points, 3)
     powers = np.einsum("ip,jp->ijp", *(np.stack([np.ones_like(t), t, t**2]) for t in (u, v)))
     at = np.einsum("nijx,ijp->npx", patches[outer], powers)
     normals = _normals_at(patches[outer], u, v)

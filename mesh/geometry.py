@@ -19,7 +19,7 @@ from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
 
 _LAST_STEP: Final = 1e-9
-"""Of the square of the surface's radius, relative to that of the outer wall."""
+"""Last step of the square of the surface's radius, relative to that of the outer wall."""
 
 
 def imported_table(disc: Disc) -> ChamberTable | None:
@@ -141,13 +141,13 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
         alpha = half_angle(disc=disc, radius=np.sqrt(squared))
         return squared * alpha - t * np.sqrt(squared - t**2), alpha
 
-    whole = within(most)[0]
-    target = x * (whole - within(least)[0])
+    full = within(most)[0]
+    target = x * (full - within(least)[0])
     # Newton's steps square the error, so the last of this size leaves rounding alone.
     squared, enough = most - x * (most - least), _LAST_STEP * most
     for _ in range(60):
         area, alpha = within(squared)
-        step = (whole - area - target) / alpha
+        step = (full - area - target) / alpha
         squared = np.minimum(np.maximum(squared + step, least), most)
         if (np.abs(step) <= enough).all():
             break

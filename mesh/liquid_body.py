@@ -34,11 +34,10 @@ _ON: Final = 1e-7
 """Distance over the length of an edge at which a corner counts as on the surface."""
 _FLAT: Final = 1e-9
 """Squared sine of an angle between normals below which walls at a node count as one plane."""
-_FOLDED: Final = 0.05
+_FOLDED_RATIO: Final = 0.05
 """Least Jacobian of a cell after moves, over that before."""
-
 _HALVINGS: Final = 6
-"""Of a move that folds a cell, before it is given up."""
+"""Halvings of a move that folds a cell, before it is given up."""
 
 
 def _level(places: FloatArray, radius: float) -> FloatArray:
@@ -76,8 +75,8 @@ def _tangents(body: Tetrahedra) -> FloatArray:
     spread = np.zeros((len(body.nodes), 3, 3))
     at = np.concatenate([np.eye(3), (np.eye(3) + np.roll(np.eye(3), 1, axis=1)) / 2])
     for face in range(4):
-        here = body.faces[:, face] >= 0
-        nodes = face_nodes(body.cells[here], face)
+        cells = body.faces[:, face] >= 0
+        nodes = face_nodes(body.cells[cells], face)
         tangent = derivatives(body.nodes[nodes], at)
         normal = np.cross(tangent[..., 0], tangent[..., 1])
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -88,13 +87,13 @@ def _tangents(body: Tetrahedra) -> FloatArray:
 
 
 def _move(radius: float, places: FloatArray, tangents: FloatArray) -> FloatArray:
-    """Step along walls to the surface; zero where none leads there."""
-    along = np.einsum("nij,nj->ni", tangents, _outward(places))
-    square = np.einsum("ni,ni->n", along, along)
+    """Step direction walls to the surface; zero where none leads there."""
+    direction = np.einsum("nij,nj->ni", tangents, _outward(places))
+    square = np.einsum("ni,ni->n", direction, direction)
     full = np.einsum("ni,ni->n", _outward(places), _outward(places))
     usable = square > 0.1 * full
     size = np.where(usable, -_level(places, radius) / np.where(usable, square, 1.0), 0.0)
-    return np.asarray(along * size[:, None])
+    return np.asarray(direction * size[:, None])
 
 
 def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
@@ -131,7 +130,7 @@ def _folded(body: Tetrahedra, after: Tetrahedra) -> IntArray:
     moved = (after.nodes != body.nodes).any(axis=1)
     near = np.flatnonzero(moved[body.cells].any(axis=1))
     was, least = (_jacobians(replace(b, cells=b.cells[near])).min(axis=1) for b in (body, after))
-    return np.asarray(near[least < _FOLDED * was])
+    return np.asarray(near[least < _FOLDED_RATIO * was])
 
 
 def _jacobians(body: Tetrahedra) -> FloatArray:
@@ -145,20 +144,20 @@ class _Cuts:
     """Points at which edges cross the surface, for every cell and edge."""
 
     number: IntArray
-    """Of the new node, shape (cells, 6); -1 where the edge does not cross."""
+    """Number of the new node, shape (cells, 6); -1 where the edge does not cross."""
     share: FloatArray
     """Place along the edge from its first corner, 0 to 1."""
     places: FloatArray
-    """Of the new nodes, shape (new, 3)."""
+    """Points of the new nodes, m, shape (new, 3)."""
 
 
 def _cuts(body: Tetrahedra, radius: float, value: FloatArray) -> _Cuts:
     ends = body.cells[:, EDGES]
     crossing = np.sign(value[ends]).prod(axis=2) < 0
     middles = body.cells[:, 4:][crossing]
-    kept, first, inverse = np.unique(middles, return_index=True, return_inverse=True)
+    crossed, first, inverse = np.unique(middles, return_index=True, return_inverse=True)
     first_end, second_end = ends[crossing][first].T
-    curve = body.nodes[np.stack([first_end, second_end, kept])]
+    curve = body.nodes[np.stack([first_end, second_end, crossed])]
     # Share of each edge at which it crosses, by bisection.
     low, high = np.zeros(curve.shape[1]), np.ones(curve.shape[1])
     start = np.sign(_level(curve[0], radius))
@@ -169,11 +168,11 @@ def _cuts(body: Tetrahedra, radius: float, value: FloatArray) -> _Cuts:
     share = (low + high) / 2
     number = np.full(crossing.shape, -1)
     number[crossing] = len(body.nodes) + inverse
-    along = np.zeros(crossing.shape)
+    shares = np.zeros(crossing.shape)
     # Neighbours may list an edge's ends the other way round.
     same = ends[crossing][:, 0] == first_end[inverse]
-    along[crossing] = np.where(same, share[inverse], 1 - share[inverse])
-    return _Cuts(number=number, share=along, places=_on_curve(curve, share))
+    shares[crossing] = np.where(same, share[inverse], 1 - share[inverse])
+    return _Cuts(number=number, share=shares, places=_on_curve(curve, share))
 
 
 def _on_curve(curve: FloatArray, share: FloatArray) -> FloatArray:
@@ -181,7 +180,6 @@ def _on_curve(curve: FloatArray, share: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nk,knx->nx", values, curve))
 
 
-# Corners 0 to 3, then the places on edges 0 to 5 as 4 to 9.
 def _faces_of_part(signs: tuple[int, ...]) -> tuple[IntArray, IntArray]:
     """Local corners of the part of a tetrahedron that is liquid, and its faces as quadrilaterals.
 
@@ -191,11 +189,11 @@ def _faces_of_part(signs: tuple[int, ...]) -> tuple[IntArray, IntArray]:
     for corners in FACES:
         ring: list[int] = []
         for k in range(3):
-            here, after = int(corners[k]), int(corners[(k + 1) % 3])
-            if signs[here] >= 0:
-                ring.append(here)
-            if signs[here] * signs[after] < 0:
-                ring.append(4 + _EDGE_NUMBER[frozenset((here, after))])
+            corner, after = int(corners[k]), int(corners[(k + 1) % 3])
+            if signs[corner] >= 0:
+                ring.append(corner)
+            if signs[corner] * signs[after] < 0:
+                ring.append(4 + _EDGE_NUMBER[frozenset((corner, after))])
         if len(ring) < 3:
             continue
         faces.append(ring)
@@ -220,51 +218,37 @@ _EDGE_NUMBER: Final = {frozenset((int(a), int(b))): k for k, (a, b) in enumerate
 
 
 def _divided(body: Tetrahedra, radius: float, value: FloatArray) -> Tetrahedra:
+    """Parts of the cells outside the surface as one body, with mid-nodes by the map of their cells."""
     cuts = _cuts(body, radius, value)
     signs = np.sign(value)[body.cells[:, :4]].astype(np.int64)
-    parents, barycentric, corners = [], [], []
-    own = np.concatenate([body.cells[:, :4], cuts.number], axis=1)
+    # Corners 0 to 3 of a cell, then the new nodes on its edges 0 to 5 as 4 to 9.
+    numbers = np.concatenate([body.cells[:, :4], cuts.number], axis=1)
+    parent_of, barycentric, corner_of = [], [], []
     for pattern in np.unique(signs, axis=0):
-        here = np.flatnonzero((signs == pattern).all(axis=1))
         if pattern.max() <= 0:
             continue
-        local, which = _parts(tuple(pattern.tolist()), own[here])
-        parents.append(here[which])
-        corners.append(np.take_along_axis(own[here[which]], local, axis=1))
-        barycentric.append(_barycentric(local, cuts.share[here[which]]))
-    parent, where = np.concatenate(parents), np.concatenate(barycentric)
-    return _joined(body, cuts.places, parent, where, np.concatenate(corners))
-
-
-def _parts(signs: tuple[int, ...], corners: IntArray) -> tuple[IntArray, IntArray]:
-    """Tetrahedra of the liquid's part of cells with these signs, and the cell of each."""
-    if min(signs) >= 0:
-        return np.tile(np.arange(4), (len(corners), 1)), np.arange(len(corners))
-    kept, faces = _faces_of_part(signs)
-    local = lowest_first(corners[:, kept], np.searchsorted(kept, faces)).reshape(len(corners), -1, 4)
-    which, part = np.nonzero(local[..., 0] >= 0)
-    return kept[local[which, part]], which
-
-
-def _barycentric(local: IntArray, share: FloatArray) -> FloatArray:
-    """Coordinates in the divided cell of each part's corners, shape (parts, 4, 4)."""
-    result = np.eye(4)[np.minimum(local, 3)]
-    edge = np.maximum(local - 4, 0)
-    along = np.take_along_axis(share, edge, axis=1)[..., None]
-    on_edge = (1 - along) * np.eye(4)[EDGES[edge, 0]] + along * np.eye(4)[EDGES[edge, 1]]
-    return np.where((local > 3)[..., None], on_edge, result)
-
-
-def _joined(
-    body: Tetrahedra, places: FloatArray, parent: IntArray, where: FloatArray, corners: IntArray
-) -> Tetrahedra:
-    """The parts as one body, with mid-nodes by the map of the cells that they come from."""
-    values = shapes(where[:, EDGES].mean(axis=2))
+        rows = np.flatnonzero((signs == pattern).all(axis=1))
+        if pattern.min() >= 0:
+            local, cell = np.tile(np.arange(4), (len(rows), 1)), rows
+        else:
+            used, faces = _faces_of_part(tuple(pattern.tolist()))
+            parts = lowest_first(numbers[rows][:, used], np.searchsorted(used, faces))
+            parts = parts.reshape(len(rows), -1, 4)
+            which, part = np.nonzero(parts[..., 0] >= 0)
+            local, cell = used[parts[which, part]], rows[which]
+        parent_of.append(cell)
+        corner_of.append(np.take_along_axis(numbers[cell], local, axis=1))
+        edge = np.maximum(local - 4, 0)
+        share = np.take_along_axis(cuts.share[cell], edge, axis=1)[..., None]
+        on_edge = (1 - share) * np.eye(4)[EDGES[edge, 0]] + share * np.eye(4)[EDGES[edge, 1]]
+        barycentric.append(np.where((local > 3)[..., None], on_edge, np.eye(4)[np.minimum(local, 3)]))
+    parent, coordinates = np.concatenate(parent_of), np.concatenate(barycentric)
+    values = shapes(coordinates[:, EDGES].mean(axis=2))
     middles = np.einsum("pek,pkx->pex", values, body.nodes[body.cells[parent]], optimize=True)
-    nodes, cells = with_middles(np.concatenate([body.nodes, places]), corners, middles)
+    points = np.concatenate([body.nodes, cuts.places])
+    nodes, cells = with_middles(points, np.concatenate(corner_of), middles)
     # A face of a part lies on that face of the cell on which one coordinate is zero at its three corners.
-    inside = where[:, FACES]
-    lies = (inside == 0).all(axis=2)
+    lies = (coordinates[:, FACES] == 0).all(axis=2)
     named = np.where(lies, body.faces[parent][:, None, :], -1).max(axis=2)
     free = lonely(cells, len(nodes)) & (named < 0)
     return Tetrahedra(

@@ -46,7 +46,7 @@ class Tetrahedra:
     faces: IntArray
     """Number of the boundary that each face of each cell lies on, shape (cells, 4); -1 inside the body."""
     names: tuple[str, ...]
-    """Of the boundaries, by number."""
+    """Names of the boundaries, by number."""
 
 
 def face_nodes(cells: IntArray, face: int) -> IntArray:
@@ -62,7 +62,7 @@ def shapes(barycentric: FloatArray) -> FloatArray:
 
 
 def slopes(barycentric: FloatArray) -> FloatArray:
-    """Their derivatives by the coordinates from the second on, shape (points, functions, dimension).
+    """Derivatives of the shape functions by coordinates from the second on, (points, functions, dimension).
 
     Args: `barycentric`: shape (points, dimension + 1).
     """
@@ -110,13 +110,25 @@ def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
     """The cells of a chamber as quadratic tetrahedra; straight edges get a node in their middle."""
     corners = CORNERS[geometry.kind]
     if corners == 4:
-        cells, middles = geometry.cells[:, :4], _tetrahedron_middles(geometry)
+        cells = geometry.cells[:, :4]
+        if geometry.cells.shape[1] == 10:
+            middles = np.asarray(geometry.points[geometry.cells[:, 4:]])
+        else:
+            middles = np.asarray(geometry.points[geometry.cells[:, EDGES]].mean(axis=2))
     else:
         local = lowest_first(geometry.cells[:, :8], _HEXAHEDRON_FACES).reshape(len(geometry.cells), -1, 4)
         parents, which = np.nonzero(local[..., 0] >= 0)
         local = local[parents, which]
         cells = np.take_along_axis(geometry.cells[parents, :8], local, axis=1)
-        middles = _hexahedron_middles(geometry, parents, local)
+        middle = reference_nodes("hexahedron")[local][:, EDGES].mean(axis=2)
+        middles = np.empty(middle.shape)
+        # 27 points at most: corners' means on edges, faces and in the middle of the reference cell.
+        codes = (2 * middle @ np.array([9, 3, 1])).astype(np.int64)
+        for code, first in zip(*np.unique(codes, return_index=True), strict=True):
+            rows = codes == code
+            values = shape_values(geometry.kind, middle.reshape(-1, 3)[first])
+            parent_nodes = geometry.cells[parents[np.nonzero(rows)[0]]]
+            middles[rows] = np.einsum("k,ekx->ex", values, geometry.points[parent_nodes])
     nodes, numbers = with_middles(geometry.points, cells, middles)
     faces = _named_faces(geometry, cells, corners)
     without_name = lonely(numbers, len(nodes)) & (faces < 0)
@@ -128,26 +140,6 @@ def tetrahedra(geometry: ChamberGeometry) -> Tetrahedra:
 def lonely(cells: IntArray, size: int) -> BoolArray:
     """True for each face that belongs to one cell alone, shape (cells, 4)."""
     return np.asarray(repeats(key_of(cells[:, FACES], size)) == 1)
-
-
-def _tetrahedron_middles(geometry: ChamberGeometry) -> FloatArray:
-    """Places of the six mid-nodes of each cell, shape (cells, 6, 3)."""
-    if geometry.cells.shape[1] == 10:
-        return np.asarray(geometry.points[geometry.cells[:, 4:]])
-    return np.asarray(geometry.points[geometry.cells[:, EDGES]].mean(axis=2))
-
-
-def _hexahedron_middles(geometry: ChamberGeometry, parents: IntArray, local: IntArray) -> FloatArray:
-    middle = reference_nodes("hexahedron")[local][:, EDGES].mean(axis=2)
-    result = np.empty(middle.shape)
-    # 27 places at most: corners' means on edges, faces and in the middle of the reference cell.
-    codes = (2 * middle @ np.array([9, 3, 1])).astype(np.int64)
-    for code, first in zip(*np.unique(codes, return_index=True), strict=True):
-        here = codes == code
-        values = shape_values(geometry.kind, middle.reshape(-1, 3)[first])
-        nodes = geometry.cells[parents[np.nonzero(here)[0]]]
-        result[here] = np.einsum("k,ekx->ex", values, geometry.points[nodes])
-    return result
 
 
 def with_middles(points: FloatArray, cells: IntArray, middles: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -173,11 +165,11 @@ def _named_faces(geometry: ChamberGeometry, cells: IntArray, corners: int) -> In
         triangles += parts
         numbers += [np.full(len(part), number) for part in parts]
     size = len(geometry.points)
-    known = key_of(np.concatenate(triangles), size)
-    order = np.argsort(known)
-    wanted = key_of(cells[:, FACES], size)
-    at = np.minimum(np.searchsorted(known[order], wanted), len(known) - 1)
-    return np.where(known[order][at] == wanted, np.concatenate(numbers)[order][at], -1)
+    keys = key_of(np.concatenate(triangles), size)
+    order = np.argsort(keys)
+    cell_keys = key_of(cells[:, FACES], size)
+    at = np.minimum(np.searchsorted(keys[order], cell_keys), len(keys) - 1)
+    return np.where(keys[order][at] == cell_keys, np.concatenate(numbers)[order][at], -1)
 
 
 def compacted(body: Tetrahedra) -> Tetrahedra:

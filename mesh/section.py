@@ -1,4 +1,4 @@
-"""Where a plane cuts an imported chamber: its liquid as a mesh of straight triangles, its walls as outlines.
+"""Plane sections of an imported chamber: its liquid as a mesh of straight triangles, its walls as outlines.
 
 The liquid's quadratic tetrahedra, each divided into eight straight ones, are cut by a plane across the shaft:
 a plane leaves a tetrahedron in a triangle or a quadrilateral, and a named face in a named line.
@@ -21,8 +21,8 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
-_BESIDE: Final = 1e-4
-"""Of the chamber's width: so far beside the middle the plane lies.  Through nodes, as of a mesh that is
+_PLANE_SHIFT: Final = 1e-4
+"""Distance of the plane from the middle, over the chamber's width.  Through nodes, as of a mesh that is
 symmetric about it, it would lose edges of the surface."""
 _EIGHT: Final = np.array(
     [
@@ -38,10 +38,8 @@ _EIGHT: Final = np.array(
 )
 """Straight parts of a quadratic tetrahedron; each of its faces is divided as in `_FOUR`."""
 _FOUR: Final = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
-
-
-_OFF_NODES: Final = 1e-7
-"""Of the chamber's size: so far beside its place a plane is laid, where it meets no node."""
+_OUTLINE_SHIFT: Final = 1e-7
+"""Shift of an outline's plane, which then meets no node, over the chamber's size."""
 
 
 class NoPlaneWavesError(ValueError):
@@ -70,7 +68,7 @@ def middle_section(
     """
     body = liquid_body(tetrahedra(geometry), surface_radius)
     low, high = geometry.points[:, 2].min(), geometry.points[:, 2].max()
-    height = body.nodes[:, 2] - (low + high) / 2 - _BESIDE * (high - low)
+    height = body.nodes[:, 2] - (low + high) / 2 - _PLANE_SHIFT * (high - low)
     cells, facets = body.cells[:, :4], body.cells[:, FACES].reshape(-1, 3)
     parts = 1
     if not coarse:
@@ -83,10 +81,10 @@ def middle_section(
     ends = np.sort(np.concatenate([triangles.reshape(-1, 2), lines.reshape(-1, 2)]), axis=1)
     edges, numbers = np.unique(ends, axis=0, return_inverse=True)
     share = (height[edges[:, 0]] / (height[edges[:, 0]] - height[edges[:, 1]]))[:, None]
-    places = ((1 - share) * body.nodes[edges[:, 0]] + share * body.nodes[edges[:, 1]])[:, :2]
-    scale = float(np.hypot(*places.T).max())
+    points = ((1 - share) * body.nodes[edges[:, 0]] + share * body.nodes[edges[:, 1]])[:, :2]
+    scale = float(np.hypot(*points.T).max())
     corners, pairs = np.split(numbers.ravel(), [3 * len(triangles)])
-    mesh = MeshTri1(np.ascontiguousarray(places.T / scale), np.ascontiguousarray(corners.reshape(-1, 3).T))
+    mesh = MeshTri1(np.ascontiguousarray(points.T / scale), np.ascontiguousarray(corners.reshape(-1, 3).T))
     by_name = {
         name: pairs.reshape(-1, 2)[names[names >= 0][cut] == number] for number, name in enumerate(body.names)
     }
@@ -108,31 +106,31 @@ def _crossings(simplices: IntArray, above: BoolArray) -> tuple[IntArray, IntArra
         cases[2] = [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]]
     parts, which = [], []
     for number, pieces in cases.items():
-        here = np.flatnonzero(count == number)
-        parts += [corners[here][:, piece] for piece in pieces]
-        which += [here] * len(pieces)
+        cells = np.flatnonzero(count == number)
+        parts += [corners[cells][:, piece] for piece in pieces]
+        which += [cells] * len(pieces)
     return np.concatenate(parts), np.concatenate(which)
 
 
 def _with_boundaries(mesh: Any, by_name: dict[str, IntArray]) -> Any:
     """The mesh with facets named by their ends. Raises: NoPlaneWavesError."""
     size = mesh.p.shape[1]
-    known = mesh.facets[0].astype(np.int64) * size + mesh.facets[1]
-    order = np.argsort(known)
+    keys = mesh.facets[0].astype(np.int64) * size + mesh.facets[1]
+    order = np.argsort(keys)
 
     def facets(pairs: IntArray) -> IntArray:
         low, high = np.sort(pairs.astype(np.int64), axis=1).T
-        return np.asarray(order[np.searchsorted(known[order], low * size + high)], dtype=np.int32)
+        return np.asarray(order[np.searchsorted(keys[order], low * size + high)], dtype=np.int32)
 
     named = {name: facets(pairs) for name, pairs in by_name.items() if len(pairs)}
     rim = mesh.boundary_facets()
-    whole = np.sort(np.concatenate(list(named.values()))) if named else np.empty(0)
+    named_facets = np.sort(np.concatenate(list(named.values()))) if named else np.empty(0)
     surface = (
         mesh.facets[:, named[FREE_SURFACE]] if FREE_SURFACE in named else np.empty((2, 0), dtype=np.int64)
     )
     ends = np.bincount(surface.ravel(), minlength=1)
     if not (
-        np.array_equal(whole, np.sort(rim))
+        np.array_equal(named_facets, np.sort(rim))
         and _pieces(mesh.facets[:, rim]) == 1 == _pieces(surface)
         and (ends == 1).sum() == 2
         and ends.max() == 2
@@ -169,15 +167,15 @@ def _wall_pieces(geometry: ChamberGeometry) -> tuple[IntArray, ...]:
     return np.stack(tips).transpose(0, 2, 1).reshape(-1, 3), middles
 
 
-def outlines(geometry: ChamberGeometry, *, axis: int, place: float = 0.0) -> tuple[FloatArray, ...]:
+def outlines(geometry: ChamberGeometry, *, axis: int, offset: float = 0.0) -> tuple[FloatArray, ...]:
     """Closed outlines of the chamber in a plane.
 
-    Args: `axis`: to which the plane is normal, 0 to 2. `place`: of the plane on it, m.
+    Args: `axis`: normal of the plane, 0 to 2. `offset`: of the plane along it, m.
     Returns: For each outline its corners in order, m, on the two other axes, shape (n, 2); straight from one
         edge of a facet's piece to the next.
     """
     points = geometry.points
-    height = points[:, axis] - place - _OFF_NODES * float(np.ptp(points[:, axis]))
+    height = points[:, axis] - offset - _OUTLINE_SHIFT * float(np.ptp(points[:, axis]))
     crossing = []
     for pieces in _wall_pieces(geometry):
         # Edges from one side of the plane to the other, piece by piece, their nodes in rising order.
@@ -188,18 +186,12 @@ def outlines(geometry: ChamberGeometry, *, axis: int, place: float = 0.0) -> tup
     edges, number = np.unique(crossed, axis=0, return_inverse=True)
     low, high = height[edges].T
     share = (low / (low - high))[:, None]
-    places = (1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]]
-    # Two by two: a plane leaves a piece by one edge for each that it enters by.
-    loops = _loops(number.reshape(-1, 2))
-    return tuple(np.asarray(np.delete(places[loop], axis, axis=1)) for loop in loops)
-
-
-def _loops(pairs: IntArray) -> list[list[int]]:
-    """Closed chains of numbers, each of which stands in two pairs."""
+    corners = (1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]]
+    # A plane leaves a piece by one edge for each that it enters by: each edge has two neighbours.
     neighbours: dict[int, list[int]] = {}
-    for one, other in pairs.tolist():
-        neighbours.setdefault(one, []).append(other)
-        neighbours.setdefault(other, []).append(one)
+    for first, second in number.reshape(-1, 2).tolist():
+        neighbours.setdefault(first, []).append(second)
+        neighbours.setdefault(second, []).append(first)
     loops = []
     while neighbours:
         start, (following, _) = next(iter(neighbours.items()))
@@ -207,8 +199,8 @@ def _loops(pairs: IntArray) -> list[list[int]]:
         while following != start:
             before = loop[-1]
             loop.append(following)
-            one, other = neighbours.pop(following)
-            following = other if one == before else one
+            first, second = neighbours.pop(following)
+            following = second if first == before else first
         del neighbours[start]
-        loops.append(loop)
-    return loops
+        loops.append(np.asarray(np.delete(corners[loop], axis, axis=1)))
+    return tuple(loops)

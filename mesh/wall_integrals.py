@@ -131,12 +131,12 @@ PLAIN_POINTS: Final = 6
 """Gauss points along each side of a patch that no surface crosses."""
 CUT_POINTS: Final = 6
 LONGEST: Final = 1 / 3
-"""Of a patch over its distance from the shaft: 1/|r|^2 then costs 1e-10 with six points."""
+"""Longest side of a patch over its distance from the shaft: 1/|r|^2 then costs 1e-10 with six points."""
 _STEEP: Final = 0.05
 """Least over largest slope of h along the lines on which the surface is looked for."""
 _HALVINGS: Final = 30
 _NEGLIGIBLE: Final = 1e-12
-"""Of the volume: most that a piece of wall may hold whose crossing is not looked for."""
+"""Largest share of the volume in a piece of wall whose crossing is not looked for."""
 COLUMNS: Final = 4
 """Volume, moment along x and along y, and int h dA over the outer wall; then their derivatives by L."""
 
@@ -164,7 +164,7 @@ class Walls:
     slope: float
     """s, m."""
     samples: FloatArray
-    """As `_samples` at the Gauss points, shape (6, n, points); weights included."""
+    """Result of `_samples` at the Gauss points, shape (6, n, points); weights included."""
 
 
 def walls_about(
@@ -204,10 +204,10 @@ def _bernstein(level: FloatArray) -> FloatArray:
 def _plain(patches: FloatArray, outer: BoolArray) -> FloatArray:
     places, weights = gauss(PLAIN_POINTS)
     n = len(patches)
-    along = np.broadcast_to(places, (n, PLAIN_POINTS))
-    across = np.broadcast_to(places, (n, PLAIN_POINTS, PLAIN_POINTS))
-    weight = np.broadcast_to(np.outer(weights, weights), across.shape)
-    return _samples(patches, outer, along, across, weight).reshape(6, n, PLAIN_POINTS**2)
+    v = np.broadcast_to(places, (n, PLAIN_POINTS))
+    u = np.broadcast_to(places, (n, PLAIN_POINTS, PLAIN_POINTS))
+    weight = np.broadcast_to(np.outer(weights, weights), u.shape)
+    return _samples(patches, outer, v, u, weight).reshape(6, n, PLAIN_POINTS**2)
 
 
 def _samples(
@@ -218,16 +218,16 @@ def _samples(
     Args: `v`: shape (n, k). `u`: shape (n, k, l). `weight`: of each point.
     Returns: Shape (6, n, k, l).
     """
-    one = np.ones_like
-    rows, slopes = np.stack([one(v), v, v**2], axis=-1), np.stack([0 * v, one(v), 2 * v], axis=-1)
+    ones = np.ones_like
+    rows, slopes = np.stack([ones(v), v, v**2], axis=-1), np.stack([0 * v, ones(v), 2 * v], axis=-1)
     lines = np.einsum("nijx,nkj->nkxi", patches, rows)
     turned = np.einsum("nijx,nkj->nkxi", patches, slopes)
     c0, c1, c2 = (lines[..., i, None] for i in range(3))
     d0, d1, d2 = (turned[..., i, None] for i in range(3))
     t = u[:, :, None, :]
-    place, along, across = c0 + t * (c1 + t * c2), c1 + 2 * t * c2, d0 + t * (d1 + t * d2)
-    x, y, z = (place[:, :, i] for i in range(3))
-    (ux, uy, uz), (vx, vy, vz) = ([p[:, :, i] for i in range(3)] for p in (along, across))
+    point, by_u, by_v = c0 + t * (c1 + t * c2), c1 + 2 * t * c2, d0 + t * (d1 + t * d2)
+    x, y, z = (point[:, :, i] for i in range(3))
+    (ux, uy, uz), (vx, vy, vz) = ([p[:, :, i] for i in range(3)] for p in (by_u, by_v))
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     square = x**2 + y**2
     area = np.sqrt(nx**2 + ny**2 + nz**2) * outer[:, None, None]
@@ -282,27 +282,28 @@ def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray
     excess = walls.level[patch]
     excess[:, 0, 0] -= levels[number]
     share = np.abs(walls.samples[4]).sum(axis=1)[patch]
-    negligible = _NEGLIGIBLE * _size(walls)
+    # Over the approximate size of the chamber's volume.
+    negligible = _NEGLIGIBLE * float((np.abs(walls.samples[4]).sum(axis=1) * walls.highest).sum())
     for step in range(_HALVINGS + 1):
         if number.size == 0:
             break
         bounds = _bernstein(excess)
-        along, across = _steepness(bounds), _steepness(bounds.transpose(0, 2, 1))
-        turned = across > along
+        steep_u, steep_v = _steepness(bounds), _steepness(bounds.transpose(0, 2, 1))
+        turned = steep_v > steep_u
         patches[turned], excess[turned] = _turned(patches[turned]), _turned(excess[turned])
         dry = np.all(bounds <= 0, axis=(1, 2))
         small = np.ptp(bounds, axis=(1, 2)) * share < negligible
-        whole = ~dry & (np.all(bounds >= 0, axis=(1, 2)) | small | (step == _HALVINGS))
-        graph = ~dry & ~whole & (np.maximum(along, across) >= _STEEP)
+        inside = ~dry & (np.all(bounds >= 0, axis=(1, 2)) | small | (step == _HALVINGS))
+        graph = ~dry & ~inside & (np.maximum(steep_u, steep_v) >= _STEEP)
         values = np.zeros((2 * COLUMNS, number.size))
-        plain = _plain(patches[whole], outer[whole])
-        values[:, whole] = _added(plain, walls.slope, levels[number[whole], None])
+        plain = _plain(patches[inside], outer[inside])
+        values[:, inside] = _added(plain, walls.slope, levels[number[inside], None])
         values[:, graph] = _over_graphs(
             patches[graph], outer[graph], excess[graph], walls.slope, levels[number[graph]]
         )
         for column, value in zip(total, values, strict=True):
             column += np.bincount(number, value, levels.size)
-        left = ~(graph | whole | dry)
+        left = ~(graph | inside | dry)
         # Along the curve that a surface leaves on a wall nothing is gained by halving.
         flat = np.abs(np.diff(bounds[left], axis=1)).max(axis=(1, 2)) < np.abs(
             np.diff(bounds[left], axis=2)
@@ -310,11 +311,6 @@ def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray
         patches, excess = _halved(patches[left], across=flat), _halved(excess[left], across=flat)
         outer, number, share = (np.tile(each[left], 2) for each in (outer, number, share / 2))
     return total
-
-
-def _size(walls: Walls) -> float:
-    """Approximate size of the chamber's volume."""
-    return float((np.abs(walls.samples[4]).sum(axis=1) * walls.highest).sum())
 
 
 def _turned(values: FloatArray) -> FloatArray:
@@ -325,14 +321,14 @@ def _turned(values: FloatArray) -> FloatArray:
 
 
 def _steepness(bounds: FloatArray) -> FloatArray:
-    """Least over largest slope along u; zero where the crossing is no graph over v or has unclear ends."""
+    """Least over largest slope slopes u; zero where the crossing is no graph over v or has unclear ends."""
     rise = np.diff(bounds, axis=1).reshape(len(bounds), -1)
     size = np.abs(rise)
     steep = size.min(axis=1) / np.maximum(size.max(axis=1), 1e-300)
     graph = np.all(rise > 0, axis=1) | np.all(rise < 0, axis=1)
     for edge in (bounds[:, 0], bounds[:, -1]):
-        along = np.diff(edge, axis=1)
-        once = np.all(along > 0, axis=1) | np.all(along < 0, axis=1)
+        slopes = np.diff(edge, axis=1)
+        once = np.all(slopes > 0, axis=1) | np.all(slopes < 0, axis=1)
         graph &= once | np.all(edge >= 0, axis=1) | np.all(edge <= 0, axis=1)
     return np.where(graph, steep, 0.0)
 
@@ -372,7 +368,7 @@ def _root(powers: FloatArray) -> FloatArray:
         low, high = np.where(value < 0, t, low), np.where(value < 0, high, t)
         step = t - value / np.where(rise > 0, rise, 1e-300)
         better = np.where((step > low) & (step < high), step, (low + high) / 2)
-        if np.all(np.abs(better - t) <= _ROOT):
+        if np.all(np.abs(better - t) <= _ROOT_ERROR):
             break
         t = better
     root = np.zeros(first.shape)
@@ -380,7 +376,7 @@ def _root(powers: FloatArray) -> FloatArray:
     return root
 
 
-_ROOT: Final = 1e-12
-"""Of the side of a patch; h vanishes there, so that volumes miss its square."""
+_ROOT_ERROR: Final = 1e-12
+"""Error of a root, over the side of a patch; h vanishes there, so that volumes miss its square."""
 _NEWTON_STEPS: Final = 60
 """Halvings at worst."""

@@ -37,9 +37,9 @@ def test_cells_with_fewer_nodes_give_the_chords_that_they_have(
     """Away from the nodes: straight cells have the columns of their corners, others some of those between."""
     record = disc_chamber(disc, (2, 16, 1))
     fewer = replace(record, kind=kind, cells=record.cells[:, :nodes], boundaries={})
-    (across,) = outlines(fewer, axis=2, place=0.25 * disc.axial_width)
+    (across,) = outlines(fewer, axis=2, offset=0.25 * disc.axial_width)
     coarser = disc_chamber(disc, (2, 8, 1))
-    (chords,) = outlines(coarser, axis=2, place=0.25 * disc.axial_width)
+    (chords,) = outlines(coarser, axis=2, offset=0.25 * disc.axial_width)
     if kind == "hexahedron":
         assert area(across) == pytest.approx(area(chords), rel=1e-6)
     else:
@@ -50,5 +50,5 @@ def test_a_plane_may_cut_a_chamber_twice(disc: Disc) -> None:
     """Across x below the outer wall's ends: both flanks of a half circle, and nothing beyond its rim."""
     half = replace(disc, central_angle=np.pi, chambers=2)
     record = disc_chamber(half, (2, 16, 2))
-    assert len(outlines(record, axis=0, place=0.5 * disc.inner_radius)) == 2
-    assert outlines(record, axis=0, place=1.01 * disc.outer_radius) == ()
+    assert len(outlines(record, axis=0, offset=0.5 * disc.inner_radius)) == 2
+    assert outlines(record, axis=0, offset=1.01 * disc.outer_radius) == ()

@@ -64,7 +64,7 @@ class ChamberTable:
     """Least r^2 on the outer wall, m^2."""
     error: FloatArray
     """Error of values and slopes between two nodes, shape (8, nodes - 1): difference in the middle of the
-    interval that was halved last, of which a sixteenth (slopes: an eighth) is left where the walls are smooth."""
+    interval that was halved last; smooth walls leave a sixteenth of it (slopes: an eighth)."""
 
     @cached_property
     def patches(self) -> tuple[FloatArray, BoolArray]:
@@ -265,8 +265,8 @@ class _TiltedLiquid:
     centroid: FloatArray
     """dU/dV', mean of x over the surface, each part by how much of the liquid enters there, m."""
     closed: BoolArray
-    """True where the whole outer wall is wet; if it is partly dry without gravity as well, where the liquid is
-    deeper at its deepest than G."""
+    """True where the whole outer wall is wet; if it is partly dry without gravity as well, where the liquid
+    at its deepest is deeper than G."""
 
 
 @lru_cache(maxsize=16)

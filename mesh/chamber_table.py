@@ -23,7 +23,7 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from ringbalance.mesh.wall_integrals import (
     COLUMNS,
-    LONGEST,
+    LONGEST_SIDE_RATIO,
     gauss,
     integrals,
     split_patches,
@@ -69,7 +69,7 @@ class ChamberTable:
     @cached_property
     def patches(self) -> tuple[FloatArray, BoolArray]:
         """The walls, as `wall_patches`, small enough for the integrals."""
-        return split_patches(*wall_patches(self.geometry), longest=LONGEST)
+        return split_patches(*wall_patches(self.geometry), longest=LONGEST_SIDE_RATIO)
 
     @property
     def volume(self) -> float:
@@ -145,7 +145,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
     """Table of a chamber, made when it is first asked for; a stretched one has that of its mesh, moved."""
     if geometry.stretch is not None:
         return _stretched(geometry, geometry.stretch)
-    patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST)
+    patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST_SIDE_RATIO)
     walls = walls_about(patches, outer)
     inner, outermost = _bounds(walls.level)
     wall_area = float(walls.samples[5].sum())

@@ -130,7 +130,7 @@ _SPLITS: Final = 16
 PLAIN_POINTS: Final = 6
 """Gauss points along each side of a patch that no surface crosses."""
 CUT_POINTS: Final = 6
-LONGEST: Final = 1 / 3
+LONGEST_SIDE_RATIO: Final = 1 / 3
 """Longest side of a patch over its distance from the shaft: 1/|r|^2 then costs 1e-10 with six points."""
 _STEEP: Final = 0.05
 """Least over largest slope of h along the lines on which the surface is looked for."""

@@ -193,14 +193,14 @@ def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tup
 def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     """Fill at which gas enters the port."""
 
-    def drawn(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
+    def draws_down_to(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
         part = tube.take(rows)
         scene = part.designs.scene
         driven, opposite = part.level(np.array([fills, top[rows] - fills]))
         flow = part.flow(part.ends(driven, opposite), primed=True, exactly=exactly)
         return drawn_fill(scene, flow_rate=scene.tube.area * flow.velocity)
 
-    return first_gas(tube.designs.scene, drawn, top=top, about=partial(drawn, exactly=False))
+    return first_gas(tube.designs.scene, draws_down_to, top=top, about=partial(draws_down_to, exactly=False))
 
 
 def _stalled_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:

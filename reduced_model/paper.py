@@ -23,7 +23,7 @@ from ringbalance.scene.models import Disc
 
 PAPER_DRAG_COEFFICIENT: Final = 50.0
 """k between the ends of the connecting tube, "about 50" (section 3.2)."""
-PAPER_LAMBDA: Final = 72e-3
+PAPER_LAMBDA_M: Final = 72e-3
 """lambda, m: balancing moment per unit mass of liquid, "72 mm within 0.7 %" (section 5.2)."""
 
 
@@ -176,7 +176,7 @@ def correction_mass(*, disc: Disc, density: float, fill_ratio: npt.ArrayLike) ->
 
 
 def correction_moment(
-    *, real_mass: npt.ArrayLike, imaginary_mass: npt.ArrayLike, moment_per_mass: float = PAPER_LAMBDA
+    *, real_mass: npt.ArrayLike, imaginary_mass: npt.ArrayLike, moment_per_mass: float = PAPER_LAMBDA_M
 ) -> ComplexArray:
     """Correction moment of the disc, U = lambda (m_Re + i m_Im).
 

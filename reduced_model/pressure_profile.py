@@ -211,7 +211,7 @@ def _separated(
         )
 
     first = Places.along(tube=tube, points=points)
-    crest = lowest_place(tube, float(terms.along) * head / scene.liquid.density, scene.rotor.speed**2)
+    crest = lowest_place(tube, float(terms.spread_loss) * head / scene.liquid.density, scene.rotor.speed**2)
     again = 1.0 if discharges_openly(path, ends) else _full_again(first, behind, cavity, crest)
     at = Places.along(tube=tube, points=points, doubled=(crest, again))
     from_top = ends.upstream_pressure() - column_pressure(

@@ -26,11 +26,11 @@ def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
     Raises: ValueError: a disc at rest.
     """
 
-    def drawn(_: IntArray, fills: FloatArray) -> FloatArray:
+    def draws_down_to(_: IntArray, fills: FloatArray) -> FloatArray:
         flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=True)
         return drawn_fill(scene, flow_rate=scene.tube.area * np.maximum(flow.velocity, 0.0))
 
-    return float(first_gas(scene, drawn, top=np.array([scene.disc.max_fill_ratio]))[0])
+    return float(first_gas(scene, draws_down_to, top=np.array([scene.disc.max_fill_ratio]))[0])
 
 
 def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs: bool = False) -> float:

@@ -162,7 +162,7 @@ def _ring_study(scene: Scene) -> Record:
         "limit_m": scene.controller.limit,
         "paper": {
             "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
-            "lambda_m": paper.PAPER_LAMBDA,
+            "lambda_m": paper.PAPER_LAMBDA_M,
             "lambda_spread": papers.LAMBDA_TOLERANCE,
         },
         "operating_point": {

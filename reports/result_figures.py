@@ -66,7 +66,7 @@ def _calibration(result: Any) -> list[Drawing]:
     document = result.to_dict()
     printed = {
         "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
-        "lambda_m": paper.PAPER_LAMBDA,
+        "lambda_m": paper.PAPER_LAMBDA_M,
         "lambda_spread": papers.LAMBDA_TOLERANCE,
     }
     evidence = {"calibration": document, "paper": printed, "verification": []}

@@ -20,7 +20,7 @@ from ringbalance.mesh.geometry import (
 )
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL
+from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL_WAVE_RATIO
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, closed_ring
 from ringbalance.reduced_model.chamber.values import (
     chamber_closed_forms,
@@ -289,7 +289,7 @@ def chamber_status(scene: Scene) -> Status:
         )
     height = _wave_height(scene, fills)
     worst = int(np.argmax(height))
-    if height[worst] <= SMALL:
+    if height[worst] <= SMALL_WAVE_RATIO:
         return Status()
     sector = "" if scene.disc.geometry is None else "in a plain sector of the same opening, "
     return Status(

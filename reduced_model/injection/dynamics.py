@@ -15,8 +15,8 @@ from scipy.interpolate import PchipInterpolator
 
 from ringbalance.physics.gas import (
     HEAT_CAPACITY_RATIO,
-    REFERENCE_PRESSURE,
-    REFERENCE_TEMPERATURE,
+    REFERENCE_PRESSURE_PA,
+    REFERENCE_TEMPERATURE_K,
     VENTED,
     GasLine,
 )
@@ -422,7 +422,7 @@ def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
     plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
     if line is not None:
         plant["line"], plant["temperature"] = True, line.temperature
-        warm = math.sqrt(line.temperature / REFERENCE_TEMPERATURE)
+        warm = math.sqrt(line.temperature / REFERENCE_TEMPERATURE_K)
         plant["critical_ratio"] = line.critical_ratio
-        plant["passing"] = line.conductance * REFERENCE_PRESSURE * warm
+        plant["passing"] = line.conductance * REFERENCE_PRESSURE_PA * warm
         plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO

@@ -178,7 +178,7 @@ def paper_law(scene: AnyScene) -> PaperLaw:
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,
         moment=PaperMoment(
-            moment_per_transferred_mass=paper.PAPER_LAMBDA,
+            moment_per_transferred_mass=paper.PAPER_LAMBDA_M,
             density=scene.liquid.density,
             chamber_volume=volume,
         ),

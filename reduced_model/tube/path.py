@@ -59,7 +59,7 @@ class Places:
         Source: energy balance; at the crest it is alpha and `upstream_loss`.
         """
         entrance = float(state.terms.get("entrance", np.zeros(())))
-        inside = float(state.kinetic_factor) + entrance + float(state.along) * self.share
+        inside = float(state.kinetic_factor) + entrance + float(state.spread_loss) * self.share
         if "decree" not in state.terms:
             for first, second, bend in zip(*_bend_shares(tube), state.bends, strict=True):
                 halves = [
@@ -131,7 +131,7 @@ def crest_head(
     fall = (state.kinetic_factor + state.upstream_loss(crest_span(tube)[1])) * kinetic
     if not lowest:
         return np.asarray(fall)
-    behind = head_behind_crest(tube=tube, along=state.along * kinetic, square=scene.rotor.speed**2)
+    behind = head_behind_crest(tube=tube, along=state.spread_loss * kinetic, square=scene.rotor.speed**2)
     return np.asarray(fall + behind)
 
 

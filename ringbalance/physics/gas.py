@@ -30,9 +30,9 @@ from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.models import Gas, GasProcess, Scene
 from ringbalance.scene.rules.working import AIR_CONSTANT
 
-REFERENCE_PRESSURE: Final = 1e5
+REFERENCE_PRESSURE_PA: Final = 1e5
 """Pressure of the reference atmosphere of ISO 6358, Pa."""
-REFERENCE_TEMPERATURE: Final = 293.15
+REFERENCE_TEMPERATURE_K: Final = 293.15
 """Temperature of the reference atmosphere of ISO 6358, K."""
 HEAT_CAPACITY_RATIO: Final = 1.4
 """gamma of air."""
@@ -103,8 +103,8 @@ class GasLine:
 
     def time_constant(self, *, volume: float) -> float:
         """tau = V/(C p_0) sqrt(T_0/T), s."""
-        warm = math.sqrt(REFERENCE_TEMPERATURE / self.temperature)
-        return volume / (self.conductance * REFERENCE_PRESSURE) * warm
+        warm = math.sqrt(REFERENCE_TEMPERATURE_K / self.temperature)
+        return volume / (self.conductance * REFERENCE_PRESSURE_PA) * warm
 
     def filling_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:
         """Time from ambient to an absolute pressure up to the supply's, s, isothermal."""

@@ -168,7 +168,7 @@ def _lowest(system: SloshingSystem, modes: int) -> FloatArray:
     return ratios[:modes]
 
 
-SMALL: Final = 0.3
+SMALL_WAVE_RATIO: Final = 0.3
 """Displacement of the surface over the depth of the ring up to which waves count as small."""
 FREQUENCY_UNCERTAINTY: Final = 0.06
 """U (95 %), relative, of a natural frequency by linear theory for waves of the height that experiments have.
@@ -342,7 +342,7 @@ def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond:
         )
     share = amplitude / depth
     worst = int(np.argmax(share))
-    if share[worst] > SMALL:
+    if share[worst] > SMALL_WAVE_RATIO:
         return Status(
             code=StatusCode.OUT_OF_RANGE,
             text=(

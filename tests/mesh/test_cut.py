@@ -24,7 +24,13 @@ from ringbalance.mesh.geometry import (
     surface_radius,
     wall_square,
 )
-from ringbalance.mesh.wall_integrals import LONGEST, integrals, split_patches, wall_patches, walls_about
+from ringbalance.mesh.wall_integrals import (
+    LONGEST_SIDE_RATIO,
+    integrals,
+    split_patches,
+    wall_patches,
+    walls_about,
+)
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import STRETCHED, CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
@@ -72,7 +78,7 @@ def in_box(a: float) -> tuple[float, float, float, float]:
 def test_a_box_holds_what_quadrature_says(kind: CellKind) -> None:
     """The integrals' own limit: six Gauss points on graphs, and pieces of 1e-12 of the volume left alone."""
     radii = np.array([0.0201, 0.024, 0.0283, 0.033, 0.0449, 0.0455, 0.048])
-    walls = walls_about(*split_patches(*wall_patches(box(kind=kind)), longest=LONGEST))
+    walls = walls_about(*split_patches(*wall_patches(box(kind=kind)), longest=LONGEST_SIDE_RATIO))
     found = integrals(walls, radii**2)[[0, 1, 4, 5]]
     expected = np.array([in_box(a) for a in radii]).T
     size = np.abs(expected).max(axis=1, keepdims=True)
@@ -131,7 +137,8 @@ def test_turning_about_the_shaft_changes_only_the_direction_of_the_moment(
     levels = np.array([0.022, 0.0449, 0.047]) ** 2
     plain, turned = (
         integrals(
-            walls_about(*split_patches(*wall_patches(box(kind=kind, turned=t)), longest=LONGEST)), levels
+            walls_about(*split_patches(*wall_patches(box(kind=kind, turned=t)), longest=LONGEST_SIDE_RATIO)),
+            levels,
         )
         for t in (0.0, turn)
     )
@@ -237,7 +244,7 @@ def test_a_surface_that_crosses_one_edge_of_a_wall_twice() -> None:
         return (X1 - start) * WIDTH * float(np.sqrt(1 - max(y - HALF, 0.0) / bulge))
 
     geometry = block_chamber((1, 1, 1), place, kind="hexahedron27")
-    patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST)
+    patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST_SIDE_RATIO)
     found = integrals(walls_about(patches, outer), np.array([a**2]))[0, 0]
     corner = float(np.sqrt(a**2 - X0**2))
     marks = sorted([-HALF, -corner, corner, HALF, HALF + bulge])

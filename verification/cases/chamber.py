@@ -49,9 +49,9 @@ from ringbalance.verification.reference.chambers import central_lambda, exact_mo
 
 _LAMBDA_LAST_DIGIT_M: Final = 1e-3
 _PRINTED_LAMBDA: Final = Reference(
-    value=paper.PAPER_LAMBDA,
+    value=paper.PAPER_LAMBDA_M,
     uncertainty=math.hypot(
-        from_half_width(LAMBDA_TOLERANCE * paper.PAPER_LAMBDA), from_rounding(_LAMBDA_LAST_DIGIT_M)
+        from_half_width(LAMBDA_TOLERANCE * paper.PAPER_LAMBDA_M), from_rounding(_LAMBDA_LAST_DIGIT_M)
     ),
 )
 """The printed lambda with its stated error range and the rounding, m."""
@@ -271,7 +271,7 @@ def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     away = transferred != 0
     curve = np.full(fills.shape, central.value)
     np.divide(moments - opposite, transferred, out=curve, where=away)
-    claimed = np.full(fills.shape, paper.PAPER_LAMBDA)
+    claimed = np.full(fills.shape, paper.PAPER_LAMBDA_M)
     shown = figure(
         "moment of a pair per transferred mass",
         ("fill ratio of one chamber", "1", fills),
@@ -296,7 +296,7 @@ def correction(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
     """Eq. 22 with Eq. 21's mass, literally and per transferred mass, beside Eqs. 7 and 8."""
     full = scene.disc.max_fill_ratio
     mass = float(paper.correction_mass(disc=scene.disc, density=DENSITY, fill_ratio=full))
-    arm = CHAMBER_MOMENT.value / mass if defect == "lambda_from_eq_7" else paper.PAPER_LAMBDA
+    arm = CHAMBER_MOMENT.value / mass if defect == "lambda_from_eq_7" else paper.PAPER_LAMBDA_M
     chamber, both = (
         abs(complex(paper.correction_moment(real_mass=mass, imaginary_mass=other, moment_per_mass=arm)))
         for other in (0.0, mass)

@@ -12,7 +12,7 @@ from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.mesh.wall_integrals import (
-    LONGEST,
+    LONGEST_SIDE_RATIO,
     integrals,
     split_patches,
     wall_patches,
@@ -236,7 +236,7 @@ def _round_chamber_errors(
         return np.stack([true.centre + x, y, true.width * (cube[..., 2] - 0.5)], axis=-1)
 
     block = block_chamber((cells, cells, 1), mapping, kind=kind)
-    patches, outer = split_patches(*wall_patches(block), longest=LONGEST)
+    patches, outer = split_patches(*wall_patches(block), longest=LONGEST_SIDE_RATIO)
     full = np.pi * true.radius**2 * true.width * np.array([1.0, true.centre, true.centre])
 
     def errors(centre: FloatArray) -> tuple[float, float]:

@@ -55,7 +55,7 @@ BUILT_CAUSES: Final[Mapping[str, tuple[str, float]]] = {
     "entrance as built": ("entrance", 0.2),
     "bends as built": ("bends", 0.4),
 }
-"""Of a tube as it was built: the term that differs from the correlation's, and by what share of it (95 %).
+"""Departures of a tube as it was built: the term of k, and its expanded uncertainty (95 %), relative.
 
 Correlations are for straight round tubes and clean edges.  A tube that follows the circle of the crest has a
 secondary flow of its own, not small against that of rotation; a bore out of round changes f by some percent;

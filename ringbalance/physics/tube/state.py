@@ -57,7 +57,7 @@ class TubeState:
         return np.asarray(sum(self.terms.values()), dtype=np.float64)
 
     @property
-    def along(self) -> FloatArray:
+    def spread_loss(self) -> FloatArray:
         """The part of k that is spread evenly along the path."""
         spread = (self.terms[name] for name in _SPREAD_TERMS if name in self.terms)
         return np.asarray(sum(spread), dtype=np.float64)
@@ -70,7 +70,7 @@ class TubeState:
         numbers; the crest halves the middle one of an odd number.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
-        spread = share * self.along
+        spread = share * self.spread_loss
         if "decree" in self.terms:
             return np.asarray(spread)
         before = len(self.bends) / 2

@@ -135,7 +135,7 @@ def test_multigrid_agrees_with_factorisation_bit_for_bit_from_run_to_run(disc: D
 
 def test_a_factorisation_follows_where_multigrid_fails(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
     matrix, right = system(disc)
-    monkeypatch.setattr(solve, "_MOST_STEPS", 2)
+    monkeypatch.setattr(solve, "_MULTIGRID_STEPS", 2)
     found = _solve_linear(matrix, right, multigrid=True)
     assert found.status.ok
     assert found.statistics.iterations == 0

@@ -153,6 +153,10 @@ def _solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = Fa
     """
     if multigrid and (solution := _judged(matrix, right, *_by_multigrid(matrix, right))).status.ok:
         return solution
+    return _judged(matrix, right, _factorised(matrix, right), 0)
+
+
+def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
     # Symmetric mode halves the fill of the default ordering; a positive definite matrix needs no pivoting.
     try:
         factor = splu(
@@ -161,10 +165,9 @@ def _solve_linear(matrix: csr_matrix, right: FloatArray, *, multigrid: bool = Fa
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
-        values = np.asarray(factor.solve(right))
     except RuntimeError:  # singular: the residual of zeros says so
-        values = np.zeros_like(right)
-    return _judged(matrix, right, values, 0)
+        return np.zeros_like(right)
+    return np.asarray(factor.solve(right))
 
 
 def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, int]:

@@ -1,4 +1,4 @@
-"""Interface of every balancer: and how a scene comes to its own.
+"""Interface of every balancer, and the balancer of a scene.
 
 `simulate`, `tune`, `compare` and the first half of `fit` are written against `Balancer` alone.  A further one
 is a sub-package with its scene's keys and a subclass, and one line that registers it
@@ -110,7 +110,7 @@ class Run(Protocol):
         ...
 
     def to_dict(self) -> dict[str, Any]:
-        """As a JSON document in SI."""
+        """The run as a JSON document in SI."""
         ...
 
 
@@ -201,7 +201,7 @@ class Outcomes:
 
 
 ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
-"""Of `Outcomes`."""
+"""Names of the arrays of `Outcomes`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -394,11 +394,11 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
     Args: `options`: of its class, such as `flow_law` of a liquid ring; None counts as not given.
     Raises: ValueError: an option that this balancer does not have.
     """
-    made = registered("balancer", scene.balancer)
-    given = {name: value for name, value in options.items() if value is not None}
-    if foreign := sorted(set(given) - made.options):
+    balancer_class = registered("balancer", scene.balancer)
+    stated = {name: value for name, value in options.items() if value is not None}
+    if foreign := sorted(set(stated) - balancer_class.options):
         raise ValueError(f"the balancer {scene.balancer} has no {', '.join(foreign)}: leave that out")
-    balancer: Balancer = made(scene, **given)
+    balancer: Balancer = balancer_class(scene, **stated)
     return balancer
 
 
@@ -438,7 +438,7 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
         uncertain = stated.get(path.split("[")[0])
         return 0.0 if uncertain is None else uncertain.absolute(value)
 
-    found = []
+    inputs = []
     for table, content in scene_kind(scene.balancer).schema.tables.items():
         for key, declared in content.keys.items():
             value = getattr(getattr(scene, table), key) if declared.uncertain else None
@@ -449,8 +449,8 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
                 path = f"{table}.{key}" if entry is None else f"{table}.{key}[{entry}]"
                 if each is not None:
                     half = (width or of_scene)(path, float(each))
-                    found.append(Input(path=path, value=float(each), half_width=half, unit=unit))
-    return tuple(found)
+                    inputs.append(Input(path=path, value=float(each), half_width=half, unit=unit))
+    return tuple(inputs)
 
 
 def settles_within(time: float, *, stated: bool, amplitude: float | None = None) -> Demand:

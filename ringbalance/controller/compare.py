@@ -20,7 +20,7 @@ from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, plain_set
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.rotor import (
     CommonRotor,
-    one_rotor,
+    joined_rotor,
     rotor_difference,
     rotor_fault,
     rotors_of,
@@ -243,7 +243,7 @@ class Comparison(Result):
         cells: list[Cells] = [
             ("balancer", *(side.scene.balancer.replace("_", " ") for side in sides)),
             ("settings", *(text or "the scene's" for text in changed)),
-            *((one.name, one.text, other.text) for one, other in zip(*of_sides, strict=True)),
+            *((left.name, left.text, right.text) for left, right in zip(*of_sides, strict=True)),
         ]
         note = "medians of the devices that settle; -/+: to the smallest and the largest"
         return Rows(
@@ -279,13 +279,13 @@ def compare(
         home = {FIRST: first, SECOND: second}[rotor].scene
         common = vibrating(home, {FIRST: first, SECOND: second}[rotor].rotor())
     else:
-        one, other = (vibrating(each.scene, each.rotor()) for each in (first, second))
-        if (name := rotor_difference(one, other)) is not None:
+        described, other = (vibrating(each.scene, each.rotor()) for each in (first, second))
+        if (name := rotor_difference(described, other)) is not None:
             problem = f"another {name} than in {other.source}: two rotors, and neither is named for both"
             allowed = f"one rotor in both scenes, or --rotor {FIRST} or {SECOND}"
             raise rotor_fault(first.scene, "rotor", problem, allowed)
-        common = one_rotor(one, other)
-        home = first.scene if common.source == one.source else second.scene
+        common = joined_rotor(described, other)
+        home = first.scene if common.source == described.source else second.scene
     rotors = rotors_of(common, first.rotor, second.rotor)
     try:
         # A balancer that cannot work on the rotor is refused before anything runs.

@@ -121,7 +121,7 @@ def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: 
 
 @in_place
 def _sense(loop: Record, run: Record, amplitude_noise: float, phase_noise: float) -> None:
-    """What a sensor shows; an amplitude that noise would make negative is folded back."""
+    """Write a noisy sample; an amplitude that noise would make negative is folded back."""
     run.seen_amplitude = abs(run.amplitude + loop.amplitude_noise * amplitude_noise)
     run.seen_phase = math.atan2(run.vibration.imag, run.vibration.real) + loop.phase_noise * phase_noise
     run.usable = USABLE
@@ -169,7 +169,7 @@ def _watch(loop: Record, run: Record) -> None:
 
 @in_place
 def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
-    """Why the loop stops cycling, if it does."""
+    """Cause for which the loop stops cycling, `NONE` where it continues."""
     _hold(loop, run)
     if run.settled > 0 and loop.to_time_limit == 0:
         return HELD
@@ -186,7 +186,7 @@ def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
 
 @in_place
 def _hold(loop: Record, run: Record) -> None:
-    """Whether the run has settled: within the limit for the hold time, then but for few samples further.
+    """Note if the run has settled: within the limit for the hold time, then but for few samples further.
 
     A hold that is lost is forgotten, and the next one is looked for.
     """
@@ -206,11 +206,11 @@ def _hold(loop: Record, run: Record) -> None:
 
 @in_place
 def _rests(loop: Record, plant: Record, run: Record, motions: Record) -> bool:
-    """Whether no liquid can move until a valve is commanded to open."""
-    found = run.floods == 0
+    """True if no liquid can move until a valve is commanded to open."""
+    at_rest = run.floods == 0
     for i in range(loop.chambers // 2):
-        found = found and rests(plant, motions[i])
-    return bool(found)
+        at_rest = at_rest and rests(plant, motions[i])
+    return bool(at_rest)
 
 
 @in_place

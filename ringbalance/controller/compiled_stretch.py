@@ -17,7 +17,7 @@ from ringbalance.scene.platform.compiled import in_place
 
 @in_place
 def vibration(loop: Record, plant: Record, run: Record) -> complex:
-    """With the disc's liquid, m."""
+    """Vibration with the disc's liquid, m."""
     moment = 0j
     for i in range(loop.chambers // 2):
         moment += loop.axis[i] * pair_moment(plant, run.fill[i])
@@ -26,7 +26,7 @@ def vibration(loop: Record, plant: Record, run: Record) -> complex:
 
 @in_place
 def time_left(loop: Record, run: Record) -> float:
-    """Until the run ends undecided, s: one within its limit in time is watched until it has settled."""
+    """Time until the run ends undecided, s: one within its limit in time is watched until it has settled."""
     watched = min(run.since, run.held_since) <= loop.time_limit and run.settled == 0
     more = loop.hold_time + loop.further + 2.0 * loop.period if watched else 0.0
     return float(loop.time_limit + more - run.time)
@@ -34,7 +34,7 @@ def time_left(loop: Record, run: Record) -> float:
 
 @in_place
 def limit_to_time(loop: Record, run: Record) -> int:
-    """Cut what is asked to the time left. Returns: the number of valves."""
+    """Cut the valve-open times to the time left. Returns: the number of valves."""
     half, left, count = loop.chambers // 2, time_left(loop, run), 0
     for i in range(half):
         if run.asked[i] > 0.0:
@@ -86,14 +86,14 @@ def _driven_fill(plant: Record, run: Record, pair: int) -> float:
 
 @in_place
 def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> bool:
-    """Whether each driven chamber has kept its residual fill and will, with the tail of its injection."""
-    spare, found = loop.chambers // 2 * 2, True
+    """True if each driven chamber has kept its residual fill and will, with the tail of its injection."""
+    spare, keeps = loop.chambers // 2 * 2, True
     for i in range(loop.chambers // 2):
         if run.drives[i] > 0.0:
             motions[spare] = motions[i]
             run.lowest[i] = least_later(plant, motions, spare, w)
-            found = found and run.lowest[i] >= run.residual_fill
-    return found
+            keeps = keeps and run.lowest[i] >= run.residual_fill
+    return keeps
 
 
 @in_place
@@ -102,9 +102,9 @@ def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: Float
     half = loop.chambers // 2
     for i in range(half):
         if run.drives[i] > 0.0:
-            asked, side, lowest = run.drives[i], run.side[i], run.lowest[i]
-            time = opening_within(plant, motions, i, 2 * half, side, asked, lowest, w)
-            if time != asked:
+            driving, side, lowest = run.drives[i], run.side[i], run.lowest[i]
+            time = opening_within(plant, motions, i, 2 * half, side, driving, lowest, w)
+            if time != driving:
                 _gas_in_port(loop, run, i, time)
 
 
@@ -120,9 +120,9 @@ def _gas_in_port(loop: Record, run: Record, pair: int, time: float) -> None:
 def _pass(
     loop: Record, plant: Record, run: Record, motions: Record, notes: FloatArray, w: FloatArray
 ) -> float:
-    """Carry all pairs through the valve-open times and the wait, with their fills at the instants in `notes`.
+    """Move all pairs through the valve-open times and the wait, with their fills at the instants in `notes`.
 
-    Returns: how far liquid ran back with the gas off, the most of any pair and stretch.
+    Returns: fill that ran back with the gas off, the most of any pair and interval.
     """
     half, on, drift = loop.chambers // 2, 0.0, 0.0
     for i in range(half):
@@ -155,11 +155,11 @@ def _gas_instants(loop: Record, run: Record, notes: FloatArray) -> int:
         notes[0, 0, k] = run.on * (k + 1) / GAS_POINTS
     for i in range(loop.chambers // 2):
         if 0.0 < run.drives[i] < run.on:
-            place = count
-            while place > 0 and notes[0, 0, place - 1] > run.drives[i]:
-                notes[0, 0, place] = notes[0, 0, place - 1]
-                place -= 1
-            notes[0, 0, place] = run.drives[i]
+            k = count
+            while k > 0 and notes[0, 0, k - 1] > run.drives[i]:
+                notes[0, 0, k] = notes[0, 0, k - 1]
+                k -= 1
+            notes[0, 0, k] = run.drives[i]
             count += 1
     return count
 
@@ -174,7 +174,7 @@ def note_stretch(
     start: float,
     instants: FloatArray,
 ) -> None:
-    """Since when the amplitude is not above the limit, and the trace, from a stretch begun at `start`."""
+    """Note since when the amplitude is not above the limit, and the trace, of an interval from `start` on."""
     lowest, largest = plant.lowest_fill, plant.total - plant.lowest_fill
     for k in range(count):
         for i in range(loop.chambers // 2):
@@ -187,7 +187,7 @@ def note_stretch(
 
 @in_place
 def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
-    """The disc at the next sample, and whether liquid still runs back that would take it above the limit."""
+    """Note the disc at the next sample, and if liquid still runs back that would take it above the limit."""
     half, back = loop.chambers // 2, False
     for i in range(half):
         motion = motions[i]
@@ -204,7 +204,7 @@ def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
 
 @in_place
 def keep_instant(loop: Record, run: Record, instants: FloatArray, time: float) -> None:
-    """A valve may open for less than the clock resolves: the trace has one row for one time."""
+    """Add a row to the trace, one for one time: a valve may open for less than the clock resolves."""
     if run.instants < instants.shape[0] and (time > run.kept or run.samples == 0):
         instants[run.instants, 0] = time
         for i in range(loop.chambers // 2):
@@ -216,7 +216,7 @@ def keep_instant(loop: Record, run: Record, instants: FloatArray, time: float) -
 def keep_injections(
     loop: Record, plant: Record, run: Record, motions: Record, start: float, injections: Record
 ) -> bool:
-    """Rows of the last command. Returns: whether the injection that should do the work has moved liquid."""
+    """Add the last command to the trace. Returns: true if its longest injection has moved liquid."""
     half, longest, working = loop.chambers // 2, 0.0, False
     for chamber in range(loop.chambers):
         pair = chamber % half

@@ -15,7 +15,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.liquid_ring.loop_factor import vibration_left
-from ringbalance.controller.simulation import GasUse, Injection, Simulation
+from ringbalance.controller.simulation import GasUse, Simulation
 from ringbalance.physics import balancing
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
 from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
@@ -140,8 +140,18 @@ def simulation_rows(simulation: Simulation) -> Rows:
     gas = simulation.gas.finding
     scene = simulation.scene
     model = simulation.model_status
+    neglected = neglected_in_injections(simulation.models_used).text
+
+    injections = []
+    for each in simulation.injections[:_MOST_INJECTIONS]:
+        regimes = " to ".join(dict.fromkeys((each.regime_start.label, each.regime_end.label)))
+        event = "" if each.event in {Event.NONE, Event.BLOCKED} else f" ({each.event.value})"
+        fills = (f"{each.fill_before:.5f}", f"{each.fill_after:.5f}")
+        injections.append((f"{each.time:.3f}", each.chamber, f"{each.duration:.4f}", *fills, regimes + event))
+    more = len(simulation.injections) - _MOST_INJECTIONS
+
+    # The line of bars ends shortly after the last valve has closed.
     closed = [i.time + i.duration for i in simulation.injections]
-    # Until shortly after the last valve has closed.
     end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
     return Rows(
         title=f"Run of {scene.name} ({scene.source}), {simulation.law} law, {simulation.controller}",
@@ -149,16 +159,21 @@ def simulation_rows(simulation: Simulation) -> Rows:
         findings=(
             *simulation.findings,
             *(() if gas is None else (gas,)),
-            *(Finding(code="out_of_range", values={"text": model.text}) for _ in (model,) if not model.ok),
+            *(() if model.ok else (Finding(code="out_of_range", values={"text": model.text}),)),
         ),
         facts=(
             ("flow law", simulation.law),
             ("gas line", line_text(simulation.gas_line)),
-            ("neglected", neglected_in_injections(simulation.models_used).text),
+            ("neglected", neglected),
             ("amplitude (log)", amplitude_line(simulation.time, simulation.amplitude, end=end)),
         ),
         tables=(
-            _injection_table(simulation.injections),
+            Table(
+                caption="Injections",
+                heads=("time, s", "chamber", "gas, s", "fill before", "fill after", "regime"),
+                rows=injections,
+                note=f"and {more} more: see --json" if more > 0 else "",
+            ),
             Table(
                 caption="In the units of the shop",
                 heads=("quantity", "value"),
@@ -200,23 +215,6 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
     )
 
 
-def _injection_table(injections: tuple[Injection, ...]) -> Table:
-    """Table of the first injections."""
-    rows = []
-    for each in injections[:_MOST_INJECTIONS]:
-        regimes = " to ".join(dict.fromkeys((each.regime_start.label, each.regime_end.label)))
-        event = "" if each.event in {Event.NONE, Event.BLOCKED} else f" ({each.event.value})"
-        fills = (f"{each.fill_before:.5f}", f"{each.fill_after:.5f}")
-        rows.append((f"{each.time:.3f}", each.chamber, f"{each.duration:.4f}", *fills, regimes + event))
-    more = len(injections) - _MOST_INJECTIONS
-    return Table(
-        caption="Injections",
-        heads=("time, s", "chamber", "gas, s", "fill before", "fill after", "regime"),
-        rows=rows,
-        note=f"and {more} more: see --json" if more > 0 else "",
-    )
-
-
 def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> str:
     """Bars of an amplitude at equal steps of time up to `end`, s, by straight lines; logarithmic."""
     return f"{_sparkline(np.interp(np.linspace(0.0, end, _SPARK_WIDTH), time, amplitude))} to {end:.3g} s"
@@ -228,7 +226,7 @@ def _sparkline(values: FloatArray) -> str:
     if top == 0:
         return _BARS[0] * values.size
     depth = np.log10(np.maximum(values / top, 10.0**-_DECADES)) / _DECADES + 1
-    return "".join(_BARS[round(share * (len(_BARS) - 1))] for share in depth)
+    return "".join(_BARS[round(height * (len(_BARS) - 1))] for height in depth)
 
 
 def line_runs(nominal: Simulation) -> dict[str, Simulation]:
@@ -240,12 +238,12 @@ def line_runs(nominal: Simulation) -> dict[str, Simulation]:
         return {}
     # The paper's law has no mass in the tube and no crest.
     terms = (FILLING, LAG) if isinstance(flow, PaperLaw) else (INERTIA, HELD, FILLING, LAG)
-    found = {}
+    runs = {}
     for end in ends:
         conductance, ratio = end.line.conductance, end.line.critical_ratio
         gas = replace(scene.gas, conductance=conductance, critical_ratio=ratio, valve_lag=end.valve_lag)
-        found[end.name] = nominal.again(replace(scene, gas=gas), terms)
-    return found
+        runs[end.name] = nominal.again(replace(scene, gas=gas), terms)
+    return runs
 
 
 def line_runs_table(runs: Mapping[str, Simulation]) -> Table:
@@ -286,91 +284,79 @@ def command_document(nominal: Simulation) -> dict[str, Any]:
     return simulation_document(nominal) | {"gas_line_runs": runs}
 
 
-_HOUR: Final = 3600.0
+_HOUR_S: Final = 3600.0
 
 
 def conventions(run: Simulation) -> tuple[Quantity, ...]:
     """Unbalances and vibrations of the run as ISO 21940 and ISO 20816 name them, the loop's peak sensitivity,
     gas used, and down to which speed the correction lasts without gas.
     """
-    return (*_unbalances(run), *_vibrations(run), *_loop(run), *_gas(run), *_lasting(run))
+    return tuple(
+        Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
+        for key, name, value, unit, status in (*_vibration_rows(run), *_loop_and_gas_rows(run))
+    )
 
 
-def _unbalances(run: Simulation) -> Iterator[Quantity]:
+_Row = tuple[str, str, float | None, str, str]
+"""Key, name, value, unit and status of a quantity."""
+
+
+def _vibration_rows(run: Simulation) -> Iterator[_Row]:
+    """Unbalances and vibrations, before and at the end."""
     scene, before, after = run.scene, float(run.amplitude[0]), float(run.amplitude[-1])
-    influence, grade = scene.rotor.influence_coefficient, scene.requirement.grade
-    yield _row("residual_unbalance", "residual unbalance at the end", after / influence, "kg m")
-    if grade is not None and scene.rotor.mass is not None:
-        permissible = permissible_unbalance(grade=grade, mass=scene.rotor.mass, speed=scene.rotor.speed)
+    rotor, grade = scene.rotor, scene.requirement.grade
+    influence = rotor.influence_coefficient
+    yield "residual_unbalance", "residual unbalance at the end", after / influence, "kg m", "ok"
+    if grade is not None and rotor.mass is not None:
+        permissible = permissible_unbalance(grade=grade, mass=rotor.mass, speed=rotor.speed)
         name = "permissible residual unbalance (ISO 21940-11)"
-        yield _row("permissible_unbalance", name, permissible, "kg m")
-    yield _row(
-        "unbalance_reduction_ratio",
-        "unbalance reduction ratio (ISO 21940-21)",
-        balancing.unbalance_reduction_ratio(before=before, after=after) if before > 0 else None,
-    )
-    left = vibration_left(run.scene, run.loop)
-    yield _row(
-        "unbalance_left",
-        "unbalance that noise leaves at most with this run's settings",
-        None if left is None else left / influence,
-        "kg m",
-    )
+        yield "permissible_unbalance", name, permissible, "kg m", "ok"
+    ratio = balancing.unbalance_reduction_ratio(before=before, after=after) if before > 0 else None
+    yield "unbalance_reduction_ratio", "unbalance reduction ratio (ISO 21940-21)", ratio, "1", "ok"
+    vibration = vibration_left(scene, run.loop)
+    left = None if vibration is None else vibration / influence
+    name = "unbalance that noise leaves at most with this run's settings"
+    yield "unbalance_left", name, left, "kg m", "ok"
+    for key, when, amplitude in (("initial", "before", before), ("final", "at the end", after)):
+        velocity = balancing.rms_velocity(amplitude=amplitude, speed=rotor.speed)
+        yield f"{key}_peak_to_peak", f"vibration {when}, peak to peak", 2 * amplitude, "m", "ok"
+        yield f"{key}_velocity", f"vibration {when}, velocity, rms", velocity, "m/s", "ok"
 
 
-def _vibrations(run: Simulation) -> Iterator[Quantity]:
-    speed = run.scene.rotor.speed
-    for key, name, amplitude in (
-        ("initial", "before", float(run.amplitude[0])),
-        ("final", "at the end", float(run.amplitude[-1])),
-    ):
-        velocity = balancing.rms_velocity(amplitude=amplitude, speed=speed)
-        yield _row(f"{key}_peak_to_peak", f"vibration {name}, peak to peak", 2 * amplitude, "m")
-        yield _row(f"{key}_velocity", f"vibration {name}, velocity, rms", velocity, "m/s")
+def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
+    """Peak sensitivity of a stable loop with a gain, gas used, and speeds to which the correction lasts.
 
-
-def _loop(run: Simulation) -> Iterator[Quantity]:
+    Down to these speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: whatever the
+    pressure of a cavity over the crest, and under the one that runs take.  Restarts find what the run-down
+    has left: below, opposite chambers level out.
+    """
     factor, controller = run.loop.value, run.scene.controller
-    if not run.loop.fixed or factor is None or factor >= run.loop.limit:
-        return
-    peak = balancing.peak_sensitivity(
-        loop_factor=factor,
-        integral=controller.period / (controller.integral_time or math.inf),
-        derivative=controller.derivative_time / controller.period,
-    )
-    name = f"peak sensitivity of the loop (zone {balancing.zone(peak)} of ISO 14839-3)"
-    yield _row("peak_sensitivity", name, peak)
+    if run.loop.fixed and factor is not None and factor < run.loop.limit:
+        peak = balancing.peak_sensitivity(
+            loop_factor=factor,
+            integral=controller.period / (controller.integral_time or math.inf),
+            derivative=controller.derivative_time / controller.period,
+        )
+        name = f"peak sensitivity of the loop (zone {balancing.zone(peak)} of ISO 14839-3)"
+        yield "peak_sensitivity", name, peak, "1", "ok"
 
-
-def _gas(run: Simulation) -> Iterator[Quantity]:
     first = min((each.time + each.duration for each in run.injections if each.moved), default=None)
     corrections = len({each.time for each in run.injections})
-    per = run.gas.normal_volume / corrections if corrections else None
+    per_correction = run.gas.normal_volume / corrections if corrections else None
     hourly, since, end = None, run.settling_time, float(run.time[-1])
     if since is not None and end > since:
         later = [each for each in run.injections if each.time > since]
         used = GasUse.of(scene=run.scene, model=run.model, injections=later)
-        hourly = used.normal_volume / (end - since) * _HOUR
-    yield _row("first_correction", "first correction made after", first, "s")
-    yield _row("gas_per_correction", "gas per correction, normal volume", per, "m^3")
-    yield _row("gas_per_hour", "gas per hour to hold it, normal volume", hourly, "m^3")
+        hourly = used.normal_volume / (end - since) * _HOUR_S
+    yield "first_correction", "first correction made after", first, "s", "ok"
+    yield "gas_per_correction", "gas per correction, normal volume", per_correction, "m^3", "ok"
+    yield "gas_per_hour", "gas per hour to hold it, normal volume", hourly, "m^3", "ok"
 
-
-def _lasting(run: Simulation) -> Iterator[Quantity]:
-    """Speeds down to which the fullest chamber keeps its liquid with the gas off, by hydrostatics: whatever
-    the pressure of a cavity over the crest, and under the one that runs take.
-
-    Restarts find what the run-down has left: below, opposite chambers level out.
-    """
-    fill = max(float(each[-1]) for each in run.fill_ratio.values())
-    held = Holding.of(run.scene, fill_ratio=fill)
+    held = Holding.of(run.scene, fill_ratio=max(float(each[-1]) for each in run.fill_ratio.values()))
     status = "ok" if held.finding is None else held.finding.code
-    for key, name, speed in (
-        ("lasting_speed", "correction lasts without gas, sure down to", held.sure_speed),
-        ("likely_lasting_speed", "correction lasts without gas, perhaps down to", held.likely_speed),
+    for key, how_sure, speed in (
+        ("lasting_speed", "sure", held.sure_speed),
+        ("likely_lasting_speed", "perhaps", held.likely_speed),
     ):
-        yield _row(key, name, speed, "rad/s", status="ok" if speed is not None else status)
-
-
-def _row(key: str, name: str, value: float | None, unit: str = "1", *, status: str = "ok") -> Quantity:
-    return Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
+        name = f"correction lasts without gas, {how_sure} down to"
+        yield key, name, speed, "rad/s", "ok" if speed is not None else status

@@ -26,7 +26,6 @@ from ringbalance.reduced_model.injection.moment import tabulate_moment
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.results.result import Presentation
-from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 
 Progress = Callable[[float, float], None]
@@ -71,19 +70,20 @@ def simulate(
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_ring(scene)
-    balancer = _one_of(model, flow_law)
+    if (model is None) == (flow_law is None):
+        raise ValueError(
+            "give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither"
+        )
+    balancer = BalancerModel.of(flow_law) if model is None else model
     check_fit(scene, balancer)
-    used = run_models(scene=scene, model=balancer, asked=modelled)
+    used = run_models(scene=scene, model=balancer, terms=modelled)
     residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill
     dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used), residual_fill=residual)
     algorithm = controller or controller_of(scene, balancer)
     loop = loop_factor(scene, balancer, algorithm)
+    sensed = sensor is not None
     plan = LoopPlan.of(
-        [scene],
-        [algorithm],
-        most_samples=MAX_SAMPLES,
-        sensed=sensor is not None,
-        to_time_limit=to_time_limit,
+        [scene], [algorithm], most_samples=MAX_SAMPLES, sensed=sensed, to_time_limit=to_time_limit
     )
     total = 2 * scene.disc.initial_fill
     plant = dynamics.plant(total=total, relative_error=RELATIVE_ERROR)
@@ -96,11 +96,11 @@ def simulate(
         residual_fill=residual,
         speed=speed,
     )
-    own = None if isinstance(algorithm, BuiltIn) else algorithm
+    foreign = None if isinstance(algorithm, BuiltIn) else algorithm
     outside = None
-    if own is not None or sensor is not None:
+    if foreign is not None or sensor is not None:
         used_sensor = sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed)
-        outside = _Outside(sensor=used_sensor, controller=own, chambers=scene.disc.chambers)
+        outside = _Outside(sensor=used_sensor, controller=foreign, chambers=scene.disc.chambers)
 
     def watch() -> None:
         if progress is not None:
@@ -109,28 +109,20 @@ def simulate(
             outside.answer(runs[0])
 
     random = noise or np.random.default_rng(scene.run.seed)
-    seen = random.standard_normal((1, MAX_SAMPLES, 2))
-    trace = plan.carry(
-        runs,
-        plant,
-        lambda _: seen,
-        traced=True,
-        watch=None if progress is None and outside is None else watch,
-    )
-    time, vibration, fills = _histories(scene, balancer, trace)
+    deviations = random.standard_normal((1, MAX_SAMPLES, 2))
+    watched = progress is not None or outside is not None
+    trace = plan.carry(runs, plant, lambda _: deviations, traced=True, watch=watch if watched else None)
+    positive = trace.instants[:, 1:].T
+    fills = np.concatenate([positive, total - positive])
+    vibration = scene.rotor.vibration(disc_unbalance(moment=balancer.moment, fill_ratio=fills))
     run = Simulation(
         scene=scene,
-        plant=LiquidRing(
-            model=balancer,
-            chambers=scene.disc.chambers,
-            dynamics=dynamics,
-            total=total,
-        ),
+        plant=LiquidRing(model=balancer, chambers=scene.disc.chambers, dynamics=dynamics, total=total),
         state=runs[0],
-        controller=scene.controller.kind if own is None else type(own).__name__,
+        controller=scene.controller.kind if foreign is None else type(foreign).__name__,
         as_scene=controller is None and sensor is None,
         loop=loop,
-        time=time,
+        time=trace.instants[:, 0],
         amplitude=np.abs(vibration),
         phase=np.angle(vibration),
         fill_ratio=dict(zip(chamber_letters(scene.disc.chambers), fills, strict=True)),
@@ -142,14 +134,6 @@ def simulate(
         again=partial(_again, balancer),
     )
     return replace(run, findings=run_findings(run))
-
-
-def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
-    if model is not None and flow_law is None:
-        return model
-    if flow_law is not None and model is None:
-        return BalancerModel.of(flow_law)
-    raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
 
 
 @dataclass(kw_only=True)
@@ -192,16 +176,6 @@ class _Outside:
                 raise ValueError(f"gas into chambers {pair} and {pair + half} of one pair at once")
             run["asked"][pair], run["side"][pair] = valve.duration, side
         self.commands.append(command)
-
-
-def _histories(
-    scene: Scene, model: BalancerModel, trace: Trace
-) -> tuple[FloatArray, ComplexArray, FloatArray]:
-    """Time, s, vibration, m, and the fill of every chamber."""
-    first = trace.instants[:, 1:].T
-    fills = np.concatenate([first, 2 * scene.disc.initial_fill - first])
-    moment = disc_unbalance(moment=model.moment, fill_ratio=fills)
-    return trace.instants[:, 0], scene.rotor.vibration(moment), fills
 
 
 def _samples(trace: Trace, chambers: int, outside: _Outside | None) -> tuple[Sample, ...]:

@@ -32,9 +32,9 @@ from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 
 SAMPLES_AT_FIRST: Final = 256
-"""Up to which runs are continued at once; then twice as many."""
+"""Samples up to which runs are continued at once; then twice as many."""
 ALLOWED: Final = 0.01
-"""Fraction of the samples in that time that may be above the limit."""
+"""Fraction of the samples in the time after the hold that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
 """Commands in a row, beyond one for each chamber, from which on a run that ends is said to move nothing."""
 
@@ -62,7 +62,7 @@ class LoopPlan:
     assumed: Records | None
     """Type `PLANT`, shape (1,): a device as the law-based algorithm has it; None: it does not look at one."""
     liquid: Records
-    """Type `MOTION`: the pairs as the law-based algorithm believes them to be, and one more; else empty."""
+    """Type `MOTION`: the pairs as the law-based algorithm estimates them, and one more; else empty."""
 
     @classmethod
     def of(
@@ -90,8 +90,14 @@ class LoopPlan:
         for scene, controller, loop, start in zip(scenes, controllers, loops, starts, strict=True):
             if isinstance(controller, BuiltIn):
                 controller.fill(loop, start)
-            for name, value in _settings(scene, further).items():
-                loop[name] = value
+            settings, sensor = scene.controller, scene.sensor
+            loop["chambers"], loop["limit"] = scene.disc.chambers, settings.limit
+            loop["period"], loop["hold_time"] = settings.period, settings.hold_time
+            loop["time_limit"], loop["further"] = scene.run.time_limit, further
+            loop["allowed"] = ALLOWED * further / settings.period
+            loop["amplitude_noise"], loop["phase_noise"] = sensor.amplitude_noise, sensor.phase_noise
+            loop["exact"] = sensor.amplitude_noise == sensor.phase_noise == 0
+            loop["idle_tolerated"] = IDLE_OPERATIONS + scene.disc.chambers
             loop["rises_tolerated"] = controller.rises_tolerated
         first, chambers = controllers[0], scenes[0].disc.chambers
         loops["axis"][:, : chambers // 2] = chamber_directions(chambers)[: chambers // 2]
@@ -141,10 +147,8 @@ class LoopPlan:
             injections=np.zeros(pairs * most, dtype=INJECTION),
             samples=np.zeros(most, dtype=SAMPLE),
         )
-        assumed, room = (
-            plants if self.assumed is None else self.assumed,
-            (np.zeros(NOTES), np.zeros(WORKSPACE)),
-        )
+        assumed = plants if self.assumed is None else self.assumed
+        notes, workspace = np.zeros(NOTES), np.zeros(WORKSPACE)
 
         def go_on(until: int) -> None:
             continue_runs(
@@ -159,7 +163,8 @@ class LoopPlan:
                 trace.instants,
                 trace.injections,
                 trace.samples,
-                *room,
+                notes,
+                workspace,
             )
 
         until = 0
@@ -175,21 +180,3 @@ class LoopPlan:
             injections=trace.injections[: run["injections"]].copy(),
             samples=trace.samples[: run["samples"]].copy(),
         )
-
-
-def _settings(scene: Scene, further: float) -> dict[str, Any]:
-    """Sensor, clock and bounds."""
-    settings, sensor = scene.controller, scene.sensor
-    return {
-        "chambers": scene.disc.chambers,
-        "limit": settings.limit,
-        "period": settings.period,
-        "hold_time": settings.hold_time,
-        "time_limit": scene.run.time_limit,
-        "further": further,
-        "allowed": ALLOWED * further / settings.period,
-        "amplitude_noise": sensor.amplitude_noise,
-        "phase_noise": sensor.phase_noise,
-        "exact": sensor.amplitude_noise == sensor.phase_noise == 0,
-        "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
-    }

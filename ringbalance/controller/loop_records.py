@@ -29,14 +29,14 @@ OWN: Final = 3
 """Algorithms by number; the last is the caller's, who writes its command into the run."""
 NO_PHASE: Final = 1
 USABLE: Final = 2
-"""What a sample shows: nothing (0), an amplitude, or a phase as well."""
+"""Content of a sample: nothing (0), an amplitude, or a phase as well."""
 UNUSABLE: Final = 1
 TOO_SHORT: Final = 2
-"""Why no valve opens though the algorithm is not content."""
+"""Reasons for which no valve opens though the algorithm is not content."""
 NOTICEABLE: Final = 1e-12
 """Change of a fill ratio that counts as movement."""
 NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
-"""Why a loop stopped cycling; it goes on, or
+"""Causes for which a loop stopped cycling; it continues, or
 
     the amplitude rose after more operations in a row than the algorithm can explain,
     the time is up, and the longest injections of the last commands moved no liquid,
@@ -46,7 +46,7 @@ NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
     the amplitude has been within its limit for the hold time and, but for few samples, for the further time.
 """
 
-_REAL: Final = (
+_LOOP_REALS: Final = (
     "limit",  # m
     "period",  # s
     "hold_time",  # s
@@ -64,19 +64,19 @@ _REAL: Final = (
     "assumed_phase_noise",  # standard deviation, rad
     "law_deviation",  # standard deviation of the law's velocity, relative
 )
-_WHOLE: Final = (
+_LOOP_INTEGERS: Final = (
     "algorithm",
-    "sensed",  # whether the caller's sensor writes its sample into the run
-    "exact",  # whether the sensor is without noise
-    "to_time_limit",  # whether a settled run continues
+    "sensed",  # 1 if the caller's sensor writes its sample into the run
+    "exact",  # 1 if the sensor is without noise
+    "to_time_limit",  # 1 if a settled run continues
     "chambers",
     "rises_tolerated",
     "idle_tolerated",
     "most_samples",
 )
 LOOP: Final = np.dtype(
-    [(name, np.float64) for name in _REAL]
-    + [(name, np.int64) for name in _WHOLE]
+    [(name, np.float64) for name in _LOOP_REALS]
+    + [(name, np.int64) for name in _LOOP_INTEGERS]
     + [
         ("influence", np.complex128),  # that is assumed, m/(kg m)
         ("settings", np.float64, (DIRECTIONS + 3 * MAX_CHAMBERS,)),  # of `target_steps` or `trial_steps`
@@ -86,7 +86,7 @@ LOOP: Final = np.dtype(
 )
 """Settings of a scene's loop, which its devices share."""
 
-_RUN_REAL: Final = (
+_RUN_REALS: Final = (
     "noise_floor",  # rise of the amplitude that noise alone does not explain, m
     "speed",  # factor of the flow's velocity
     "residual_fill",  # of a driven chamber, that no command goes below
@@ -112,17 +112,17 @@ _RUN_REAL: Final = (
     "before_phase",  # law-based: rad
     "gas",  # what vented chambers have released, above ambient pressure, Pa m^3
 )
-_RUN_WHOLE: Final = (
+_RUN_INTEGERS: Final = (
     "loop",  # number of its settings
     "plant",  # and of its device
-    "settled",  # whether a hold was followed by the further time
+    "settled",  # 1 if a hold was followed by the further time
     "lost",  # holds that were not
     "usable",
-    "resting",  # whether the algorithm is content
+    "resting",  # 1 if the algorithm is content
     "reason",
-    "floods",  # whether liquid runs through an empty tube with the gas off
-    "cut",  # whether the time limit has shortened a valve-open time or a wait
-    "operated",  # whether a valve has opened since the last sample with an amplitude
+    "floods",  # 1 if liquid runs through an empty tube with the gas off
+    "cut",  # 1 if the time limit has shortened a valve-open time or a wait
+    "operated",  # 1 if a valve has opened since the last sample with an amplitude
     "rises",
     "idle",
     "overshoots",
@@ -130,7 +130,7 @@ _RUN_WHOLE: Final = (
     "shortened",  # injections that gas in the port has ended before their valves
     "samples",
     "cause",
-    "drains",  # whether what still runs back would take the vibration above the limit
+    "drains",  # 1 if what still runs back would take the vibration above the limit
     "on_points",  # instants noted within each of these
     "off_points",
     "instants",  # rows of the trace in use
@@ -146,11 +146,11 @@ _RUN_PAIRS: Final = (
 _RUN_FLAGS: Final = (
     "side",  # which chamber is driven: 0 the positive one, 1 the other
     "given_side",
-    "runs_back",  # whether liquid still ran back as the last wait ended
+    "runs_back",  # 1 if liquid still ran back as the last wait ended
 )
 RUN: Final = np.dtype(
-    [(name, np.float64) for name in _RUN_REAL]
-    + [(name, np.int64) for name in _RUN_WHOLE]
+    [(name, np.float64) for name in _RUN_REALS]
+    + [(name, np.int64) for name in _RUN_INTEGERS]
     + [(name, np.complex128) for name in ("start", "gain", "vibration")]
     + [(name, np.float64, (PAIRS,)) for name in _RUN_PAIRS]
     + [(name, np.int64, (PAIRS,)) for name in _RUN_FLAGS]

@@ -11,7 +11,6 @@ from ringbalance.controller.liquid_ring.loop_factor import default_gain
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
-    LiquidRing,
     starting_pressure,
 )
 from ringbalance.controller.rotor import assumed_rotor
@@ -32,32 +31,29 @@ _TURNED: Final = math.sqrt(2.0)
 
 def run_findings(run: Simulation) -> tuple[Finding, ...]:
     """The first says how the run ended, the others what stands behind it and what to change."""
-    outcome = run.outcome
-    code = outcome.value
+    code = run.outcome.value
     if not _moves(run):
         unmoved = {Outcome.STALLED: "stalled_at_start", Outcome.GAS_TIME_TOO_SHORT: "injection_too_short"}
-        code = unmoved.get(outcome, code)
+        code = unmoved.get(run.outcome, code)
     numbers = _numbers(run)
-    ended = Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
-    return (ended, *_required(run), *_causes(run), *_shortened(run), *_assumed(run))
+    findings = [Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})]
 
-
-def _assumed(run: Simulation) -> Iterator[Finding]:
-    """Findings on assumptions that are not in the scene."""
-    yield from assumed_rotor(run.scene)
-    if run.loop.fixed:
-        yield from default_gain(run.scene)
-
-
-def _required(run: Simulation) -> Iterator[Finding]:
-    """Findings on requirements of the scene that a settled run does not show."""
     scene, time = run.scene, run.settling_time
-    asked, allowed = scene.requirement.settling_time, scene.required_amplitude
-    if time is not None and asked is not None and time > asked:
-        yield Finding(code="settled_too_late", values={"settling_time": time, "required": asked})
+    required, allowed = scene.requirement.settling_time, scene.required_amplitude
+    if time is not None and required is not None and time > required:
+        values: dict[str, Value] = {"settling_time": time, "required": required}
+        findings.append(Finding(code="settled_too_late", values=values))
     if allowed is not None and scene.controller.limit > allowed:
         values = {"limit": scene.controller.limit, "allowed": allowed}
-        yield Finding(code="limit_above_requirement", values=values)
+        findings.append(Finding(code="limit_above_requirement", values=values))
+    findings += _causes(run)
+    if count := run.shortened:
+        values = {"count": count, "residual_fill": run.plant.residual_fill}
+        findings.append(Finding(code="injections_shortened", values=values))
+    findings += assumed_rotor(scene)
+    if run.loop.fixed:
+        findings += default_gain(scene)
+    return tuple(findings)
 
 
 def _moves(run: Simulation) -> bool:
@@ -65,13 +61,13 @@ def _moves(run: Simulation) -> bool:
     return run.longest is None or run.longest.moved
 
 
-def _own(run: Simulation) -> bool:
+def _is_foreign(run: Simulation) -> bool:
     """True if the algorithm was the caller's."""
     return run.controller != run.scene.controller.kind
 
 
 def _numbers(run: Simulation) -> dict[str, Value]:
-    """Of which a sentence takes what it names."""
+    """Numbers by the names that the sentences use."""
     settings = run.scene.controller
     numbers: dict[str, Value] = {
         "initial_amplitude": float(run.amplitude[0]),
@@ -104,50 +100,41 @@ def _numbers(run: Simulation) -> dict[str, Value]:
 
 
 def _causes(run: Simulation) -> Iterator[Finding]:
-    """What a formula or a count explains; what to change, runs of drawn devices tell."""
-    outcome = run.outcome
+    """Causes that a formula or a count explains; runs of drawn devices tell what to change."""
+    outcome, scene, loop = run.outcome, run.scene, run.loop
     if outcome is Outcome.HOVERING:
-        yield from _noise(run)
+        sigma, deviation = scene.sensor.amplitude_noise, loop.deviation
+        if NOISE_DEVIATIONS * sigma > scene.controller.limit:
+            yield Finding(code="sensor_noise_too_high", values={"noise": sigma})
+        elif deviation is not None and math.isfinite(deviation):
+            yield Finding(code="noise_sustained", values={"deviation": deviation})
     if outcome in {Outcome.TIME_LIMIT, Outcome.GAS_TIME_TOO_SHORT}:
         yield from _dead_time(run)
     if outcome in {Outcome.DIVERGING, Outcome.UNSTABLE}:
-        yield from _growing(run)
-    if outcome is Outcome.STALLED and run.unreachable_amplitude > run.scene.controller.limit:
+        # A residual grows: too much of it is removed at once, or in another direction.
+        if loop.value is None or not loop.unstable or loop.limit < _TURNED:
+            yield Finding(code="check_direction")
+        else:
+            highest = scene.controller.proportional * loop.limit / loop.value
+            values: dict[str, Value] = {"loop_factor": loop.value, "loop_factor_limit": loop.limit}
+            yield Finding(code="gain_too_high", values={**values, "proportional": highest})
+    if outcome is Outcome.STALLED and run.unreachable_amplitude > scene.controller.limit:
         yield Finding(code="unbalance_beyond_gas", values=_moments(run))
     if outcome is Outcome.DRIFTING:
-        total = 2 * run.scene.disc.initial_fill
+        total = 2 * scene.disc.initial_fill
         fill = total - min(run.plant.residual_fill, total / 2)
-        held = Holding.of(run.scene, fill_ratio=fill)
+        held = Holding.of(scene, fill_ratio=fill)
         lost = None if held.likely_speed is not None else held.finding
         yield lost or Finding(code="tube_runs_back")
     if outcome in _BY_SETTINGS:
-        code = "own_overshoots" if _own(run) else "overshoots"
+        code = "own_overshoots" if _is_foreign(run) else "overshoots"
         yield Finding(code=code, values={"overshoots": run.overshoots})
-
-
-def _growing(run: Simulation) -> Iterator[Finding]:
-    """Why a residual grows: too much of it is removed at once, or in another direction."""
-    loop = run.loop
-    if loop.value is None or not loop.unstable or loop.limit < _TURNED:
-        yield Finding(code="check_direction")
-    else:
-        highest = run.scene.controller.proportional * loop.limit / loop.value
-        values: dict[str, Value] = {"loop_factor": loop.value, "loop_factor_limit": loop.limit}
-        yield Finding(code="gain_too_high", values={**values, "proportional": highest})
-
-
-def _noise(run: Simulation) -> Iterator[Finding]:
-    sigma, deviation = run.scene.sensor.amplitude_noise, run.loop.deviation
-    if NOISE_DEVIATIONS * sigma > run.scene.controller.limit:
-        yield Finding(code="sensor_noise_too_high", values={"noise": sigma})
-    elif deviation is not None and math.isfinite(deviation):
-        yield Finding(code="noise_sustained", values={"deviation": deviation})
 
 
 def _dead_time(run: Simulation) -> list[Finding]:
     """Finding that an amplitude above the limit stands still, as its valve-open time moves nothing."""
     scene, loop = run.scene, run.loop
-    if _own(run) or scene.controller.kind == "trial" or loop.rate == 0.0:
+    if _is_foreign(run) or scene.controller.kind == "trial" or loop.rate == 0.0:
         return []
     lost = dead_time(scene, run.plant.model, rate=loop.rate)
     rest = max(lost - min(scene.controller.offsets(scene.disc.chambers)), 0.0)
@@ -155,12 +142,6 @@ def _dead_time(run: Simulation) -> list[Finding]:
     if rest * per_time <= scene.controller.limit:
         return []
     return [Finding(code="dead_time", values={"standing_amplitude": rest * per_time, "dead_time": lost})]
-
-
-def _shortened(run: Simulation) -> Iterator[Finding]:
-    if count := run.shortened:
-        numbers: dict[str, Value] = {"count": count, "residual_fill": run.plant.residual_fill}
-        yield Finding(code="injections_shortened", values=numbers)
 
 
 def _moments(run: Simulation) -> dict[str, Value]:
@@ -173,27 +154,27 @@ def _moments(run: Simulation) -> dict[str, Value]:
 
 
 def _pressures(run: Simulation) -> dict[str, Value]:
-    """Where the gas drives no liquid, and the pressures that would; None: its liquid has left the port."""
+    """Fill at which the gas drives no liquid, and pressures that would, Pa; None: none does."""
     plant, still = run.plant, None if _moves(run) else run.longest
-    lowest = max(0.0, plant.total - plant.model.flow.max_fill_ratio)
+    law, total = plant.model.flow, plant.total
+
+    def pressure_from(fill: float) -> float | None:
+        """Pressure from which an injection begins, over an empty crest, as all short ones do, Pa."""
+        return starting_pressure(
+            law=law,
+            fill=fill,
+            opposite_fill=min(total - fill, law.max_fill_ratio),
+            primed=False,
+            above=max(plant.gas_pressure, LEAST_PRESSURE),
+        )
+
+    lowest = max(0.0, total - law.max_fill_ratio)
     numbers: dict[str, Value] = {
         "gas_pressure": plant.gas_pressure,
         "fill": plant.least_fill,
-        "pressure_to_empty": _needed(plant, lowest + NEARLY_EMPTY),
+        "pressure_to_empty": pressure_from(lowest + NEARLY_EMPTY),
     }
     if still is not None:
         fill = still.fill_after
-        numbers |= {"fill": fill, "chamber": still.chamber, "pressure_to_start": _needed(plant, fill)}
+        numbers |= {"fill": fill, "chamber": still.chamber, "pressure_to_start": pressure_from(fill)}
     return numbers
-
-
-def _needed(plant: LiquidRing, fill: float) -> float | None:
-    """The pressure, Pa, from which an injection begins at a fill, over an empty crest: short ones all do."""
-    law = plant.model.flow
-    return starting_pressure(
-        law=law,
-        fill=fill,
-        opposite_fill=min(plant.total - fill, law.max_fill_ratio),
-        primed=False,
-        above=max(plant.gas_pressure, LEAST_PRESSURE),
-    )

@@ -102,9 +102,9 @@ def noisy_sensor(*, sensor: loop_models.Sensor, seed: int | np.random.Generator)
 
 @dataclass(frozen=True, kw_only=True)
 class CommonRotor:
-    """What balancers on one rotor have in common.
+    """Rotor that balancers have in common.
 
-    What a balancer knows of a rotor at constant speed is its vibration before balancing and its vibration per
+    A balancer sees of a rotor at constant speed its vibration before balancing and its vibration per
     unbalance, V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex
     alpha, the same U_0, the same sensor and the same amplitude to come below.
     """
@@ -134,8 +134,8 @@ Rotors = Callable[[int], CommonRotor]
 """The rotor by number of the drawn device that it belongs to."""
 
 
-_COUNT: Final = 16
-"""Devices by which it is told which of the scenes draws a quantity more widely."""
+_COMPARED_DEVICES: Final = 16
+"""Devices that show which of the scenes draws a quantity more widely."""
 
 
 class _Drawn(Protocol):
@@ -144,27 +144,27 @@ class _Drawn(Protocol):
     def __call__(self, number: int | None = None) -> CommonRotor: ...
 
 
-_SAME: Final = 0.01
+_ALIKE: Final = 0.01
 """Relative difference of speed, alpha and U_0 up to which two scenes describe one rotor: files state these to
 two or three digits, and a balancing run leaves more of a vibration than so small a difference makes."""
 
 
-def rotor_difference(one: CommonRotor, other: CommonRotor) -> str | None:
+def rotor_difference(rotor: CommonRotor, other: CommonRotor) -> str | None:
     """Name of a quantity in which two rotors differ; None: they are one, to the digits of scene files."""
     for name in ("speed", "influence", "unbalance"):
-        values = getattr(one, name), getattr(other, name)
-        if abs(values[0] - values[1]) > _SAME * max(map(abs, values)):
+        values = getattr(rotor, name), getattr(other, name)
+        if abs(values[0] - values[1]) > _ALIKE * max(map(abs, values)):
             return name
     return None
 
 
-def one_rotor(one: CommonRotor, other: CommonRotor) -> CommonRotor:
+def joined_rotor(rotor: CommonRotor, other: CommonRotor) -> CommonRotor:
     """Join two descriptions of one rotor: the more vibration, the worse sensor and the narrower limit.
 
     Symmetric in both: no verdict under it depends on which is named first.
     """
-    rougher = max(one, other, key=lambda rotor: (rotor.amplitude, rotor.mass or 0.0))
-    return replace(rougher, noise=max(one.noise, other.noise), limit=min(one.limit, other.limit))
+    rougher = max(rotor, other, key=lambda each: (each.amplitude, each.mass or 0.0))
+    return replace(rougher, noise=max(rotor.noise, other.noise), limit=min(rotor.limit, other.limit))
 
 
 def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
@@ -173,18 +173,18 @@ def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
     Each of speed, magnitude and angle of alpha, and size and direction of the unbalance deviates by what that
     scene draws which is least sure of it: the order of the scenes does not matter to the deviations.
     """
-    drawn_by = []
+    deviations = []
     for scene in scenes:
         with suppress(SceneError):
             # A rotor that stands still or does not vibrate says nothing of this one.
-            if (own := scene()).amplitude > 0.0:
-                drawn_by.append(_deviations(own, scene))
-    spread = np.array([np.std([of(number) for number in range(_COUNT)], axis=0) for of in drawn_by])
+            if (described := scene()).amplitude > 0.0:
+                deviations.append(_deviations(described, scene))
+    spread = np.array([np.std([of(n) for n in range(_COMPARED_DEVICES)], axis=0) for of in deviations])
     wider = np.argmax(spread, axis=0)
 
     def rotor(number: int) -> CommonRotor:
-        drawn = np.choose(wider, [of(number) for of in drawn_by])
-        speed, size, angle, unbalance, direction = drawn.tolist()
+        deviation = np.choose(wider, [of(number) for of in deviations])
+        speed, size, angle, unbalance, direction = deviation.tolist()
         return replace(
             nominal,
             speed=nominal.speed * math.exp(speed),
@@ -195,11 +195,11 @@ def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
     return cache(rotor)
 
 
-def _deviations(nominal: CommonRotor, drawn: _Drawn) -> Callable[[int], list[float]]:
-    """By number: logarithms of ratios to what the scene says, and angles."""
+def _deviations(nominal: CommonRotor, rotor_of: _Drawn) -> Callable[[int], list[float]]:
+    """Deviations of a device's rotor by number: logarithms of ratios to what the scene says, and angles."""
 
     def of(number: int) -> list[float]:
-        rotor = drawn(number)
+        rotor = rotor_of(number)
         influence, unbalance = rotor.influence / nominal.influence, rotor.unbalance / nominal.unbalance
         return [
             math.log(rotor.speed / nominal.speed),
@@ -225,13 +225,13 @@ def vibrating(scene: SceneFile, rotor: CommonRotor) -> CommonRotor:
 
 
 def assumed_rotor(scene: SceneFile) -> Iterator[Finding]:
-    """What a scene leaves to a default that holds for one rotor alone."""
+    """Finding on keys that a scene leaves to defaults that hold for one rotor alone."""
     keys = LIQUID_RING.tables["rotor"].keys
-    defaults = {key: keys[key].presence.default for key in _OF_ONE_ROTOR if f"rotor.{key}" in scene.defaulted}
-    if defaults:
-        texts = [f"rotor.{key} {_plain(default)}" for key, default in defaults.items()]
+    texts = []
+    for key in _OF_ONE_ROTOR:
+        if f"rotor.{key}" in scene.defaulted:
+            default = keys[key].presence.default
+            text = " at ".join(map(str, default.values())) if isinstance(default, Mapping) else str(default)
+            texts.append(f"rotor.{key} {text}")
+    if texts:
         yield Finding(code="rotor_assumed", values={"values": texts})
-
-
-def _plain(default: object) -> str:
-    return " at ".join(map(str, default.values())) if isinstance(default, Mapping) else str(default)

@@ -36,7 +36,7 @@ _LITRE = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Injection:
-    """One opening of one valve, and what it did by the next sample."""
+    """One opening of one valve, and its effect by the next sample."""
 
     time: float
     """s, at which the valve opens."""
@@ -156,7 +156,7 @@ class Outcome(StrEnum):
 
 
 class RunVerdict(StrEnum):
-    """What a run says of the loop."""
+    """Verdict of a run on the loop."""
 
     SETTLED = "settled"
     """The amplitude has held within its limit and stayed there, or nothing can change any more."""
@@ -173,12 +173,12 @@ _VERDICTS: Final[Mapping[Outcome, RunVerdict]] = {
     Outcome.UNSTABLE: RunVerdict.UNSTABLE,
     Outcome.DIVERGING: RunVerdict.UNSTABLE,
 }
-"""What an outcome says of the loop; any other: not settled."""
+"""Verdict by outcome; any other: not settled."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """One look at the vibration and what the controller made of it."""
+    """One sample of the vibration and the command that answers it."""
 
     time: float
     """s."""
@@ -201,7 +201,7 @@ class Simulation(PresentedResult):
     scene: Scene
     plant: LiquidRing
     state: np.void
-    """As it ended, type `RUN`."""
+    """State at the end, type `RUN`."""
     controller: str
     """`controller.kind` of the scene; of another algorithm the name of its type."""
     as_scene: bool
@@ -225,7 +225,7 @@ class Simulation(PresentedResult):
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
     again: Callable[[Scene, Sequence[str]], Simulation]
-    """Runs another scene under the same law, with given terms modelled."""
+    """Runs another scene under the same law, with the named terms modelled."""
 
     @property
     def status(self) -> str:
@@ -244,7 +244,7 @@ class Simulation(PresentedResult):
 
     @property
     def shortened(self) -> int:
-        """Injections that go on with gas in the port of the driven chamber, which keeps its residual fill."""
+        """Injections that end with gas in the port of the driven chamber, which keeps its residual fill."""
         return int(self.state["shortened"])
 
     @property
@@ -259,7 +259,7 @@ class Simulation(PresentedResult):
 
     @property
     def settling_time(self) -> float | None:
-        """s, from which on it first held, whatever the time limit; None when not settled."""
+        """Time from which on it first held, whatever the time limit, s; None when not settled."""
         first, last = float(self.state["held_since"]), float(self.state["since"])
         if self.state["settled"]:
             return first
@@ -289,7 +289,7 @@ class Simulation(PresentedResult):
 
     @cached_property
     def outcome(self) -> Outcome:
-        """How the run ended.
+        """End of the run.
 
         SETTLED takes a true amplitude that held within the limit for the hold time and then in all but 1 % of
         the samples of a further minute, or a run in which nothing can change any more.  Both are known when
@@ -320,7 +320,7 @@ class Simulation(PresentedResult):
         return Outcome.TOO_MANY_SAMPLES if cause == SAMPLES else self._out_of_time
 
     def _unmoved(self, last: Injection) -> Outcome:
-        """Why an injection moved nothing; gas that would drive it may lack the time to fill the chamber."""
+        """Cause of an injection that moved nothing; gas may have lacked the time to fill the chamber."""
         plant = self.plant
         if last.event in {Event.EMPTY, Event.FULL}:
             return Outcome.CHAMBER_EMPTY
@@ -347,12 +347,12 @@ class Simulation(PresentedResult):
 
     @property
     def verdict(self) -> RunVerdict:
-        """What the outcome says of the loop."""
+        """Verdict on the loop."""
         return _VERDICTS.get(self.outcome, RunVerdict.NOT_SETTLED)
 
     @property
     def balancer(self) -> str:
-        """Kind of the scene."""
+        """Kind of the balancer, as in the scene."""
         return self.scene.balancer
 
     @property
@@ -362,7 +362,7 @@ class Simulation(PresentedResult):
 
     @property
     def hold_time(self) -> float:
-        """s."""
+        """Time for which the amplitude must hold within the limit, s."""
         return self.scene.controller.hold_time
 
     @property
@@ -382,12 +382,12 @@ class Simulation(PresentedResult):
 
     @property
     def limit(self) -> float:
-        """m."""
+        """Amplitude to come below, m."""
         return self.scene.controller.limit
 
     @property
     def tolerance(self) -> float:
-        """At which the models were selected."""
+        """Tolerance at which the models were selected."""
         return self.scene.tolerance
 
     @cached_property

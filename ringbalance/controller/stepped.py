@@ -35,7 +35,7 @@ class Memory:
 
 
 class Stepped:
-    """A `Controller` that does what an algorithm of the program does."""
+    """`Controller` that steps an algorithm of the program."""
 
     def __init__(self, algorithm: BuiltIn) -> None:
         self.algorithm, self.rises_tolerated = algorithm, algorithm.rises_tolerated
@@ -44,11 +44,11 @@ class Stepped:
         self._plant = algorithm.plant if isinstance(algorithm, LawBased) else empty_plants(1)
 
     def start(self) -> Memory:
-        """As `Controller.start`."""
+        """State before the first sample."""
         return Memory(self._run, self.algorithm.liquid())
 
     def step(self, state: Memory, measurement: Measurement | None) -> tuple[Memory, Command]:
-        """As `Controller.step`."""
+        """Next state and command after one sample (None: dropped)."""
         run, liquid = state.run.copy(), state.liquid.copy()
         show(run[0], measurement)
         if measurement is not None:
@@ -62,13 +62,13 @@ class Stepped:
 def scene_controller(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Stepped:
     """The algorithm that a scene asks for, with the scene's settings, for one of your own to wrap.
 
-    Args: `flow_law`: what the law-based algorithm believes of the flow; default the calibrated law.
+    Args: `flow_law`: law that the law-based algorithm assumes; default the calibrated law.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
         >>> inner = rb.scene_controller(scene)
-        >>> seen = rb.Measurement(time=0.0, amplitude=1e-5, phase=0.0)
-        >>> state, command = inner.step(inner.start(), seen)
+        >>> measurement = rb.Measurement(time=0.0, amplitude=1e-5, phase=0.0)
+        >>> state, command = inner.step(inner.start(), measurement)
         >>> [valve.chamber for valve in command.valves]
         [0, 1]
     """

@@ -1,8 +1,8 @@
-"""Composition of a run: the terms that it models, and whether scene and balancer can be run at all."""
+"""Composition of a run: the terms that it models, and checks that scene and balancer can be run at all."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
@@ -22,16 +22,16 @@ VOLUME_TOLERANCE: Final = 0.05
 
 
 def run_models(
-    *, scene: Scene, model: BalancerModel, asked: Collection[str] | None = None
+    *, scene: Scene, model: BalancerModel, terms: Collection[str] | None = None
 ) -> tuple[ModelUsed, ...]:
     """Model of every term in a run; under the calibrated law the same list as `calibrate` gives.
 
-    Args: `model`: the balancer; a law that gives no forces can carry no term of an injection. `asked`: names
-        of the terms to model instead; None: all.
+    Args: `model`: the balancer; a law that gives no forces can carry no term of an injection. `terms`: names
+        of those to model; None: all.
     Raises: ValueError: a term that is not known, or that the scene or the law gives no numbers for.
     """
-    _check(scene, model, asked or ())
-    return models_used(scene, law=model.name, obstacles=_obstacles(model), selected=asked)
+    _check(scene, model, terms or ())
+    return models_used(scene, law=model.name, obstacles=_obstacles(model), selected=terms)
 
 
 def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
@@ -55,7 +55,7 @@ def dynamics_of(
 ) -> Dynamics:
     """Dynamics that move the liquid: the flow law, and beyond it the modelled terms.
 
-    Args: `residual_fill`: of a driven chamber. `checked`: whether the terms are known to have numbers, as
+    Args: `residual_fill`: of a driven chamber. `checked`: true if the terms are known to have numbers, as
         for the many scenes of a fit that differ in values alone.
     Raises: ValueError: a term that is not known, or that the scene or the law gives no numbers for.
     """
@@ -72,8 +72,8 @@ def dynamics_of(
     )
 
 
-def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
-    for term in asked:
+def _check(scene: Scene, model: BalancerModel, terms: Collection[str]) -> None:
+    for term in terms:
         if term not in IN_INJECTIONS:
             raise ValueError(f"no term {term!r}; there are {', '.join(IN_INJECTIONS)}")
         gas = scene.gas
@@ -84,7 +84,7 @@ def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
 
 
 def _obstacles(model: BalancerModel) -> dict[str, str]:
-    """Why the law cannot carry a term, by term."""
+    """Reasons for which the law cannot carry a term, by term."""
     if not gives_forces(model.flow):
         return dict.fromkeys(IN_INJECTIONS, "this law gives velocities and no forces")
     if isinstance(model.flow, PaperLaw):
@@ -100,19 +100,11 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
 
     Raises: SceneError: largest fill or chamber volume of the scene and of the model do not agree.
     """
-    faults = [*_fill_faults(scene, model), *_volume_faults(scene, model)]
-    if faults:
-        raise SceneError(faults)
-
-
-def _fill_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
+    faults: list[Fault] = []
     largest = model.flow.max_fill_ratio
     if abs(scene.disc.max_fill_ratio - largest) > 1e-9:
         problem = f"the {model.name} law was made for another fill"
-        yield scene_fault(scene, "disc.max_fill_ratio", problem=problem, allowed=f"{largest:.6g}")
-
-
-def _volume_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
+        faults.append(scene_fault(scene, "disc.max_fill_ratio", problem=problem, allowed=f"{largest:.6g}"))
     # Eq. 4 knows no rib, fillet or gas tube of an imported chamber, which can be much of it.
     by_paper = isinstance(model.flow, PaperLaw) and scene.disc.geometry is not None
     volume = (paper.chamber_volume_paper if by_paper else chamber_volume)(disc=scene.disc)
@@ -122,7 +114,9 @@ def _volume_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
             f"{model.name} law: that was made for another disc"
         )
         allowed = "that disc, or a law made for this one"
-        yield scene_fault(scene, "disc.axial_width", problem=problem, allowed=allowed)
+        faults.append(scene_fault(scene, "disc.axial_width", problem=problem, allowed=allowed))
+    if faults:
+        raise SceneError(faults)
 
 
 def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:

@@ -16,7 +16,7 @@ from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.judging.judge import judged
-from ringbalance.controller.rotor import CommonRotor, one_rotor, rotors_of
+from ringbalance.controller.rotor import CommonRotor, joined_rotor, rotors_of
 from ringbalance.results.requirements import Paired
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.origins import SceneFile
@@ -173,7 +173,7 @@ def test_both_are_run_on_the_same_drawn_rotor_whichever_is_first(
     ring, masses = under_paper_law(paper_scene), balancer_of(small)
     both: dict[int, CommonRotor] = {}
     for first, second in ((ring, masses), (masses, ring)):
-        common = one_rotor(first.rotor(), second.rotor())
+        common = joined_rotor(first.rotor(), second.rotor())
         rotors = rotors_of(common, first.rotor, second.rotor)
         placed = [each.on_rotor(common, rotors) for each in (first, second)]
         for number in (3, 70):

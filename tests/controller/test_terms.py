@@ -37,7 +37,7 @@ def test_the_papers_law_has_no_mass_in_the_tube(scene: Scene, model: BalancerMod
     found = {used.term: used for used in run_models(scene=trial, model=model)}
     assert not found["tube inertia"].modelled
     assert "no mass in the tube" in found["tube inertia"].why
-    asked = {used.term: used for used in run_models(scene=trial, model=model, asked=["tube inertia"])}
+    asked = {used.term: used for used in run_models(scene=trial, model=model, terms=["tube inertia"])}
     assert asked["tube inertia"].modelled
 
 

@@ -57,7 +57,7 @@ class ValveCommand:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What the algorithm wants done now.
+    """Command of an algorithm: valves to open, or none.
 
     Example:
         >>> valve = rb.ValveCommand(chamber=0, duration=0.02)
@@ -69,7 +69,7 @@ class Command:
     resting: bool = False
     """True when the algorithm is content: the amplitude is not above its limit."""
     reason: str = ""
-    """Why no valve opens although the algorithm is not content; empty otherwise."""
+    """Reason for which no valve opens although the algorithm is not content; empty otherwise."""
 
 
 class Controller(Protocol[StateT]):

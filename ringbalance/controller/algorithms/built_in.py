@@ -1,4 +1,4 @@
-"""Algorithms of the program: what all share, and the two that follow no liquid, target vector and trial."""
+"""Algorithms of the program: the common part, and the two that follow no liquid, target vector and trial."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ class BuiltIn:
     """An algorithm of the program, whose step is compiled within the loop."""
 
     scene: Scene
-    """Whose settings it has."""
+    """Scene with the algorithm's settings."""
 
     @property
     def rises_tolerated(self) -> int:
-        """As `Controller` has it: a rise, and another after what was assumed has been corrected."""
+        """Rises in a row that are borne: one, and another after an assumption has been corrected."""
         return 2
 
     def fill(self, loop: Record, run: Record) -> None:  # noqa: ARG002
@@ -63,7 +63,7 @@ class BuiltIn:
         loop["offset"][:chambers] = settings.offsets(chambers)
 
     def liquid(self) -> Records:
-        """The pairs as the algorithm believes them to be at the start; empty where it has no belief."""
+        """Pairs as the algorithm estimates them at the start; empty where it follows no liquid."""
         return np.zeros(0, dtype=MOTION)
 
 
@@ -77,7 +77,7 @@ def open_valve(loop: Record, run: Record, chamber: int, share: float, offset: fl
 
 
 def show(run: Record, measurement: Measurement | None) -> None:
-    """Write what a sensor gave into an element of type `RUN`."""
+    """Write a measurement into an element of type `RUN`."""
     run["usable"] = 0
     if measurement is not None:
         run["seen_amplitude"], run["seen_phase"] = measurement.amplitude, measurement.phase
@@ -88,8 +88,8 @@ def show(run: Record, measurement: Measurement | None) -> None:
 def command_of(sample: Record, chambers: int) -> Command:
     """The command in an element of type `RUN` or `SAMPLE`."""
     half = chambers // 2
-    asked = np.flatnonzero(sample["asked"])
-    opened = sorted((int(sample["side"][p]) * half + int(p), float(sample["asked"][p])) for p in asked)
+    pairs = np.flatnonzero(sample["asked"])
+    opened = sorted((int(sample["side"][p]) * half + int(p), float(sample["asked"][p])) for p in pairs)
     valves = tuple(ValveCommand(chamber=chamber, duration=duration) for chamber, duration in opened)
     return Command(valves=valves, resting=bool(sample["resting"]), reason=REASONS[int(sample["reason"])])
 
@@ -125,7 +125,7 @@ class TargetVector(BuiltIn):
     """Treatment of the integral when the residual turns round."""
 
     def fill(self, loop: Record, run: Record) -> None:
-        """As `BuiltIn.fill`."""
+        """Write the settings, those of this algorithm included."""
         super().fill(loop, run)
         constants = self.constants
         loop["algorithm"], loop["settings"][: len(constants)] = TARGET_VECTOR, constants
@@ -172,7 +172,7 @@ def target_vector_step(loop: Record, run: Record) -> None:
 
 @in_place
 def _open_valves(loop: Record, run: Record, first: int) -> None:
-    """Command what the memory says of each chamber, from the place `first` on."""
+    """Command the open times that the memory holds for each chamber, from the place `first` on."""
     for chamber in range(loop.chambers):
         opened = run.memory[first + PER_CHAMBER * chamber + OPEN_TIME]
         if opened > 0.0:
@@ -199,7 +199,7 @@ class Trial(BuiltIn):
         return len(self.scene.controller.sequence)
 
     def fill(self, loop: Record, run: Record) -> None:
-        """As `BuiltIn.fill`."""
+        """Write the settings, those of this algorithm included."""
         super().fill(loop, run)
         constants = self.constants
         loop["algorithm"], loop["settings"][: len(constants)] = TRIAL, constants

@@ -82,9 +82,9 @@ class LawBased(BuiltIn):
     """
 
     model: BalancerModel
-    """As the algorithm assumes it, which need not be the one that is controlled."""
+    """Model that the algorithm assumes, which need not be the one that is controlled."""
     relative_error: float = RELATIVE_ERROR
-    """Allowed to a step of the liquid that it follows."""
+    """Error allowed to a step of the liquid that it follows."""
 
     @cached_property
     def ring(self) -> LiquidRing:
@@ -110,23 +110,21 @@ class LawBased(BuiltIn):
     def law_standard_deviation(self) -> float:
         """Standard deviation of the law's velocity at the start, relative."""
         level, flow = self.ring.total / 2, self.ring.model.flow
-        found = flow.evaluate(
+        answer = flow.evaluate(
             fill_ratio=level, opposite_fill_ratio=level, gas_pressure=self.ring.gas_pressure
         )
-        velocity = abs(float(found.velocity))
-        own = float(found.uncertainty) / (2 * velocity) if velocity > 0 else 0.0
-        return max(own, LEAST_LAW_STANDARD_DEVIATION)
+        velocity = abs(float(answer.velocity))
+        relative = float(answer.uncertainty) / (2 * velocity) if velocity > 0 else 0.0
+        return max(relative, LEAST_LAW_STANDARD_DEVIATION)
 
     def fill(self, loop: Record, run: Record) -> None:
-        """As `BuiltIn.fill`."""
+        """Write the settings, the influence assumed and its variance included."""
         super().fill(loop, run)
         scene, chambers, total = self.scene, self.ring.chambers, self.ring.total
         influence, sensor = scene.controller.assumed_influence, scene.sensor
         loop["algorithm"], loop["influence"] = LAW_BASED, influence
-        loop["assumed_amplitude_noise"], loop["assumed_phase_noise"] = (
-            sensor.amplitude_noise,
-            sensor.phase_noise,
-        )
+        loop["assumed_amplitude_noise"] = sensor.amplitude_noise
+        loop["assumed_phase_noise"] = sensor.phase_noise
         loop["probe"], loop["law_deviation"] = scene.controller.period, self.law_standard_deviation
         loop["axis"][: chambers // 2] = chamber_directions(chambers)[: chambers // 2]
         lowest = total - self.ring.model.flow.max_fill_ratio
@@ -137,7 +135,7 @@ class LawBased(BuiltIn):
         run["memory"][VARIANCE] = abs(PRIOR_STANDARD_DEVIATION * influence) ** 2
 
     def liquid(self) -> Records:
-        """As `BuiltIn.liquid`."""
+        """Pairs at rest at equal fills, and a spare one to try."""
         return self._liquid.copy()
 
     @cached_property
@@ -166,7 +164,7 @@ def controller_of(scene: Scene, model: BalancerModel, *, relative_error: float =
 def law_based_step(
     loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
 ) -> None:
-    """One step of `LawBased` on a usable sample; `liquid` has the pairs as they are believed to be."""
+    """One step of `LawBased` on a usable sample; `liquid` has the pairs as estimated."""
     _follow(loop, plant, run, liquid, notes, w)
     run.before_time = run.time
     run.before_amplitude, run.before_phase = run.seen_amplitude, run.seen_phase
@@ -187,10 +185,10 @@ def _vector(amplitude: float, phase: float) -> complex:
 
 @in_place
 def _disc_moment(loop: Record, plant: Record, liquid: Record) -> complex:
-    found = 0j
+    moment = 0j
     for i in range(loop.chambers // 2):
-        found += loop.axis[i] * pair_moment(plant, shown(plant, liquid[i], liquid[i].state[X]))
-    return found
+        moment += loop.axis[i] * pair_moment(plant, shown(plant, liquid[i], liquid[i].state[X]))
+    return moment
 
 
 @in_place
@@ -216,10 +214,8 @@ def _follow(
         moment = _along(plant, shown(plant, liquid[i], liquid[i].state[X]))
         set_should(m, 0, i, moment, run.given[i] > 0.0)
     if opened:
-        seen, last = (
-            _vector(run.seen_amplitude, run.seen_phase),
-            _vector(run.before_amplitude, run.before_phase),
-        )
+        seen = _vector(run.seen_amplitude, run.seen_phase)
+        last = _vector(run.before_amplitude, run.before_phase)
         after = _disc_moment(loop, plant, liquid)
         m[SEEN_X], m[SEEN_Y], m[LAST_X], m[LAST_Y] = seen.real, seen.imag, last.real, last.imag
         m[NOW_X], m[NOW_Y] = after.real, after.imag
@@ -346,11 +342,11 @@ def _time_to(
     time = longest
     for _ in range(_HALVINGS):
         time = low + (high - low) * above / (above - below) if above > below else (low + high) / 2.0
-        found = _fill_after(plant, liquid, pair, side, time, notes, w) - target
-        if abs(found) <= FILL_ERROR * plant.relative_error or high - low <= 4e-16 * high:
+        off = _fill_after(plant, liquid, pair, side, time, notes, w) - target
+        if abs(off) <= FILL_ERROR * plant.relative_error or high - low <= 4e-16 * high:
             break
-        if found > 0.0:
-            low, above, below, stays = time, found, below * (0.5 if stays > 0 else 1.0), 1
+        if off > 0.0:
+            low, above, below, stays = time, off, below * (0.5 if stays > 0 else 1.0), 1
         else:
-            high, below, above, stays = time, found, above * (0.5 if stays < 0 else 1.0), -1
+            high, below, above, stays = time, off, above * (0.5 if stays < 0 else 1.0), -1
     return time

@@ -1,4 +1,4 @@
-"""The liquid ring as every command knows it."""
+"""The liquid ring behind the interface of every balancer."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class LiquidRingBalancer(Balancer):
     scene: Scene
     _: KW_ONLY
     flow_law: Any = None
-    """May be a name that `law_by_name` knows, too."""
+    """A law, or a name that `law_by_name` knows; None: calibrated from the scene."""
     controller: Controller[Any] | None = None
     sensor: Sensor | None = None
     modelled: Collection[str] | None = None
@@ -87,10 +87,12 @@ class LiquidRingBalancer(Balancer):
     """Rotors of drawn devices; None: their own, drawn."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no algorithm."""
-        own = self.controller
-        if own is not None and not (hasattr(own, "start") and hasattr(own, "step")):
-            raise TypeError(f"an algorithm has start() and step(state, measurement), which {own!r} has not")
+        """Refuse a controller that is no algorithm."""
+        if (algorithm := self.controller) is None or (
+            hasattr(algorithm, "start") and hasattr(algorithm, "step")
+        ):
+            return
+        raise TypeError(f"an algorithm has start() and step(state, measurement), which {algorithm!r} has not")
 
     @cached_property
     def model(self) -> BalancerModel:
@@ -118,7 +120,7 @@ class LiquidRingBalancer(Balancer):
     def settings(self) -> tuple[Setting, ...]:
         """Gas pressure, gain and integral time."""
         gas, settings = self.scene.gas, self.scene.controller
-        found = [
+        listed = [
             Setting(
                 path="gas.pressure",
                 value=gas.pressure,
@@ -131,8 +133,8 @@ class LiquidRingBalancer(Balancer):
             ("controller.integral_time", settings.integral_time),
         ):
             if value is not None:
-                found.append(Setting(path=path, value=value, lowest=value / _GAIN, highest=value * _GAIN))
-        return tuple(found)
+                listed.append(Setting(path=path, value=value, lowest=value / _GAIN, highest=value * _GAIN))
+        return tuple(listed)
 
     def run(
         self,
@@ -142,9 +144,9 @@ class LiquidRingBalancer(Balancer):
         trace: bool = False,
         progress: Progress | None = None,
     ) -> Outcomes:
-        """See `Balancer`; without traces, runs of the program's own algorithm and sensor are many at once."""
-        own = (self.controller, self.sensor, self.modelled) != (None, None, None) or self.to_time_limit
-        if not trace and not own:
+        """Closed-loop runs; those of the program's own algorithm and sensor without traces run together."""
+        foreign = (self.controller, self.sensor, self.modelled) != (None, None, None)
+        if not (trace or foreign or self.to_time_limit):
             return self.run_all([settings], draws)[0]
         scene = with_values_at(self.scene, settings)
         traced = [
@@ -155,26 +157,26 @@ class LiquidRingBalancer(Balancer):
     def run_all(
         self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
     ) -> tuple[Outcomes, ...]:
-        """See `Balancer`; for the program's own algorithms and an exact or noisy sensor of the scene."""
+        """Run several settings with the program's own algorithms and sensor, without traces."""
         return self._drawn_runs.outcomes(settings, draws, further=further)
 
     def asked_fraction(self) -> float:
-        """The scene's."""
+        """Fraction of the devices that the scene requires to meet every demand."""
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
         """Settled in time, and the unbalance that must be corrected."""
-        wanted = self.scene.requirement
-        time = self.span() if wanted.settling_time is None else wanted.settling_time
-        stated, allowed = wanted.settling_time is not None, self.scene.required_amplitude
+        requirement = self.scene.requirement
+        time = self.span() if requirement.settling_time is None else requirement.settling_time
+        stated, allowed = requirement.settling_time is not None, self.scene.required_amplitude
         settles = settles_within(time, stated=stated, amplitude=allowed)
-        if wanted.correction_moment is None:
+        if requirement.correction_moment is None:
             return (settles,)
         moment = Demand(
             code="correction_moment",
             outcome="usable_moment",
             sense=AT_LEAST,
-            required=wanted.correction_moment,
+            required=requirement.correction_moment,
             unit="kg m",
             stated=True,
         )
@@ -185,26 +187,23 @@ class LiquidRingBalancer(Balancer):
         return trials(self.scene, self.model, limit=self.limit)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """See `Balancer`."""
         return remedies_of(self.scene, self.model)
 
     def choices(self) -> tuple[Remedy, ...]:
-        """Valves; see `Balancer`."""
+        """Valves that can be bought, where the scene gives none."""
         return valves_of(self.scene)
 
     def drawn_input(self, name: str) -> DrawnInput:
-        """See `Balancer`."""
         return drawn_input(name)
 
     def on_scene(self, scene: SceneFile) -> LiquidRingBalancer:
-        """See `Balancer`."""
         return replace(self, scene=liquid_ring_scene(scene))
 
     @property
     def limit(self) -> float:
         """Amplitude that may remain, m: the one required, else the controller's limit."""
-        asked = self.scene.required_amplitude
-        return self.scene.controller.limit if asked is None else asked
+        required = self.scene.required_amplitude
+        return self.scene.controller.limit if required is None else required
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:
@@ -220,13 +219,13 @@ class LiquidRingBalancer(Balancer):
         )
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> RunResult:
-        drawn: dict[str, Any] = {"controller": self.controller}
+        loop: dict[str, Any] = {"controller": self.controller}
         informed = self._drawn_runs.informed if self.flow_law == UNCHECKED else self.model
         model, moment = informed, 1.0
         if devices:
             device = self._drawn_runs.device(number)
             model, scene, moment = device.model, device.under(scene, of=self.scene), device.moment
-            drawn = {
+            loop = {
                 "controller": self.controller or controller_of(scene, informed),
                 "speed": device.speed,
                 "noise": run_noise(self.scene.run.seed, number),
@@ -240,9 +239,9 @@ class LiquidRingBalancer(Balancer):
             progress=progress,
             modelled=self.modelled,
             to_time_limit=self.to_time_limit,
-            **drawn,
+            **loop,
         )
-        run = replace(run, findings=(*run.findings, *_of_own_law(self.flow_law, run)))
+        run = replace(run, findings=(*run.findings, *_law_findings(self.flow_law, run)))
         return RunResult(
             run=run,
             settling_time=math.inf if run.settling_time is None else run.settling_time,
@@ -255,7 +254,6 @@ class LiquidRingBalancer(Balancer):
         )
 
     def rotor(self, number: int | None = None) -> CommonRotor:
-        """See `Balancer`."""
         scene = self.scene if number is None else self._drawn_runs.device(number).scene
         return CommonRotor(
             source=scene.source,
@@ -295,44 +293,37 @@ class LiquidRingBalancer(Balancer):
         return replace(self, scene=scene, rotors=rotors)
 
     def sampling_time(self) -> float:
-        """See `Balancer`."""
         return self.scene.controller.period
 
     def lasting(self, span: float) -> LiquidRingBalancer:
-        """See `Balancer`."""
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
     def information(self, scene: SceneFile) -> Information:
-        """See `Balancer`."""
-        known = loop_information(liquid_ring_scene(scene), self.model)
-        return replace(known, document={**known.document, "drawn": self._drawn_runs.spread.document()})
+        loop = loop_information(liquid_ring_scene(scene), self.model)
+        return replace(loop, document={**loop.document, "drawn": self._drawn_runs.spread.document()})
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:
-        """See `Balancer`."""
         return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended, settings=settings))
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Those of its calibration; see `Balancer`."""
+        """Quantities of its calibration."""
         return calibrate(self.scene).rows().quantities
 
     def rows(self, run: Simulation) -> Rows:
-        """See `Balancer`."""
         rows = run.rows()
-        at_ends = line_runs_table(line_runs(run))
-        return replace(rows, tables=(at_ends, *rows.tables))
+        return replace(rows, tables=(line_runs_table(line_runs(run)), *rows.tables))
 
     def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:
-        """See `Balancer`."""
         return simulation_history(run)
 
 
-def _of_own_law(law: object, run: Simulation) -> Iterator[Finding]:
-    """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
+def _law_findings(law: object, run: Simulation) -> Iterator[Finding]:
+    """Findings on numbers that a law of the caller's own does not give: taken from elsewhere, or left out."""
     if law is None or isinstance(law, CalibratedLaw | PaperLaw | str):
         return
-    rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
+    terms = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
     if names := lacking(law):
         yield Finding(code="own_law_lacks", values={"names": names})
-    if rows and not gives_forces(run.model.flow):
-        yield Finding(code="own_law_without_forces", values={"terms": rows})
+    if terms and not gives_forces(run.model.flow):
+        yield Finding(code="own_law_without_forces", values={"terms": terms})

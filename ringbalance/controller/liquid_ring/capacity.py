@@ -15,7 +15,7 @@ from ringbalance.results.rows import Finding, Value
 from ringbalance.scene.models import Scene
 
 _NOTICEABLE: Final = 1e-3
-"""Fill by which a running flow must go further to be worth a word."""
+"""Fill by which a running flow must go further to be reported."""
 
 
 def beyond_capacity(
@@ -23,7 +23,7 @@ def beyond_capacity(
 ) -> Iterator[Finding]:
     """Findings where devices end for want of capacity.
 
-    Args: `ended`: how each one's run did. `settings`: what to call those of the scene.
+    Args: `ended`: codes of the ends of their runs. `settings`: what to call those of the scene.
     """
     which = {"settings": settings}
     total, law = 2 * scene.disc.initial_fill, model.flow
@@ -32,7 +32,7 @@ def beyond_capacity(
     stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
 
     def moment(least: float) -> float:
-        """Of a pair with a chamber emptied to a fill, kg m."""
+        """Moment of a pair with a chamber emptied to a fill, kg m."""
         high = min(total - min(least, total / 2), law.max_fill_ratio)
         return abs(complex(model.moment.pair_vector(fill_ratio=high, opposite_fill_ratio=total - high)))
 

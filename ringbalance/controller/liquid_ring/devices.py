@@ -69,20 +69,40 @@ class Spread:
     def of(cls, scene: Scene, model: BalancerModel, *, remade: bool = True) -> Spread:
         """Stated uncertainties, else assumed ones, and the errors of the law's models.
 
-        Args: `remade`: whether a calibrated law is the scene's own.
+        Args: `remade`: true if a calibrated law is the scene's own.
         """
-        remade = remade and isinstance(model.flow, CalibratedLaw)
-        moment = of_chamber(MOMENT, _moment(model))
-        if remade:
-            known = [each for each in uncertainties(scene) if each.name != MOMENT]
-            return cls(errors=(*known, moment, *of_runs(scene)), remade=True)
+        law, fill, top = model.flow, scene.disc.initial_fill, model.flow.max_fill_ratio
+        # A pair's largest moment, by numerics and models.
+        width = PAPER_MOMENT_UNCERTAINTY
+        if isinstance(model.moment, CalibratedMoment):
+            largest = float(model.moment.pair_moment(fill_ratio=top, opposite_fill_ratio=0.0))
+            width = float(np.hypot(*model.moment.half_width(np.array([0.0, top])))) / largest
+        moment = of_chamber(MOMENT, width)
+        if remade and isinstance(law, CalibratedLaw):
+            errors = [each for each in uncertainties(scene) if each.name != MOMENT]
+            return cls(errors=(*errors, moment, *of_runs(scene)), remade=True)
+
+        # The velocity of a law that is not remade, by models alone of the paper's.
+        if isinstance(law, PaperLaw):
+            stated = any(each.quantity == "drag_coefficient" for each in scene.uncertainty)
+            k = law.drag_coefficient
+            velocity_width = 0.0 if stated else PAPER_DRAG_UNCERTAINTY * k / (k + 1.0) / 2.0
+        else:
+            rest = law.evaluate(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=0.0, primed=True)
+            flow = law.evaluate(
+                fill_ratio=fill,
+                opposite_fill_ratio=fill,
+                gas_pressure=scene.gas.pressure,
+                primed=rest.primed,
+            )
+            velocity_width = float(flow.uncertainty) / (abs(float(flow.velocity)) or 1.0)
         loss = Uncertainty(
             name=LOSS,
             group=LOSS,
             acts_on="velocity in the tube",
             varies="not known",
             distribution="lognormal",
-            half_width=_loss(scene, model),
+            half_width=velocity_width,
         )
         inputs = uncertainties(scene, models=False)
         return cls(errors=(*inputs, loss, moment, *of_runs(scene)), remade=False)
@@ -90,7 +110,7 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Device:
-    """One of them: its scene, with the vibration that it starts with, and its law."""
+    """A drawn device: its scene, with the vibration that it starts with, and its law."""
 
     number: int
     scene: Scene
@@ -100,9 +120,9 @@ class Device:
     moment: float
     """Factor on the law's moments."""
     inputs: Mapping[str, float]
-    """Quantile of everything that was drawn, in (0, 1)."""
+    """Quantile of every drawn input, in (0, 1)."""
     clipped: tuple[str, ...]
-    """Inputs that lie nearer to the scene's value than drawn, since no device has the drawn one."""
+    """Inputs nearer to the scene's value than drawn, since no device has the drawn one."""
 
     def under(self, settings: Scene, *, of: Scene) -> Scene:
         """The device with a scene's controller and gas pressure; its gauge is as wrong as it was.
@@ -137,12 +157,24 @@ def devices(
     places = {each.name: quantiles(each.name, numbers, seed=seed) for each in spread.errors}
     quantile = _rows(places)
     deviation = _rows({each.name: each.deviation(places[each.name]) for each in spread.errors})
-    drawn = [_drawn(scene, spread, z) for z in deviation]
-    scenes = [each for each, _ in drawn]
+    shifted = [_shifted(scene, spread, z) for z in deviation]
+    scenes = [each for each, _ in shifted]
     if rotors is not None:
         pairs = zip(scenes, numbers, strict=True)
         scenes = [replace(each, rotor=rotor_like(each.rotor, rotors(number))) for each, number in pairs]
-    laws = _laws(scenes, scene, model, spread, deviation)
+
+    if isinstance(model.flow, PaperLaw):
+        k, width = model.flow.drag_coefficient, 2.0 * spread.half_width(LOSS)
+        drags = [k * math.exp(math.log1p(width * (k + 1.0) / k) * z[LOSS] / NORMAL_95) for z in deviation]
+        tubes = [replace(each.tube, drag_coefficient=k) for each, k in zip(scenes, drags, strict=True)]
+        of_tubes = zip(scenes, tubes, strict=True)
+        laws = [(paper_model(replace(each, tube=tube)), 1.0) for each, tube in of_tubes]
+    elif not spread.remade:
+        laws = [(model, spread.factor(LOSS, z)) for z in deviation]
+    else:
+        # Whether the devices hold gravity is the scene's own question.
+        gravity, waves = gravity_shares(scene).mean > scene.tolerance, [z[WAVES] for z in deviation]
+        laws = [(BalancerModel.of(law), 1.0) for law in nominal_laws(scenes, gravity=gravity, waves=waves)]
     return tuple(
         Device(
             number=number,
@@ -154,7 +186,7 @@ def devices(
             clipped=clipped,
         )
         for number, device, (law, speed), z, q, (_, clipped) in zip(
-            numbers, scenes, laws, deviation, quantile, drawn, strict=True
+            numbers, scenes, laws, deviation, quantile, shifted, strict=True
         )
     )
 
@@ -164,11 +196,11 @@ def _rows(columns: Mapping[str, FloatArray]) -> list[dict[str, float]]:
     return [dict(zip(columns, row, strict=True)) for row in np.stack(list(columns.values()), axis=1).tolist()]
 
 
-def rotor_like(own: Rotor, rotor: CommonRotor) -> Rotor:
+def rotor_like(scene_rotor: Rotor, rotor: CommonRotor) -> Rotor:
     """A scene's rotor with another's speed, influence coefficient and vibration before balancing."""
     vibration = rotor.influence * rotor.unbalance
     return replace(
-        own,
+        scene_rotor,
         speed=rotor.speed,
         influence_coefficient=abs(rotor.influence),
         lag_angle=-cmath.phase(rotor.influence),
@@ -177,7 +209,7 @@ def rotor_like(own: Rotor, rotor: CommonRotor) -> Rotor:
     )
 
 
-def _drawn(scene: Scene, spread: Spread, z: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
+def _shifted(scene: Scene, spread: Spread, z: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a device, and the inputs that no device can have as drawn."""
     alone = {
         name: z[each.name] * change
@@ -199,53 +231,3 @@ def _drawn(scene: Scene, spread: Spread, z: Mapping[str, float]) -> tuple[Scene,
         initial_phase=rotor.initial_phase + half * z[PHASE] / NORMAL_95,
     )
     return replace(device, rotor=started), clipped
-
-
-def _laws(
-    scenes: Sequence[Scene],
-    scene: Scene,
-    model: BalancerModel,
-    spread: Spread,
-    deviation: Sequence[Mapping[str, float]],
-) -> list[tuple[BalancerModel, float]]:
-    """Law of each device, and the factor on its velocity where only that is known to be uncertain.
-
-    Whether they hold gravity is the scene's own question.
-    """
-    if isinstance(model.flow, PaperLaw):
-        drags = [_drag(model.flow.drag_coefficient, spread, z) for z in deviation]
-        tubes = zip(scenes, drags, strict=True)
-        drawn = [replace(each, tube=replace(each.tube, drag_coefficient=drag)) for each, drag in tubes]
-        return [(paper_model(each), 1.0) for each in drawn]
-    if not spread.remade:
-        return [(model, spread.factor(LOSS, z)) for z in deviation]
-    gravity, waves = gravity_shares(scene).mean > scene.tolerance, [z[WAVES] for z in deviation]
-    return [(BalancerModel.of(law), 1.0) for law in nominal_laws(scenes, gravity=gravity, waves=waves)]
-
-
-def _drag(k: float, spread: Spread, z: Mapping[str, float]) -> float:
-    return k * math.exp(math.log1p(2.0 * spread.half_width(LOSS) * (k + 1.0) / k) * z[LOSS] / NORMAL_95)
-
-
-def _loss(scene: Scene, model: BalancerModel) -> float:
-    """Relative uncertainty of the velocity of a law that is not remade, by models alone of the paper's."""
-    law, fill = model.flow, scene.disc.initial_fill
-    if isinstance(law, PaperLaw):
-        stated = any(each.quantity == "drag_coefficient" for each in scene.uncertainty)
-        k = law.drag_coefficient
-        return 0.0 if stated else PAPER_DRAG_UNCERTAINTY * k / (k + 1.0) / 2.0
-    rest = law.evaluate(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=0.0, primed=True)
-    flow = law.evaluate(
-        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=rest.primed
-    )
-    u = abs(float(flow.velocity)) or 1.0
-    return float(flow.uncertainty) / u
-
-
-def _moment(model: BalancerModel) -> float:
-    """Relative uncertainty of a pair's largest moment by numerics and models."""
-    if not isinstance(model.moment, CalibratedMoment):
-        return PAPER_MOMENT_UNCERTAINTY
-    top = model.flow.max_fill_ratio
-    ends = model.moment.half_width(np.array([0.0, top]))
-    return float(np.hypot(*ends)) / float(model.moment.pair_moment(fill_ratio=top, opposite_fill_ratio=0.0))

@@ -49,8 +49,8 @@ _GROUPS: Final = (0, 4, 16, 32, 64)
 """Between which numbers, of each 64 that follow each other, devices are made at once: each has the same bits
 whichever are asked for, and of a design that four devices refuse no more are made.
 """
-_KEPT: Final = 32
-"""Groups of devices, and groups under a pressure."""
+_CACHED_GROUPS: Final = 32
+"""Groups of devices that are cached, and groups under a pressure."""
 _OUT_OF_REACH: Final = 2.0
 """Times the limit that remain with chambers emptied to their residual fills, from which on a run need not
 be carried out: none settles, and each would take its whole time limit.  Beyond the fill where the gas stalls
@@ -67,7 +67,7 @@ _ENDS: Final = (
     Outcome.GAS_TIME_TOO_SHORT,
     Outcome.TIME_LIMIT,
 )
-"""Of a run: the first that it shows, else the last."""
+"""Ends of a run: the first that it shows, else the last."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +86,7 @@ class DrawnRuns:
 
     @cached_property
     def informed(self) -> BalancerModel:
-        """The model with that, which the law-based algorithm asks for."""
+        """Model with uncertainties of the scene's inputs, which the law-based algorithm needs."""
         return calibrated_model(self.scene, checked=False) if self.bare else self.model
 
     @cached_property
@@ -97,7 +97,7 @@ class DrawnRuns:
     def outcomes(
         self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
     ) -> tuple[Outcomes, ...]:
-        """One a setting.
+        """Outcomes of each setting.
 
         Args: `settings`: of the gas pressure and of keys of [controller].
         Raises: SceneError: a rotor too slow to form a ring.
@@ -105,48 +105,49 @@ class DrawnRuns:
         check_ring(self.scene)
         if not settings:
             return ()
+        # Settings of one gas pressure and kind of controller run together.
         scenes = [with_values_at(self.scene, each) for each in settings]
         alike: dict[tuple[float, str], list[int]] = {}
-        for place, each in enumerate(scenes):
-            alike.setdefault((each.gas.pressure, each.controller.kind), []).append(place)
-        plans = {
-            key: self._plan([scenes[i] for i in places], draws, further) for key, places in alike.items()
-        }
+        for number, each in enumerate(scenes):
+            alike.setdefault((each.gas.pressure, each.controller.kind), []).append(number)
+        plans = {}
+        for (pressure, kind), indices in alike.items():
+            model = self.informed if kind == "law_based" else self.model
+            some = [scenes[i] for i in indices]
+            controllers = [controller_of(each, model, relative_error=RELATIVE_ERROR) for each in some]
+            plan = LoopPlan.of(some, controllers, most_samples=MOST_SAMPLES, further=further)
+            plan.loops["limit"] = self.limit
+            plan.loops["time_limit"] = min(self.scene.run.time_limit, draws.until)
+            plans[pressure, kind] = plan
+
         shape = len(settings), len(draws.numbers)
         numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
-        drawn: list[Device] = []
-        for block, some in groupby(draws.numbers, _group):
-            asked = list(some)
-            columns = slice(len(drawn), len(drawn) + len(asked))
-            for (pressure, kind), places in alike.items():
+        devices_run: list[Device] = []
+        for block, members in groupby(draws.numbers, _group):
+            requested = list(members)
+            columns = slice(len(devices_run), len(devices_run) + len(requested))
+            for (pressure, kind), indices in alike.items():
                 under = self._under(block, draws.devices, pressure)
-                place_of = {each.number: place for place, each in enumerate(under.group.devices)}
-                rows = np.array([place_of[number] for number in asked])
-                numbers[:, places, columns], ends[places, columns] = under.ran(
+                row_of = {each.number: row for row, each in enumerate(under.group.devices)}
+                rows = np.array([row_of[number] for number in requested])
+                numbers[:, indices, columns], ends[indices, columns] = under.ran(
                     plans[pressure, kind], rows, whole=draws.whole, limit=self.limit
                 )
-            drawn += [under.group.devices[row] for row in rows]
-        inputs = {name: np.array([each.inputs[name] for each in drawn]) for name in drawn[0].inputs}
-        clipped = Counter(name for each in drawn for name in each.clipped)
+            devices_run += [under.group.devices[row] for row in rows]
+        inputs = {
+            name: np.array([each.inputs[name] for each in devices_run]) for name in devices_run[0].inputs
+        }
+        clipped = Counter(name for each in devices_run for name in each.clipped)
         return tuple(
             Outcomes(
-                **dict(zip(ARRAYS, numbers[:, place], strict=True)),
-                ended=tuple(str(_ENDS[end]) for end in ends[place]),
+                **dict(zip(ARRAYS, numbers[:, index], strict=True)),
+                ended=tuple(str(_ENDS[end]) for end in ends[index]),
                 numbers=draws.numbers,
                 inputs=inputs,
                 clipped=clipped,
             )
-            for place in range(len(settings))
+            for index in range(len(settings))
         )
-
-    def _plan(self, scenes: Sequence[Scene], draws: Draws, further: float) -> LoopPlan:
-        """Settings of one gas pressure and kind of controller."""
-        model = self.informed if scenes[0].controller.kind == "law_based" else self.model
-        controllers = [controller_of(each, model, relative_error=RELATIVE_ERROR) for each in scenes]
-        plan = LoopPlan.of(scenes, controllers, most_samples=MOST_SAMPLES, further=further)
-        plan.loops["limit"] = self.limit
-        plan.loops["time_limit"] = min(self.scene.run.time_limit, draws.until)
-        return plan
 
     def device(self, number: int) -> Device:
         """One of the devices."""
@@ -161,40 +162,40 @@ class DrawnRuns:
     def _devices(self) -> Callable[[range], tuple[Device, ...]]:
         """Devices of some numbers; the last ones are cached, as a search runs the same again and again."""
 
-        def made(block: range) -> tuple[Device, ...]:
+        def made_together(block: range) -> tuple[Device, ...]:
             seed, rotors = self.scene.run.seed, self.rotors
             return devices(self.scene, self.model, self.spread, block, seed=seed, rotors=rotors)
 
-        return lru_cache(_KEPT)(made)
+        return lru_cache(_CACHED_GROUPS)(made_together)
 
     @cached_property
     def _groups(self) -> Callable[[range, bool, float], _Group]:
-        """By numbers, whether devices are drawn, and gas pressure; kept likewise."""
+        """Groups by numbers, true for drawn devices, and gas pressure; the last ones are cached."""
 
-        def made(block: range, drawn: bool, pressure: float) -> _Group:
-            own = Device(
+        def group(block: range, varied: bool, pressure: float) -> _Group:
+            exact = Device(
                 number=0, scene=self.scene, model=self.model, speed=1.0, moment=1.0, inputs={}, clipped=()
             )
-            some = self._devices(block) if drawn else [replace(own, number=number) for number in block]
+            some = self._devices(block) if varied else [replace(exact, number=number) for number in block]
             settings = replace(self.scene, gas=replace(self.scene.gas, pressure=pressure))
             scenes = [each.under(settings, of=self.scene) for each in some]
-            noise = partial(noise_table, self.scene.run.seed, devices=drawn)
+            noise = partial(noise_table, self.scene.run.seed, devices=varied)
             return _Group.of(some, scenes, modelled=self.terms, noise=noise)
 
-        return lru_cache(_KEPT)(made)
+        return lru_cache(_CACHED_GROUPS)(group)
 
     @cached_property
     def _under(self) -> Callable[[range, bool, float], _Under]:
-        """By numbers, whether devices are drawn, and gas pressure of the settings; kept likewise."""
+        """Groups by numbers, true for drawn devices, and gas pressure of the settings; cached likewise."""
 
-        def made(block: range, drawn: bool, pressure: float) -> _Under:
+        def under(block: range, varied: bool, pressure: float) -> _Under:
             stated = self.scene.gas.pressure
             # A law of velocities alone is tabulated for one pressure.
-            group = self._groups(block, drawn, stated if gives_forces(self.model.flow) else pressure)
-            own = np.array([each.scene.gas.pressure for each in group.devices])
-            return group.under(np.maximum(own + pressure - stated, 0.0))
+            group = self._groups(block, varied, stated if gives_forces(self.model.flow) else pressure)
+            pressures = np.array([each.scene.gas.pressure for each in group.devices])
+            return group.under(np.maximum(pressures + pressure - stated, 0.0))
 
-        return lru_cache(_KEPT)(made)
+        return lru_cache(_CACHED_GROUPS)(under)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,7 +207,7 @@ class _Group:
     scenes: tuple[Scene, ...]
     """Scenes as which the devices run."""
     kinds: tuple[tuple[slice, Scene], ...]
-    """Places of those that differ in numbers alone, and these as one scene."""
+    """Rows of devices that differ in numbers alone, and these as one scene."""
     plants: Records
     """Type `PLANT`."""
     fields: Mapping[str, Any]
@@ -217,20 +218,20 @@ class _Group:
 
     @classmethod
     def of(
-        cls, drawn: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str], noise: Any
+        cls, devices: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str], noise: Any
     ) -> _Group:
-        """Args: `scenes`: of the devices, with what they run under. `noise`: as `noise_table`, by number."""
+        """Args: `scenes`: of the devices, with their settings. `noise`: as `noise_table`, by number."""
         order = alike(scenes)
-        places = [place for kind in order for place in kind]
-        some, scenes = tuple(drawn[place] for place in places), [scenes[place] for place in places]
+        indices = [index for kind in order for index in kind]
+        some, scenes = tuple(devices[index] for index in indices), [scenes[index] for index in indices]
         plants, edges = empty_plants(len(some)), np.cumsum([0, *map(len, order)]).tolist()
         # What is held in the tube follows from the other terms, of all devices at once.
         before = [term for term in modelled if term != HELD]
-        for place, (device, scene) in enumerate(zip(some, scenes, strict=True)):
+        for row, (device, scene) in enumerate(zip(some, scenes, strict=True)):
             total = 2 * scene.disc.initial_fill
             dynamics = dynamics_of(scene=scene, model=device.model, modelled=before, checked=True)
-            dynamics.fill(plants[place : place + 1], total=total, relative_error=RELATIVE_ERROR)
-            tabulate_moment(plants[place], device.model, total=total)
+            dynamics.fill(plants[row : row + 1], total=total, relative_error=RELATIVE_ERROR)
+            tabulate_moment(plants[row], device.model, total=total)
         return cls(
             devices=some,
             scenes=tuple(scenes),
@@ -310,9 +311,9 @@ class _Under:
     beyond_disc: FloatArray
     """Vibration that remains with gas that empties a chamber to its residual fill, m."""
     usable_moment: FloatArray
-    """Towards its own unbalance, kg m."""
+    """Usable moment towards its own unbalance, kg m."""
     unbalance: FloatArray
-    """kg m."""
+    """Unbalance of the rotor, kg m."""
     work: FloatArray
     """Least that compresses the gas, over its p V."""
 
@@ -357,6 +358,6 @@ class _Under:
 
 def _group(number: int) -> range:
     """Numbers of the devices that are made with one."""
-    start, place = number - number % _GROUPS[-1], number % _GROUPS[-1]
-    after = next(each for each in range(len(_GROUPS)) if _GROUPS[each] > place)
+    start, within = number - number % _GROUPS[-1], number % _GROUPS[-1]
+    after = next(each for each in range(len(_GROUPS)) if _GROUPS[each] > within)
     return range(start + _GROUPS[after - 1], start + _GROUPS[after])

@@ -81,7 +81,7 @@ class LinearLoop:
     derivative: float
     """q = Td/dt."""
     findings: tuple[Finding, ...]
-    """Findings that all results hold for a gain that the scene does not give."""
+    """Findings that all results hold for a gain that the scene does not state."""
 
     def __repr__(self) -> str:
         """Results on the loop without its matrices, for JSON."""
@@ -181,26 +181,12 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
     if scene.controller.kind != "target_vector":
         problem = f"the controller {scene.controller.kind!r} has no linear loop"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
-    settings, dt = scene.controller, scene.controller.period
+    settings, dt, lag = scene.controller, scene.controller.period, scene.rotor.lag_angle
     rate = loop_rate(scene, BalancerModel.of(flow_law))
-    integral = 0.0 if settings.integral_time is None else dt / settings.integral_time
-    derivative = settings.derivative_time / dt
-    return LinearLoop(
-        plant=_plant(rate, scene.rotor.lag_angle, dt),
-        controller=_controller(settings.proportional, settings.assumed_lag_angle, integral, derivative, dt),
-        gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - scene.rotor.lag_angle),
-        integral=integral,
-        derivative=derivative,
-        findings=tuple(default_gain(scene)),
-    )
-
-
-def _plant(rate: float, lag: float, dt: float) -> StateSpace:
-    whole = np.eye(2)
-    return StateSpace(
-        a=whole,
+    plant = StateSpace(
+        a=np.eye(2),
         b=_matrix([[-cmath.rect(rate, -lag)]]),
-        c=whole,
+        c=np.eye(2),
         d=np.zeros((2, 2)),
         inputs=AIR_TIME,
         outputs=VIBRATION,
@@ -208,24 +194,32 @@ def _plant(rate: float, lag: float, dt: float) -> StateSpace:
         dt=dt,
     )
 
-
-def _controller(gain: float, lag: float, integral: float, derivative: float, dt: float) -> StateSpace:
-    """States: w, where there is an integral part, and the vibration of the sample before."""
-    asks, half = cmath.rect(gain, lag), integral / 2.0
-    moves, takes = [[1.0, half], [0.0, 0.0]], [[half], [1.0]]
-    gives = [asks, asks * (half - derivative)]
+    # States of the controller: w, where there is an integral part, and the vibration of the sample before.
+    integral = 0.0 if settings.integral_time is None else dt / settings.integral_time
+    derivative = settings.derivative_time / dt
+    gain, half = cmath.rect(settings.proportional, settings.assumed_lag_angle), integral / 2.0
+    a, b = [[1.0, half], [0.0, 0.0]], [[half], [1.0]]
+    c = [gain, gain * (half - derivative)]
     states: tuple[str, ...] = ("integral_x", "integral_y", "before_x", "before_y")
     if integral == 0.0:
-        moves, takes, gives, states = [[0.0]], [[1.0]], gives[1:], states[2:]
-    return StateSpace(
-        a=_matrix(moves),
-        b=_matrix(takes),
-        c=_matrix([gives]),
-        d=_matrix([[asks * (1.0 + derivative + half)]]),
+        a, b, c, states = [[0.0]], [[1.0]], c[1:], states[2:]
+    controller = StateSpace(
+        a=_matrix(a),
+        b=_matrix(b),
+        c=_matrix([c]),
+        d=_matrix([[gain * (1.0 + derivative + half)]]),
         inputs=VIBRATION,
         outputs=AIR_TIME,
         states=states,
         dt=dt,
+    )
+    return LinearLoop(
+        plant=plant,
+        controller=controller,
+        gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - lag),
+        integral=integral,
+        derivative=derivative,
+        findings=tuple(default_gain(scene)),
     )
 
 

@@ -1,4 +1,4 @@
-"""The loop about the balanced state: what one injection removes of a small residual, and what noise leaves.
+"""The loop about the balanced state: the part of a small residual that one injection removes, and noise.
 
 Gas for a time T into a chamber of fill x moves (S/V) u T of fill to the opposite one, so the vibration
 changes by b T with b = kappa |dM/dx| (S/V) u, M the moment of the pair along x + x_opposite = const: that is
@@ -8,7 +8,7 @@ turns round from h = 1 / cos d on.  b differs from pair to pair, and with the ch
 driven.  A residual that turns round is driven by both in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2,
 so the mean of both counts; of all pairs the largest.
 
-`loop_information` is all that is known of the loop under its settings without a run.
+`loop_information` has all numbers of the loop under its settings that take no run.
 """
 
 from __future__ import annotations
@@ -136,14 +136,14 @@ def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
     pairs = scene.disc.chambers // 2
     row = first_memory(chamber_directions(scene.disc.chambers)[:pairs]).tolist()
-    places = [change_of(0, pair) for pair in range(pairs)]
-    for at in places:
+    changes = [change_of(0, pair) for pair in range(pairs)]
+    for at in changes:
         row[at + LOWEST_CHANGE], row[at + HIGHEST_CHANGE] = float(low - now), float(high - now)
     unbalance = scene.rotor.initial_unbalance
     split(row, 0, pairs, -unbalance.real, -unbalance.imag)
     plant = empty_plants(1)[0]
     tabulate_moment(plant, model, total=total)
-    fills = [fill_for_moment(plant, float(now) + row[at + CHANGE], lowest, highest) for at in places]
+    fills = [fill_for_moment(plant, float(now) + row[at + CHANGE], lowest, highest) for at in changes]
     return np.asarray(np.clip(np.array(fills), lowest, highest), dtype=np.float64)
 
 
@@ -216,8 +216,8 @@ def _stationary_deviation(
         return 0.0
     # P = A P A^H + B B^H, row by row.
     size = step.shape[0]
-    whole = np.eye(size**2) - np.kron(step, step.conj())
-    variance = np.linalg.solve(whole, (push @ push.conj().T).ravel())[0]
+    equations = np.eye(size**2) - np.kron(step, step.conj())
+    variance = np.linalg.solve(equations, (push @ push.conj().T).ravel())[0]
     return noise * math.sqrt(max(float(variance.real), 0.0))
 
 
@@ -230,9 +230,9 @@ class Margins:
     """Margins of the linear loop about the balanced state."""
 
     gain_factor: float
-    """Factor by which the loop factor may grow, the lag angle being right."""
+    """Factor by which the loop factor may grow with the right lag angle."""
     phase: float
-    """Error of the lag angle that the loop bears, its loop factor being right, rad."""
+    """Error of the lag angle that the loop bears with the right loop factor, rad."""
     disk: float
     """Disk margin, 0 to 2: gain and phase may change together, at every frequency by other amounts."""
     disk_gain_factor: float
@@ -272,13 +272,18 @@ def loop_margins(
 
 
 def loop_information(scene: Scene, model: BalancerModel) -> Information:
-    """Loop factor and margins of the linear loop about the balanced state, and what the gas line does."""
+    """Loop factor and margins of the linear loop about the balanced state, with gas line and models."""
     loop, settings = loop_factor(scene, model, controller_of(scene, model)), scene.controller
-    used, lines, margins = (
-        run_models(scene=scene, model=model),
-        line_answers(scene, model),
-        _margins(scene, loop),
-    )
+    used, lines = run_models(scene=scene, model=model), line_answers(scene, model)
+    margins = None
+    if loop.rate != 0.0 and settings.kind != "trial":
+        # The law-based algorithm comes to a loop factor of one.
+        fixed = settings.kind == "target_vector"
+        margins = loop_margins(
+            loop_factor=loop.value if fixed and loop.value else 1.0,
+            integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
+            derivative=settings.derivative_time / settings.period if fixed else 0.0,
+        )
     neglected = neglected_in_injections(used)
     document: dict[str, Any] = {
         "law": model.name,
@@ -308,19 +313,6 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
             ("neglected", neglected.text),
         ],
         document=document,
-    )
-
-
-def _margins(scene: Scene, loop: LoopFactor) -> Margins | None:
-    """Of a loop that liquid flows in; the law-based algorithm comes to a loop factor of one."""
-    settings = scene.controller
-    if loop.rate == 0.0 or settings.kind == "trial":
-        return None
-    fixed = settings.kind == "target_vector"
-    return loop_margins(
-        loop_factor=loop.value if fixed and loop.value else 1.0,
-        integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
-        derivative=settings.derivative_time / settings.period if fixed else 0.0,
     )
 
 

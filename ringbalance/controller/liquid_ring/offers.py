@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from types import MappingProxyType
 from typing import Any, Final
@@ -63,37 +63,25 @@ _INSTEAD: Final = {"target_vector": ("law_based",), "law_based": ("target_vector
 """Kinds of controller beside the scene's; valve-open times of a trial are its scene's."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Loop:
-    """Under one gas pressure."""
-
-    rate: float
-    """b of `loop_factor`, m/s."""
-    dead_time: float
-    """s."""
-
-    @classmethod
-    def of(cls, scene: Scene, model: BalancerModel) -> _Loop:
-        rate = loop_rate(scene, model)
-        return cls(rate=rate, dead_time=dead_time(scene, model, rate=rate))
-
-
 def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials, ...]:
     """Settings to try, those of the scene's kind of controller first.
 
     Args: `limit`: amplitude by which runs are judged, m.
     """
 
-    own, available, controller = scene.gas.pressure, scene.design.pressure, scene.controller
+    nominal, available, controller = scene.gas.pressure, scene.design.pressure, scene.controller
 
     @cache
-    def loop(pressure: float) -> _Loop:
-        return _Loop.of(replace(scene, gas=replace(scene.gas, pressure=pressure)), model)
+    def rate_and_dead_time(pressure: float) -> tuple[float, float]:
+        """b of `loop_factor`, m/s, and dead time, s, under a gas pressure."""
+        supplied = replace(scene, gas=replace(scene.gas, pressure=pressure))
+        rate = loop_rate(supplied, model)
+        return rate, dead_time(supplied, model, rate=rate)
 
     def settings(kind: str, point: Point) -> Mapping[str, Any] | None:
-        pressure = point.get(PRESSURE, own)
-        linear = loop(pressure)
-        if linear.rate <= 0.0:
+        pressure = point.get(PRESSURE, nominal)
+        rate, dead = rate_and_dead_time(pressure)
+        if rate <= 0.0:
             return None
         values: dict[str, Any] = {
             PRESSURE: pressure,
@@ -101,32 +89,32 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
             "controller.limit": min(limit, controller.limit),
         }
         if _GAIN.name in point:
-            values["controller.proportional"] = rounded(point[_GAIN.name] / linear.rate)
+            values["controller.proportional"] = rounded(point[_GAIN.name] / rate)
             part = point[_INTEGRAL.name]
             values["controller.integral_time"] = rounded(controller.period / part) if part else None
         if _OFFSET.name in point:
-            offset = round(point[_OFFSET.name] * linear.dead_time / _OFFSET_STEP) * _OFFSET_STEP
+            offset = round(point[_OFFSET.name] * dead / _OFFSET_STEP) * _OFFSET_STEP
             values["controller.gas_time_offset"] = (round(offset, 6),) if offset else None
         return {path: value for path, value in values.items() if value != raw_value_at(scene, path)}
 
     # The scene's pressure and levels around it, up to the highest that is available.
-    pressures = {own, *(each for each in _PRESSURES if own / _REACH <= each <= own * _REACH)}
+    pressures = {nominal, *(each for each in _PRESSURES if nominal / _REACH <= each <= nominal * _REACH)}
     if available is not None:
         pressures = {available, *(each for each in pressures if each < available)}
     levels = tuple(sorted(pressures))
-    first = tuple(at for at, each in enumerate(levels) if own / _NEAR <= each <= own * _NEAR)
-    along = Axis(name=PRESSURE, levels=levels, first=first or (len(levels) - 1,), unit="Pa")
+    first = tuple(at for at, each in enumerate(levels) if nominal / _NEAR <= each <= nominal * _NEAR)
+    pressure_axis = Axis(name=PRESSURE, levels=levels, first=first or (len(levels) - 1,), unit="Pa")
     gain = scene.origin_of("controller.proportional")
     stated = gain != "default" or controller.kind != "target_vector"
-    kept = scene.origin_of("controller.kind") == "given"
+    kind_stated = scene.origin_of("controller.kind") == "given"
     return tuple(
         Trials(
             kind=kind,
             axes=_OWN[kind],
             settings=partial(settings, kind),
             stated=stated,
-            kept=kept,
-            along=along,
+            kept=kind_stated,
+            along=pressure_axis,
         )
         for kind in (controller.kind, *_INSTEAD[controller.kind])
     )
@@ -158,7 +146,7 @@ _MEASURED: Mapping[str, str] = MappingProxyType(
     dict.fromkeys((LOSS, *MODEL_ERRORS), "measure_flow")
     | {MOMENT: "measure_moment", "draw_down_factor": "measure_residual"}
 )
-"""Codes of what to measure in place of an error of a model."""
+"""Codes of the measurements that replace an error of a model."""
 
 
 def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
@@ -231,7 +219,7 @@ def _of_valve(scene: Scene) -> Iterator[Remedy]:
 
 
 def _of_limit(scene: Scene) -> Iterator[Remedy]:
-    """None where the scene requires a residual: no higher limit reaches that."""
+    """Higher limits, where the scene requires no residual: they would not reach that."""
     if scene.requirement.residual is None and scene.requirement.grade is None:
         for factor in _LIMITS:
             changes = {"controller.limit": factor * scene.controller.limit}

@@ -49,7 +49,7 @@ class LiquidRing:
 
     @property
     def residual_fill(self) -> float:
-        """Of a driven chamber, below which gas would enter its port."""
+        """Residual fill of a driven chamber, below which gas would enter its port."""
         return self.dynamics.residual
 
     @property
@@ -95,16 +95,16 @@ def corners_of(pair_moment: npt.ArrayLike, chambers: int) -> ComplexArray:
     return np.asarray(np.asarray(pair_moment)[..., None] * _corner_directions(chambers))
 
 
-def unreachable_moment(corners: ComplexArray, wanted: ComplexArray) -> FloatArray:
-    """Distance between the moment that is wanted of each disc and the nearest that it can form, kg m.
+def unreachable_moment(corners: ComplexArray, required: ComplexArray) -> FloatArray:
+    """Distance between the moment required of each disc and the nearest that it can form, kg m.
 
     Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
     """
     edges = np.roll(corners, -1, axis=-1) - corners
-    offset = wanted[..., None] - corners
-    along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
+    offset = required[..., None] - corners
+    fraction = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
     inside = np.all((edges.conj() * offset).imag > 0, axis=-1)
-    return np.where(inside, 0.0, np.min(np.abs(offset - along * edges), axis=-1))
+    return np.where(inside, 0.0, np.min(np.abs(offset - fraction * edges), axis=-1))
 
 
 def moment_towards(corners: ComplexArray, towards: ComplexArray) -> FloatArray:
@@ -132,14 +132,14 @@ def starting_pressure(
 ) -> float | None:
     """Smallest gauge pressure at which liquid leaves a chamber, Pa, to 12 digits, searched from `above` on.
 
-    None when no pressure found does.
+    None when no pressure does.
     """
 
     def flows(pressure: FloatArray) -> BoolArray:
-        one = np.ones_like(pressure)
+        ones = np.ones_like(pressure)
         flow = law.evaluate(
-            fill_ratio=fill * one,
-            opposite_fill_ratio=opposite_fill * one,
+            fill_ratio=fill * ones,
+            opposite_fill_ratio=opposite_fill * ones,
             gas_pressure=pressure,
             primed=primed,
         )
@@ -149,9 +149,9 @@ def starting_pressure(
         return above
     for doubled in range(_MAX_DOUBLINGS):
         low = above * 2.0**doubled
-        found = _least_pressure(flows, low, 2.0 * low)
-        if found is not None:
-            return found
+        pressure = _least_pressure(flows, low, 2.0 * low)
+        if pressure is not None:
+            return pressure
     return None
 
 

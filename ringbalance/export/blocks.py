@@ -1,4 +1,4 @@
-"""What a host can run: the law, the disc in time, the controller; each of constants and one row of numbers.
+"""Blocks that a host can run: law, disc in time, controller; each of constants and one row of numbers.
 
 A block's functions read the constants and change the row, in which each variable has its place; the source is
 the same for every host.
@@ -34,28 +34,28 @@ from ringbalance.scene.models import Scene
 
 Kind = Literal["law", "disc", "controller"]
 Numbers = tuple[float, ...]
-_LONGEST: Final = 1e-3
-"""s, of a part of a step of the disc."""
-_LONGEST_FOLLOWED: Final = 5e-3
-"""s, the same of the liquid that a controller follows."""
-_SHORTEST: Final = 1e-6
-"""s, of the longest part: below it a host's step of 10 ms would take more than 10,000 parts."""
-_OF_LINE: Final = 0.04
-"""Of the line's time constant: near its end a pressure changes some fifty times as fast, and the method is
-stable up to 2.8 of the reciprocal."""
+_LONGEST_PART_S: Final = 1e-3
+"""Longest part of a step of the disc."""
+_LONGEST_FOLLOWED_PART_S: Final = 5e-3
+"""Longest part of a step of the liquid that a controller follows."""
+_SHORTEST_PART_S: Final = 1e-6
+"""Least value of the longest part: below it a host's step of 10 ms would take more than 10,000 parts."""
+_PART_OF_TIME_CONSTANT: Final = 0.04
+"""Longest part over the line's time constant: near its end a pressure changes some fifty times as fast, and
+the method is stable up to 2.8 of the reciprocal."""
 RANGE: Final = "{:g} to {:g} m/s".format(*VELOCITIES)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One that a host sees."""
+    """Variable that a host sees."""
 
     name: str
     kind: str
     """ "Real", "Integer" or "Boolean"."""
     input: bool
-    place: int
-    """In the block's row."""
+    index: int
+    """Index in the block's row."""
     description: str
     range: Mapping[str, str]
     """Unit, minimum, maximum and nominal value, as far as its kind has them."""
@@ -77,44 +77,44 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """One thing for a host."""
+    """Law, disc or controller for a host."""
 
     kind: Kind
     title: str
     scene: str
     """File that it was made from."""
     facts: str
-    """What it holds and how exact it is."""
+    """Contents and accuracy, in sentences."""
     constants: Numbers
     tables: Tables | None
-    """Of its law, if it has one."""
+    """Tables of its law, if it has one."""
     start: Numbers
     """The row before the first step."""
     modules: tuple[ModuleType, ...]
     steps: str
     """Function that lets a time pass and brings the outputs up to date; the law's does the latter alone."""
     timed: bool
-    """Whether a time passes."""
+    """True if a time passes in a step."""
     variables: tuple[Variable, ...]
 
     def source(self, entries: Sequence[str] = ()) -> Source:
-        """What some functions need; default the one that a host calls."""
+        """Source that some functions need; default the one that a host calls."""
         return Source.of_modules(self.modules, entries or (self.steps,))
 
     @property
     def size(self) -> int:
-        """Of the constants, bytes."""
+        """Size of the constants, bytes."""
         return 8 * len(self.constants) + (0 if self.tables is None else self.tables.size)
 
     def outputs(self, row: list[float]) -> dict[str, float]:
-        """By name, of a row that is up to date."""
-        return {each.name: row[each.place] for each in self.variables if not each.input}
+        """Outputs by name, of a row that is up to date."""
+        return {each.name: row[each.index] for each in self.variables if not each.input}
 
     def run(self, row: list[float], time: float, inputs: Mapping[str, float]) -> dict[str, float]:
         """Set inputs, let a time pass, s, as a host does. Returns: the outputs."""
-        places = {each.name: each.place for each in self.variables if each.input}
+        indices = {each.name: each.index for each in self.variables if each.input}
         for name, value in inputs.items():
-            row[places[name]] = float(value)
+            row[indices[name]] = float(value)
         step = getattr(self.modules[-1], self.steps)
         step(self.constants, *(self.tables or ()), row, *((time,) if self.timed else ()))
         return self.outputs(row)
@@ -140,7 +140,7 @@ def law_block(law: CompactLaw) -> Block:
 
 
 def tabulation(law: CompactLaw) -> str:
-    """What a law holds and how exact it is, in sentences."""
+    """Contents and accuracy of a law, in sentences."""
     return (
         f"Constants of {law.size} bytes; velocities {RANGE}, beyond\n"
         f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
@@ -155,12 +155,12 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
         inputs that were fitted together, or a gas line that fills a chamber too fast to be followed.
     """
     gas, half = scene.gas, scene.disc.chambers // 2
-    given = {FILLING: gas.conductance, LAG: gas.valve_lag}
-    modelled = [term for term, value in given.items() if value is not None]
+    terms = {FILLING: gas.conductance, LAG: gas.valve_lag}
+    modelled = [term for term, value in terms.items() if value is not None]
     compact, constants, row = _disc(scene, law, modelled)
     disc.show(constants, compact.tables.cells, compact.tables.pieces, row)
 
-    def place(offset: str, chamber: int | None) -> int:
+    def index_of(offset: str, chamber: int | None) -> int:
         value = int(getattr(disc, offset))
         if chamber is None:
             return value
@@ -177,49 +177,40 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
         modules=(point, query, chamber, disc),
         steps="step",
         timed=True,
-        variables=_variables("disc", place, most=law.max_fill_ratio, chambers=scene.disc.chambers),
+        variables=_variables("disc", index_of, most=law.max_fill_ratio, chambers=scene.disc.chambers),
     )
 
 
 def _disc(
     scene: Scene, law: CalibratedLaw, modelled: Collection[str]
 ) -> tuple[CompactLaw, list[float], list[float]]:
-    """Its law, the numbers of both, and its row at the start."""
+    """Law of a disc, the numbers of both, and its row at the start."""
     if law.moment.across is not None:
         raise SceneError.of_file(
             scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
         )
+    gas, rotor, half, fill = scene.gas, scene.rotor, scene.disc.chambers // 2, scene.disc.initial_fill
     compact = compact_law(scene=scene, law=law)
-    constants = [*compact.constants, *_disc_numbers(scene, law, modelled)]
-    constants[point.BLOCK] = float(len(compact.constants))
-    half, fill, ambient = scene.disc.chambers // 2, scene.disc.initial_fill, scene.gas.ambient_pressure
-    row = [0.0] * (disc.FIRST_PAIR + disc.PER_PAIR * half)
-    content = ambient * disc.gas_volume(constants, fill) / scene.gas.temperature
-    for pair in range(half):
-        at = disc.FIRST_PAIR + disc.PER_PAIR * pair
-        row[at : at + disc.STATES] = [fill, ambient, ambient, content, content]
-    return compact, constants, row
-
-
-def _disc_numbers(scene: Scene, law: CalibratedLaw, modelled: Collection[str]) -> Numbers:
-    """What `disc` finds behind the law."""
-    gas, rotor, half = scene.gas, scene.rotor, scene.disc.chambers // 2
     dynamics = dynamics_of(scene=scene, model=BalancerModel.of(law), modelled=modelled)
-    plant = dynamics.plant(total=2 * scene.disc.initial_fill)[0]
-    least = (1 - law.max_fill_ratio) * law.chamber_volume + dynamics.dead_volume
-    longest = _LONGEST
+    longest = _LONGEST_PART_S
     if dynamics.line is not None:
+        least = (1 - law.max_fill_ratio) * law.chamber_volume + dynamics.dead_volume
         constant = dynamics.line.time_constant(volume=least)
-        longest = min(longest, _OF_LINE * constant)
-        if longest < _SHORTEST:
+        longest = min(longest, _PART_OF_TIME_CONSTANT * constant)
+        if longest < _SHORTEST_PART_S:
             took = f"gas fills a chamber with a time constant of {constant:.2g} s"
-            allowed = f"at least {_SHORTEST / _OF_LINE:.2g} s, no gas.conductance, or --block law"
+            shortest = _SHORTEST_PART_S / _PART_OF_TIME_CONSTANT
+            allowed = f"at least {shortest:.2g} s, no gas.conductance, or --block law"
             raise SceneError.of_file(scene.file, f"{took}, too short for a host's steps", allowed)
+
+    plant = dynamics.plant(total=2 * fill)[0]
     ratio = float(plant["heat_capacity_ratio"])
-    axes = chamber_directions(scene.disc.chambers)[:half]
-    return (
+    complex_numbers = [rotor.initial_vibration, rotor.influence]
+    complex_numbers += chamber_directions(scene.disc.chambers)[:half].tolist()
+    constants = [
+        *compact.constants,
         float(half),
-        2 * scene.disc.initial_fill,
+        2 * fill,
         law.tube_area / law.chamber_volume,
         law.chamber_volume,
         dynamics.dead_volume,
@@ -233,14 +224,15 @@ def _disc_numbers(scene: Scene, law: CalibratedLaw, modelled: Collection[str]) -
         gas.temperature,
         ratio,
         float(ratio > 1.0),
-        *_parts(rotor.initial_vibration),
-        *_parts(rotor.influence),
-        *(part for axis in axes for part in _parts(complex(axis))),
-    )
-
-
-def _parts(value: complex) -> tuple[float, float]:
-    return value.real, value.imag
+        *(part for number in complex_numbers for part in (number.real, number.imag)),
+    ]
+    constants[point.BLOCK] = float(len(compact.constants))
+    row = [0.0] * (disc.FIRST_PAIR + disc.PER_PAIR * half)
+    content = gas.ambient_pressure * disc.gas_volume(constants, fill) / gas.temperature
+    for pair in range(half):
+        at = disc.FIRST_PAIR + disc.PER_PAIR * pair
+        row[at : at + disc.STATES] = [fill, gas.ambient_pressure, gas.ambient_pressure, content, content]
+    return compact, constants, row
 
 
 def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
@@ -256,7 +248,7 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
     tries = scene.controller.kind == "trial"
     steps: ModuleType = trial_steps if tries else target_steps
 
-    def place(offset: str, chamber: int | None) -> int:
+    def index_of(offset: str, chamber: int | None) -> int:
         if chamber is None:
             return int(getattr(steps, offset))
         return (
@@ -274,7 +266,7 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
         modules=(point, valve_steps, steps),
         steps="step",
         timed=True,
-        variables=_variables("controller", place, chambers=chambers),
+        variables=_variables("controller", index_of, chambers=chambers),
     )
 
 
@@ -283,7 +275,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     half, chambers = scene.disc.chambers // 2, scene.disc.chambers
     d, r = len(compact.constants), len(row)
     # It follows the liquid of whole injections: none is cut, and parts may be long.
-    constants[d + disc.RESIDUAL], constants[d + disc.LONGEST] = -1.0, _LONGEST_FOLLOWED
+    constants[d + disc.RESIDUAL], constants[d + disc.LONGEST] = -1.0, _LONGEST_FOLLOWED_PART_S
     loop, run = np.zeros(1, dtype=LOOP)[0], np.zeros(1, dtype=RUN)[0]
     LawBased(scene=scene, model=BalancerModel.of(law)).fill(loop, run)
     constants += (
@@ -298,15 +290,15 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         float(loop["assumed_phase_noise"]) ** 2,
         *loop["offset"][:chambers].tolist(),
     )
-    beside = law_steps.change_of(r, half)
-    row += [*run["memory"][: beside - r].tolist(), *[0.0] * law_based.FIRST_CHAMBER]
+    host = law_steps.change_of(r, half)
+    row += [*run["memory"][: host - r].tolist(), *[0.0] * law_based.FIRST_CHAMBER]
     first_chamber = len(row)
     row += [0.0] * (valve_steps.PER_CHAMBER * chambers)
     places = {"VIBRATION_X": r + law_steps.SEEN_X, "VIBRATION_Y": r + law_steps.SEEN_Y}
-    places |= {"RESTING": beside + law_based.RESTS, "SAMPLES": beside + law_based.SAMPLES}
-    places["WAIT"] = beside + law_based.WAIT
+    places |= {"RESTING": host + law_based.RESTS, "SAMPLES": host + law_based.SAMPLES}
+    places["WAIT"] = host + law_based.WAIT
 
-    def place(offset: str, chamber: int | None) -> int:
+    def index_of(offset: str, chamber: int | None) -> int:
         if chamber is None:
             return places[offset]
         return first_chamber + valve_steps.PER_CHAMBER * chamber + int(getattr(valve_steps, offset))
@@ -322,7 +314,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
         modules=(point, query, chamber, disc, valve_steps, law_steps, law_based),
         steps="control",
         timed=True,
-        variables=_variables("controller", place, chambers=chambers),
+        variables=_variables("controller", index_of, chambers=chambers),
     )
 
 
@@ -340,17 +332,23 @@ def declared() -> dict[str, Any]:
 
 
 def _variables(
-    kind: Kind, place: Callable[[str, int | None], int], *, most: float = 0.0, chambers: int = 2
+    kind: Kind, index_of: Callable[[str, int | None], int], *, most: float = 0.0, chambers: int = 2
 ) -> tuple[Variable, ...]:
-    """As declared. Args: `place`: of an offset's name, and of a chamber where each has one."""
-    found = []
+    """Variables as declared. Args: `place`: index by offset's name, and chamber where each has one."""
+    variables = []
     for each in declared()[kind]:
-        heads = {**each, "input": each.get("input", False)}
-        heads["range"] = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
-        heads["description"] = each["description"].replace("MOST", number_text(most))
+        limits = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
+        description = each["description"].replace("MOST", number_text(most))
         letters = chamber_letters(chambers) if "#" in each["name"] else (None,)
         for number, letter in enumerate(letters):
-            texts = {key: heads[key].replace("#", letter or "") for key in ("name", "description")}
-            at = place(each["place"], number if letter else None)
-            found.append(Variable(**{**heads, **texts, "name": texts["name"].lower(), "place": at}))
-    return tuple(found)
+            variables.append(
+                Variable(
+                    name=each["name"].replace("#", letter or "").lower(),
+                    kind=each["kind"],
+                    input=each.get("input", False),
+                    index=index_of(each["place"], number if letter else None),
+                    description=description.replace("#", letter or ""),
+                    range=limits,
+                )
+            )
+    return tuple(variables)

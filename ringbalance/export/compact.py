@@ -7,9 +7,8 @@ decides on regime and status.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
@@ -29,43 +28,42 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 VELOCITIES: Final = (1e-3, 100.0)
-"""m/s, that heads are tabulated for."""
+"""Range of velocities that heads are tabulated for, m/s."""
 TOLERANCE: Final = 1e-4
-"""Of a velocity against the calibrated law."""
-_OF_HEADS: Final = 0.25 * TOLERANCE
-"""What of it a head takes."""
-_OF_LEVELS: Final = 0.2 * TOLERANCE
-"""Of the head of the slowest velocity."""
-_MOST_LEVELS: Final = 16
-"""Pieces; a level that asks for more is less exact, and the export says so."""
-_OF_SHARE: Final = 5e-4
-"""Where a share decides whether a column separates, `point` allows for more."""
-_OF_CHAMBER: Final = 2e-6
-"""Of the largest squared radius and moment."""
+"""Largest relative error of a velocity against the calibrated law."""
+_HEAD_ERROR: Final = 0.25 * TOLERANCE
+"""Relative error of a head, a part of the tolerance."""
+_LEVEL_ERROR: Final = 0.2 * TOLERANCE
+"""Error of a level over the head of the slowest velocity."""
+_MAX_LEVEL_PIECES: Final = 16
+"""Pieces of a level; one that needs more is less exact, and the export says so."""
+_SHARE_ERROR: Final = 5e-4
+"""Relative error of a share; where it decides if a column separates, `point` allows for more."""
+_CHAMBER_ERROR: Final = 2e-6
+"""Error relative to the largest squared radius and moment."""
 _EASES: Final = (1.0, 1.6, 2.5, 4.0)
-"""Times the first of these errors, and its cube the second, where levels would have no room otherwise; the
-larger it is the fewer levels do, as `_MOST_LEVELS` over its square."""
-_OF_ROUNDING: Final = 0.2
-"""Of a piece's error, to which its coefficients are rounded: numbers with few bits make small libraries."""
-_BITS: Final = 18
-"""Of a place at which pieces may meet, likewise."""
-_CELLS: Final = (64, 128, 256)
-"""Of equal length, each of which knows at which piece to begin looking; pieces end where cells do, and where
-these are too long for the tolerance, the next number is taken."""
+"""Factors on the errors of heads, in their cube on those of a chamber, where levels would have no room
+otherwise; the larger one is the fewer pieces of levels do, as `_MAX_LEVEL_PIECES` over its square."""
+_ROUNDING: Final = 0.2
+"""Part of a piece's error to which coefficients are rounded: numbers of few bits make small libraries."""
+_END_BITS: Final = 18
+"""Bits of the ends at which pieces may meet, likewise."""
+_CELL_COUNTS: Final = (64, 128, 256)
+"""Numbers of cells of equal length, each of which holds the piece at which to begin looking; pieces end where
+cells do, and where these are too long for the tolerance, the next number is taken."""
 _LEVEL_CELLS: Final = 160
-LARGEST: Final = 4096
-"""Of all numbers, bytes; levels take what the rest leaves."""
-_PER_CELL: Final = 10
-"""Samples."""
+MAX_BYTES: Final = 4096
+"""Size of all numbers; levels take what the rest leaves."""
+_SAMPLES_PER_CELL: Final = 10
 _EDGE: Final = 1e-3
-"""Of a cell: more than rounding moves what lies next to its edge."""
-_DRAWN: Final = 4000
-"""Conditions in which the finished law is compared with the calibrated one."""
+"""Part of a cell: more than rounding moves what lies next to its edge."""
+_COMPARED_CONDITIONS: Final = 4000
+"""Drawn conditions in which the finished law is compared with the calibrated one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What the law says of one query."""
+    """Answer of the law to one query."""
 
     velocity: float
     """m/s, positive out of the driven chamber."""
@@ -74,11 +72,11 @@ class Answer:
     status: int
     """0 ok, 1 extrapolated, 2 blocked, 4 invalid: not a number, or no possible pressure."""
     primed: bool
-    """Whether the tube holds a continuous column afterwards."""
+    """True if the tube holds a continuous column afterwards."""
 
 
 class Tables(NamedTuple):
-    """What a law's polynomials are made of, as `point` reads it."""
+    """Tables of a law's polynomials, as `point` reads them."""
 
     cells: tuple[int, ...]
     """Rows at which to begin looking, each of a byte."""
@@ -89,18 +87,18 @@ class Tables(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Of all numbers, bytes."""
+        """Size of all numbers, bytes."""
         return len(self.cells) + 4 * sum(map(len, self.pieces)) + 8 * sum(map(len, self.levels))
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompactLaw:
-    """The law of one scene in numbers that `point` reads."""
+    """Law of one scene in numbers that `point` reads."""
 
     scene: str
     """File that it was calibrated from."""
     constants: tuple[float, ...]
-    """At the places that `point` names."""
+    """Constants at the indices that `point` names."""
     tables: Tables
     level_error: float
     """Largest error of a level's pressure, Pa."""
@@ -111,7 +109,7 @@ class CompactLaw:
 
     @property
     def size(self) -> int:
-        """Of all numbers, bytes."""
+        """Size of all numbers, bytes."""
         return 8 * len(self.constants) + self.tables.size
 
     @property
@@ -152,14 +150,14 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             _add_way(rows, law, way, table, ease)
         _add_chamber(rows, scene, law, ease)
         before, count = map(len, rows.arrays({}))
-        left = LARGEST - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
+        left = MAX_BYTES - 7 * point.PLACES - before - _LEVEL_CELLS - 1 - 4 * WIDTH_OF_ROW * count
         most = left // (8 * WIDTH_OF_ROW)
-        if most * ease**2 >= _MOST_LEVELS:
+        if most * ease**2 >= _MAX_LEVEL_PIECES:
             break
     else:
-        problem = f"its law does not fit into the {LARGEST} bytes of its compact form"
+        problem = f"its law does not fit into the {MAX_BYTES} bytes of its compact form"
         raise SceneError.of_file(scene.file, problem, "a tube whose loss changes less abruptly")
-    level_error = _add_levels(level_rows, law, most=min(_MOST_LEVELS, most))
+    level_error = _add_levels(level_rows, law, most=min(_MAX_LEVEL_PIECES, most))
     level_numbers, levels = level_rows.arrays({})
     numbers, pieces = rows.arrays(
         law.scalars()
@@ -173,7 +171,7 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
     # Cells of the levels come first.
     constants[point.CHAMBER_CELLS] += _LEVEL_CELLS + 1
     pieces[: len(tables), point.CELLS] += _LEVEL_CELLS + 1
-    made = CompactLaw(
+    compact = CompactLaw(
         scene=scene.file,
         constants=tuple(constants.tolist()),
         tables=Tables(
@@ -184,28 +182,26 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
         level_error=level_error,
         calibrated=law,
     )
-    return replace(made, departure=_departure(made, law))
+
+    # Compared over fills of both chambers, pressures of six decades and both states of the tube.
+    random, departure, size = np.random.default_rng(0), 0.0, _COMPARED_CONDITIONS
+    fills, pressures = random.uniform(0.0, law.max_fill_ratio, (size, 2)), 10 ** random.uniform(2, 8, size)
+    for at, ((fill, opposite), pressure) in enumerate(zip(fills.tolist(), pressures.tolist(), strict=True)):
+        query = {"fill_ratio": fill, "opposite_fill_ratio": opposite, "gas_pressure": pressure}
+        exact = float(law.evaluate(**query, primed=at % 2 > 0).velocity)
+        if VELOCITIES[0] < abs(exact) < VELOCITIES[1]:
+            velocity = compact.answer(**query, primed=at % 2 > 0).velocity
+            departure = max(departure, abs(velocity / exact - 1.0))
+    return replace(compact, departure=departure)
 
 
 def _tuples(rows: npt.NDArray[np.floating[Any]]) -> tuple[tuple[float, ...], ...]:
     return tuple(map(tuple, rows.tolist()))
 
 
-def _departure(made: CompactLaw, law: CalibratedLaw) -> float:
-    """Over fills of both chambers, pressures of six decades and both states of the tube."""
-    drawn, worst = np.random.default_rng(0), 0.0
-    fills, pressures = drawn.uniform(0.0, law.max_fill_ratio, (_DRAWN, 2)), 10 ** drawn.uniform(2, 8, _DRAWN)
-    for at, ((fill, opposite), pressure) in enumerate(zip(fills.tolist(), pressures.tolist(), strict=True)):
-        asked = {"fill_ratio": fill, "opposite_fill_ratio": opposite, "gas_pressure": pressure}
-        right = float(law.evaluate(**asked, primed=at % 2 > 0).velocity)
-        if VELOCITIES[0] < abs(right) < VELOCITIES[1]:
-            worst = max(worst, abs(made.answer(**asked, primed=at % 2 > 0).velocity / right - 1.0))
-    return worst
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Column:
-    """A quantity over samples, as polynomials."""
+class _Piecewise:
+    """Quantity over samples, as polynomials."""
 
     value: FloatArray
     """Shape (samples,)."""
@@ -217,18 +213,18 @@ class _Column:
         """Coefficients in powers of x - end from the samples between two, both of which are met.
 
         The samples are those next to the extrema of a Chebyshev polynomial.  Coefficients are rounded to
-        `_OF_ROUNDING` of the piece's error.
+        `_ROUNDING` of the piece's error.
         """
         extrema = (1 - np.cos(np.pi * np.arange(self.degree + 1) / self.degree)) / 2
         at = np.unique(np.rint(first + (last - first) * extrema).astype(int))
         powers = (x[last] - x[first]) ** np.arange(at.size)
         t = (x[at] - x[last]) / (x[last] - x[first])
         exact = np.linalg.solve(np.vander(t, increasing=True), self.value[at]) / powers
-        step = 2.0 ** np.floor(np.log2(_OF_ROUNDING * self.allowed[first : last + 1].min() / powers))
+        step = 2.0 ** np.floor(np.log2(_ROUNDING * self.allowed[first : last + 1].min() / powers))
         return np.pad(np.rint(exact / step) * step + 0.0, (0, self.degree + 1 - at.size))
 
     def errors(self, x: FloatArray, first: int, last: int) -> FloatArray:
-        """Of one piece, at the samples that it spans."""
+        """Errors of one piece, at the samples that it spans."""
         inside = slice(first, last + 1)
         polynomial = self.polynomial(x, first, last)
         return np.asarray(polyval(x[inside] - x[last], polynomial) - self.value[inside])
@@ -239,15 +235,15 @@ class _Column:
         return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
 
     def pieces(self, x: FloatArray, ends: IntArray) -> FloatArray:
-        """Coefficients of all, shape (degree + 1, pieces)."""
+        """Coefficients of all pieces, shape (degree + 1, pieces)."""
         return np.transpose([self.polynomial(x, a, b) for a, b in pairwise(ends.tolist())])
 
 
 def _add_levels(rows: LawRows, law: CalibratedLaw, *, most: int) -> float:
-    """The hydrostatic pressure over the fill ratio. Args: `most`: pieces. Returns: its largest error, Pa."""
-    x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _PER_CELL + 1)
+    """Add the hydrostatic pressure over the fill ratio in at most so many pieces. Returns: error, Pa."""
+    x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _SAMPLES_PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
-    level = _Column(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _OF_LEVELS * slowest))
+    level = _Piecewise(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _LEVEL_ERROR * slowest))
     while (ends := _ends(x, [level])).size > most + 1:
         level = replace(level, allowed=1.5 * level.allowed)
     rows.numbers[0][point.LEVEL_SCALE] = rows.add_cells(x[ends], cells=_LEVEL_CELLS)[0]
@@ -256,15 +252,15 @@ def _add_levels(rows: LawRows, law: CalibratedLaw, *, most: int) -> float:
 
 
 def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, ease: float) -> None:
-    """Squared radius of the free surface, and moment with its largest half-width in a piece, by the fill."""
-    cells = _CELLS[0]
-    x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _PER_CELL + 1))
+    """Add the squared radius of the free surface, and the moment with its half-width, by the fill."""
+    cells = _CELL_COUNTS[0]
+    x = _rounded(np.linspace(0.0, law.max_fill_ratio, cells * _SAMPLES_PER_CELL + 1))
     # The last piece holds the largest fill, whichever way that is rounded.
     x[-1] = np.nextafter(np.float32(law.max_fill_ratio), np.float32(1.0))
     columns = []
     for value in (surface_radius(disc=scene.disc, fill_ratio=x) ** 2, law.moment.chamber_moment(x)):
-        allowed = np.full_like(x, ease**3 * _OF_CHAMBER * float(np.max(np.abs(value))))
-        columns.append(_Column(value=value, allowed=allowed, degree=2))
+        allowed = np.full_like(x, ease**3 * _CHAMBER_ERROR * float(np.max(np.abs(value))))
+        columns.append(_Piecewise(value=value, allowed=allowed, degree=2))
     ends = _ends(x, columns)
     width = np.maximum(law.moment.half_width(x), 0.0)
     widest = [np.max(width[first : last + 1]) for first, last in pairwise(ends.tolist())]
@@ -273,56 +269,50 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, ease: float) -
 
 
 def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, ease: float) -> None:
-    """Velocities over the eighth root of a pressure."""
+    """Add velocities over the eighth root of a pressure, and of a siphon the shares lost up to the crest."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
-    for cells in _CELLS:
-        x = _rounded(np.linspace(root * slowest, root * fastest, cells * _PER_CELL + 1))
+    for cells in _CELL_COUNTS:
+        x = _rounded(np.linspace(root * slowest, root * fastest, cells * _SAMPLES_PER_CELL + 1))
         s = np.clip(x / root, slowest, fastest)
         value = table.quintic(s) / law.density**0.5
-        ratio = _Column(value=value, allowed=ease * _OF_HEADS * value)
-        beside = _shares(table, s) if way == point.SIPHON else []
-        ends = _ends(x, [ratio, *beside])
-        if ratio.largest(x, ends, of=value) <= ease * _OF_HEADS:
+        ratio = _Piecewise(value=value, allowed=ease * _HEAD_ERROR * value)
+        shares = []
+        if way == point.SIPHON and table.count > SHARE:
+            # Part of the pressure that is lost up to the crest, there and back.
+            for at in (SHARE, min(BACK_SHARE, table.count - 2)):
+                share = table.cubic(s, at)
+                shares.append(_Piecewise(value=share, allowed=_SHARE_ERROR * share, degree=2))
+        ends = _ends(x, [ratio, *shares])
+        if ratio.largest(x, ends, of=value) <= ease * _HEAD_ERROR:
             break
     rows.add_ratios(way, x[ends], ratio.pieces(x, ends), law.carrying_pressures(table), cells=cells)
-    if beside:
-        rows.add(*(each.pieces(x, ends) for each in beside))
-
-
-def _shares(table: Table, s: FloatArray) -> Sequence[_Column]:
-    """Part of the pressure that is lost up to the crest, there and back."""
-    if table.count <= SHARE:
-        return []
-    ways = [table.cubic(s, at) for at in (SHARE, min(BACK_SHARE, table.count - 2))]
-    return [_Column(value=value, allowed=_OF_SHARE * value, degree=2) for value in ways]
+    if shares:
+        rows.add(*(each.pieces(x, ends) for each in shares))
 
 
 def _rounded(x: FloatArray) -> FloatArray:
-    """To `_BITS` binary places of the largest."""
-    step = 2.0 ** (np.ceil(np.log2(x[-1])) - _BITS)
+    """Round samples to `_END_BITS` binary digits of the largest."""
+    step = 2.0 ** (np.ceil(np.log2(x[-1])) - _END_BITS)
     return np.asarray(np.rint(x / step) * step)
 
 
-def _ends(x: FloatArray, columns: Sequence[_Column]) -> IntArray:
+def _ends(x: FloatArray, columns: Sequence[_Piecewise]) -> IntArray:
     """Samples at which pieces meet, each piece as many cells long as its errors allow, and both ends."""
 
     def fits(first: int, last: int) -> bool:
-        inside = slice(first * _PER_CELL, last * _PER_CELL + 1)
+        inside = slice(first * _SAMPLES_PER_CELL, last * _SAMPLES_PER_CELL + 1)
         return all(
             bool(np.all(np.abs(column.errors(x, inside.start, inside.stop - 1)) <= column.allowed[inside]))
             for column in columns
         )
 
-    cells, last = [0], (x.size - 1) // _PER_CELL
+    cells, last = [0], (x.size - 1) // _SAMPLES_PER_CELL
     while cells[-1] < last:
-        cells.append(_furthest(partial(fits, cells[-1]), cells[-1] + 1, last))
-    return np.array(cells) * _PER_CELL
-
-
-def _furthest(fits: Callable[[int], bool], low: int, high: int) -> int:
-    """By halving; the lowest is taken to fit."""
-    while low < high:
-        middle = (low + high + 1) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle - 1)
-    return low
+        # The furthest end, by halving; one cell is taken to fit.
+        low, high = cells[-1] + 1, last
+        while low < high:
+            middle = (low + high + 1) // 2
+            low, high = (middle, high) if fits(cells[-1], middle) else (low, middle - 1)
+        cells.append(low)
+    return np.array(cells) * _SAMPLES_PER_CELL

@@ -21,53 +21,60 @@ from ringbalance.export.reference import reference_files
 from ringbalance.export.translate import number_text
 
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
-"""Of every file inside, so that two exports are equal."""
+"""Date of every file inside, so that two exports are equal."""
 _KINDS: Final = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 """Names of types in FMI 3.0 by those in FMI 2.0."""
 _ABLE: Final = ("canHandleVariableCommunicationStepSize", "canGetAndSetFMU{}tate", "canSerializeFMU{}tate")
 
 
 def fmu_bytes(block: Block, name: str, version: Version, *, all_systems: bool = False) -> tuple[bytes, bool]:
-    """The unit, and whether it has a library.
+    """The unit, and true if it has a library.
 
     It holds the model description, the sources, reference results, and the library for machines like this one
     where a compiler is, or, with `all_systems`, those for all that the standard names.
 
     Raises: OSError: no cross-compiler for all systems.
     """
-    words = _words(block, name)
-    core = filled("unit", block, name, **words)
-    sources = {**block_c_files(block, name), f"{version}.c": filled(version, block, name, core=core, **words)}
-    described = _model_2(block, name) if version == "fmi2" else _model_3(block, name)
-    parts = {
-        "modelDescription.xml": described,
-        **{f"sources/{file}": text.encode() for file, text in sources.items()},
-        **reference_files(block, name),
-    }
-    if version == "fmi3":
-        parts["sources/buildDescription.xml"] = _build(name)
-    libraries = (every_library if all_systems else local_library)(sources, name, version)
-    return _zipped({**parts, **libraries}), bool(libraries)
-
-
-def _words(block: Block, name: str) -> dict[str, str]:
-    """Counts and places of the variables, and how one is read."""
+    # Counts and places of the variables, and how one is read: of a block without time from a fresh answer.
     of = {kind: [each for each in block.variables if each.kind == kind] for kind in _KINDS}
-    read = "return {}->block.w[PLACES[reference]];"
-    shown = read.format("s")
+    shown = "return s->block.w[PLACES[reference]];"
     if not block.timed:
-        seen = f"state seen = *s;\n    {name}_step(&seen.block, 0.0);"
-        shown = f"{seen}\n    return seen.block.w[PLACES[reference]];"
-    return {
+        answer = f"state seen = *s;\n    {name}_step(&seen.block, 0.0);"
+        shown = f"{answer}\n    return seen.block.w[PLACES[reference]];"
+    words = {
         "guid": guid_of(block),
         "reals": str(len(of["Real"])),
         "integers": str(len(of["Integer"])),
         "booleans": str(len(of["Boolean"])),
         "real_inputs": str(sum(each.input for each in of["Real"])),
         "boolean_inputs": str(sum(each.input for each in of["Boolean"])),
-        "all_places": ", ".join(str(each.place) for each in block.variables),
+        "all_places": ", ".join(str(each.index) for each in block.variables),
         "shown": shown,
     }
+    core = filled("unit", block, name, **words)
+    sources = {**block_c_files(block, name), f"{version}.c": filled(version, block, name, core=core, **words)}
+    parts = {
+        "modelDescription.xml": _model_2(block, name) if version == "fmi2" else _model_3(block, name),
+        **{f"sources/{file}": text.encode() for file, text in sources.items()},
+        **reference_files(block, name),
+    }
+    if version == "fmi3":
+        root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+        configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
+        listed = ET.SubElement(configuration, "SourceFileSet", language="C99")
+        for file in (f"{name}.c", "fmi3.c"):
+            ET.SubElement(listed, "SourceFile", name=file)
+        parts["sources/buildDescription.xml"] = _xml(root)
+    libraries = (every_library if all_systems else local_library)(sources, name, version)
+
+    stream = BytesIO()
+    with ZipFile(stream, "w", ZIP_DEFLATED, compresslevel=9) as archive:
+        for file, content in sorted({**parts, **libraries}.items()):
+            entry = ZipInfo(file, _DATE)
+            entry.compress_type = ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content)
+    return stream.getvalue(), bool(libraries)
 
 
 def _model_2(block: Block, name: str) -> bytes:
@@ -82,11 +89,11 @@ def _model_2(block: Block, name: str) -> bytes:
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
     groups = [ET.SubElement(structure, group) for group in ("Outputs", "InitialUnknowns")]
-    for place, each in enumerate(block.variables):
-        variable = ET.SubElement(variables, "ScalarVariable", _heads(each, place))
+    for number, each in enumerate(block.variables):
+        variable = ET.SubElement(variables, "ScalarVariable", _heads(each, number))
         ET.SubElement(variable, each.kind, _range(block, each))
         for group in groups if not each.input else ():
-            ET.SubElement(group, "Unknown", index=str(place + 1))
+            ET.SubElement(group, "Unknown", index=str(number + 1))
     return _xml(root)
 
 
@@ -98,20 +105,20 @@ def _model_3(block: Block, name: str) -> bytes:
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
-    for place, each in enumerate(block.variables):
-        ET.SubElement(variables, _KINDS[each.kind], {**_heads(each, place), **_range(block, each)})
+    for number, each in enumerate(block.variables):
+        ET.SubElement(variables, _KINDS[each.kind], {**_heads(each, number), **_range(block, each)})
     heads = {"name": "time", "valueReference": str(len(block.variables)), "description": "of the host"}
     ET.SubElement(variables, "Float64", {**heads, "causality": "independent", "variability": "continuous"})
     for group in ("Output", "InitialUnknown"):
-        for place, each in enumerate(block.variables):
+        for number, each in enumerate(block.variables):
             if not each.input:
-                ET.SubElement(structure, group, valueReference=str(place))
+                ET.SubElement(structure, group, valueReference=str(number))
     return _xml(root)
 
 
 def _range(block: Block, variable: Variable) -> dict[str, str]:
     """Unit and range, and of an input its value at the start."""
-    start = block.start[variable.place]
+    start = block.start[variable.index]
     text = number_text(start) if variable.kind == "Real" else str(bool(start)).lower()
     return {**variable.range, "start": text} if variable.input else dict(variable.range)
 
@@ -123,10 +130,10 @@ def _root(version: str, block: Block, name: str, **further: str) -> ET.Element:
     return ET.Element("fmiModelDescription", {**heads, "description": title, **words})
 
 
-def _heads(variable: Variable, place: int) -> dict[str, str]:
+def _heads(variable: Variable, number: int) -> dict[str, str]:
     return {
         "name": variable.name,
-        "valueReference": str(place),
+        "valueReference": str(number),
         "causality": "input" if variable.input else "output",
         "variability": "continuous" if variable.kind == "Real" else "discrete",
         "description": variable.description,
@@ -141,16 +148,6 @@ def _add_units(root: ET.Element, block: Block) -> None:
             ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", dict(base))
 
 
-def _build(name: str) -> bytes:
-    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
-    sources = ET.SubElement(
-        ET.SubElement(root, "BuildConfiguration", modelIdentifier=name), "SourceFileSet", language="C99"
-    )
-    for file in (f"{name}.c", "fmi3.c"):
-        ET.SubElement(sources, "SourceFile", name=file)
-    return _xml(root)
-
-
 def _xml(root: ET.Element) -> bytes:
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
@@ -158,18 +155,7 @@ def _xml(root: ET.Element) -> bytes:
 
 
 def guid_of(block: Block) -> str:
-    """One for each block: other numbers make another unit."""
+    """Identifier of a block's unit: other numbers make another one."""
     tables = () if block.tables is None else (block.tables.cells, *block.tables.pieces, *block.tables.levels)
     text = ",".join(number_text(value) for value in (*block.constants, *chain(*tables), *block.start))
     return hashlib.sha256(f"{block.kind},{text}".encode()).hexdigest()[:32]
-
-
-def _zipped(parts: dict[str, bytes]) -> bytes:
-    stream = BytesIO()
-    with ZipFile(stream, "w", ZIP_DEFLATED, compresslevel=9) as archive:
-        for file, content in sorted(parts.items()):
-            entry = ZipInfo(file, _DATE)
-            entry.compress_type = ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, content)
-    return stream.getvalue()

@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.export.blocks import tabulation
-from ringbalance.export.compact import Answer, CompactLaw
+from ringbalance.export.compact import CompactLaw
 from ringbalance.export.hosts import plain_name
-from ringbalance.scene.arrays import FloatArray
 
 COLUMNS: Final = (
     "fill_ratio",
@@ -30,51 +29,17 @@ def csv_files(law: CompactLaw, name: str, *, points: int, highest: float) -> dic
     Args: `points`: on each axis. `highest`: gas pressure that the grid ends at, gauge, Pa.
     """
     fills, pressures = np.linspace(0.0, law.max_fill_ratio, points), np.linspace(0.0, highest, points)
-    rows = {
+    answers = {
         key: law.answer(fill_ratio=key[0], gas_pressure=key[1], primed=key[2])
         for key in product(fills.tolist(), pressures.tolist(), (False, True))
     }
-    lines = [*_header(law, _interpolation_errors(law, fills, pressures, rows)), ",".join(COLUMNS)]
-    x, p, wet = (np.array(column) for column in zip(*rows, strict=True))
-    flow = law.calibrated.evaluate(fill_ratio=x, gas_pressure=p, primed=wet)
-    for ((fill, pressure, primed), found), width in zip(rows.items(), flow.uncertainty.tolist(), strict=True):
-        values = (found.velocity, width, found.regime, found.status, int(found.primed))
-        lines.append(f"{fill!r},{pressure!r},{int(primed)}," + ",".join(map(repr, values)))
-    return {f"{name}.csv": "\n".join(lines) + "\n"}
 
-
-def _header(law: CompactLaw, errors: tuple[FloatArray, float]) -> list[str]:
-    off, across = errors
-    largest = float(np.max(off)) if off.size else 0.0
-    most = float(np.quantile(off, 0.95)) if off.size else 0.0
-    return [
-        f"# {line.strip()}"
-        for line in (
-            f"Flow law of a liquid-ring balancer, made by ringbalance from {plain_name(law.scene)}.",
-            *tabulation(law).splitlines(),
-            "units: fill ratios in 1, gauge pressures in Pa, velocities in m/s; uncertainty expanded (95 %)",
-            "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse",
-            "status: 0 ok, 1 extrapolated, 2 blocked, 4 invalid",
-            f"opposite fill ratio: {law.max_fill_ratio!r} less the fill ratio",
-            "bilinear interpolation, looked at in the middle of cells whose corners have one regime: at most "
-            f"{largest:.2g} m/s, 95 % below {most:.2g} m/s",
-            f"cells with more than one regime, where interpolation is worth nothing: {100 * across:.1f} %",
-        )
-    ]
-
-
-def _interpolation_errors(
-    law: CompactLaw,
-    fills: FloatArray,
-    pressures: FloatArray,
-    rows: dict[tuple[float, float, bool], Answer],
-) -> tuple[FloatArray, float]:
-    """In the middle of cells of one regime, m/s, and the fraction of the others."""
-    off, across = [], 0
-    cells = list(product(range(fills.size - 1), range(pressures.size - 1), (False, True)))
+    # Errors of interpolation in the middle of cells of one regime, m/s, and the number of the others.
+    errors, mixed = [], 0
+    cells = list(product(range(points - 1), range(points - 1), (False, True)))
     for i, j, primed in cells:
         corners = [
-            rows[float(fills[i + a]), float(pressures[j + b]), primed] for a, b in product((0, 1), (0, 1))
+            answers[float(fills[i + a]), float(pressures[j + b]), primed] for a, b in product((0, 1), (0, 1))
         ]
         middle = law.answer(
             fill_ratio=float(fills[i : i + 2].mean()),
@@ -82,7 +47,29 @@ def _interpolation_errors(
             primed=primed,
         )
         if {each.regime for each in corners} == {middle.regime}:
-            off.append(abs(middle.velocity - sum(each.velocity for each in corners) / 4))
+            errors.append(abs(middle.velocity - sum(each.velocity for each in corners) / 4))
         else:
-            across += 1
-    return np.array(off), across / len(cells)
+            mixed += 1
+    largest = float(np.max(errors)) if errors else 0.0
+    most = float(np.quantile(errors, 0.95)) if errors else 0.0
+
+    head = (
+        f"Flow law of a liquid-ring balancer, made by ringbalance from {plain_name(law.scene)}.",
+        *tabulation(law).splitlines(),
+        "units: fill ratios in 1, gauge pressures in Pa, velocities in m/s; uncertainty expanded (95 %)",
+        "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse",
+        "status: 0 ok, 1 extrapolated, 2 blocked, 4 invalid",
+        f"opposite fill ratio: {law.max_fill_ratio!r} less the fill ratio",
+        "bilinear interpolation, looked at in the middle of cells whose corners have one regime: at most "
+        f"{largest:.2g} m/s, 95 % below {most:.2g} m/s",
+        "cells with more than one regime, where interpolation is worth nothing: "
+        f"{100 * (mixed / len(cells)):.1f} %",
+    )
+    lines = [*(f"# {line.strip()}" for line in head), ",".join(COLUMNS)]
+    x, p, wet = (np.array(column) for column in zip(*answers, strict=True))
+    flow = law.calibrated.evaluate(fill_ratio=x, gas_pressure=p, primed=wet)
+    for (key, answer), width in zip(answers.items(), flow.uncertainty.tolist(), strict=True):
+        fill, pressure, primed = key
+        values = (answer.velocity, width, answer.regime, answer.status, int(answer.primed))
+        lines.append(f"{fill!r},{pressure!r},{int(primed)}," + ",".join(map(repr, values)))
+    return {f"{name}.csv": "\n".join(lines) + "\n"}

@@ -21,7 +21,7 @@ from ringbalance.export.translate import (
     st_functions,
 )
 
-_OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
+_CHAMBER_FUNCTIONS: Final = ("surface_radius", "moment", "moment_uncertainty")
 """Functions of the law for one chamber, which a caller may ask for by themselves."""
 _ST_TYPES: Final = {"Real": "LREAL", "Integer": "DINT", "Boolean": "BOOL"}
 
@@ -39,17 +39,17 @@ def identifier(text: str) -> str:
 def c_files(block: Block, name: str) -> dict[str, str]:
     """Text of the source and of the header by file name; `name`: of file and functions."""
     if block.kind == "law":
-        head = _head(block, name, ("answer", *_OF_CHAMBER))
+        head = _head(block, name, ("answer", *_CHAMBER_FUNCTIONS))
         return {f"{name}.h": filled("h", block, name), f"{name}.c": filled("c", block, name, head=head)}
     return block_c_files(block, name)
 
 
 def block_c_files(block: Block, name: str) -> dict[str, str]:
-    """The same with the names that all blocks have."""
+    """Text of source and header by file name, with the names that all blocks have."""
     upper = name.upper()
     last = block.variables[-1]
     places = [
-        f"    {upper}_{each.name.upper()} = {each.place}{',' * (each is not last)} /* {each.explained} */"
+        f"    {upper}_{each.name.upper()} = {each.index}{',' * (each is not last)} /* {each.explained} */"
         for each in block.variables
     ]
     run = f"{block.steps}({_C_TABLES if block.tables else 'CONSTANTS'}, s->w{', time' * block.timed});"
@@ -68,7 +68,7 @@ def st_files(block: Block, name: str) -> dict[str, str]:
     sizes = {"Law": len(block.constants), "Query": len(block.start)}
     arrays = {kind: f"[0..{count - 1}] OF LREAL" for kind, count in sizes.items()}
     arrays |= {kind: _st_array(kind, rows) for kind, rows in _tables_of(block)}
-    entries = ("answer", *_OF_CHAMBER) if block.kind == "law" else ()
+    entries = ("answer", *_CHAMBER_FUNCTIONS) if block.kind == "law" else ()
     functions = st_functions(block.source(entries), prefix=name, sizes=arrays)
     if block.kind == "law":
         return {f"{name}.st": filled("st", block, name, functions=functions)}
@@ -99,12 +99,12 @@ def _st_declared(each: Variable) -> str:
 
 def _st_set(each: Variable) -> str:
     if each.kind == "Boolean":
-        return f"w[{each.place}] := 0.0;\nIF {each.name} THEN\n    w[{each.place}] := 1.0;\nEND_IF;"
-    return f"w[{each.place}] := {each.name};"
+        return f"w[{each.index}] := 0.0;\nIF {each.name} THEN\n    w[{each.index}] := 1.0;\nEND_IF;"
+    return f"w[{each.index}] := {each.name};"
 
 
 def _st_get(each: Variable) -> str:
-    value = f"w[{each.place}]"
+    value = f"w[{each.index}]"
     if each.kind == "Boolean":
         return f"{each.name} := {value} <> 0.0;"
     return f"{each.name} := LREAL_TO_DINT({value});" if each.kind == "Integer" else f"{each.name} := {value};"
@@ -113,11 +113,11 @@ def _st_get(each: Variable) -> str:
 def python_files(block: Block, name: str) -> dict[str, str]:
     """A module that needs nothing but Python."""
     law = block.kind == "law"
-    source = python_functions(block.source(("answer", *_OF_CHAMBER) if law else ()))
+    source = python_functions(block.source(("answer", *_CHAMBER_FUNCTIONS) if law else ()))
     if law:
         return {f"{name}.py": filled("python", block, name, source=source)}
     inputs, outputs = (
-        "\n".join(f'    "{v.name}": {v.place},  # {v.explained}' for v in side) for side in _sides(block)
+        "\n".join(f'    "{v.name}": {v.index},  # {v.explained}' for v in side) for side in _sides(block)
     )
     run = f"{block.steps}({_C_TABLES if block.tables else 'CONSTANTS'}, self.w, time)"
     text = filled(
@@ -128,13 +128,13 @@ def python_files(block: Block, name: str) -> dict[str, str]:
 
 _C_TABLES: Final = "CONSTANTS, CELL_ROWS, PIECES, LEVELS"
 _TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
-"""How a language writes a number; C's hexadecimal ones are short and leave nothing to round."""
+"""Writer of a number by language; C's hexadecimal ones are short and leave nothing to round."""
 _NUMBERS: Final = {
     "Cells": {"c": "unsigned char", "st": "USINT", "st_name": "k"},
     "Pieces": {"c": "float", "st": "REAL", "st_name": "p"},
     "Levels": {"c": "double", "st": "LREAL", "st_name": "q"},
 }
-"""What the tables of a law are made of, by their types in `translate`."""
+"""Types and names of the numbers in a law's tables, by their types in `translate`."""
 _ROW: Final = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}
 
 
@@ -144,7 +144,7 @@ def _tables_of(block: Block) -> Iterator[tuple[str, Sequence[Any]]]:
 
 
 def _st_array(kind: str, rows: Sequence[Any]) -> str:
-    """What structured text declares a table as, behind ARRAY."""
+    """Declaration of a table in structured text, behind ARRAY."""
     width = "" if kind == "Cells" else f", 0..{PER_PIECE - 1}"
     return f"[0..{len(rows) - 1}{width}] OF {_NUMBERS[kind]['st']}"
 

@@ -19,11 +19,11 @@ from ringbalance.scene.platform.display import announced
 
 Version = Literal["fmi2", "fmi3"]
 EXTRA: Final = "export-all"
-"""Of the project, with the cross-compiler."""
+"""Extra of the project that installs the cross-compiler."""
 _OPTIONS: Final = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 _SUFFIXES: Final = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 _SYSTEMS: Final = {"linux": "linux-gnu.2.17", "darwin": "macos", "windows": "windows-gnu"}
-"""As the cross-compiler calls them; the oldest C library that it links for is that of 2012."""
+"""Names of the cross-compiler; the oldest C library that it links for is that of 2012."""
 _SMALL: Final = (
     *("-s", "-Os", "-fomit-frame-pointer", "-fno-math-errno", "-fno-ident"),
     *("-fno-vectorize", "-fno-slp-vectorize"),
@@ -48,40 +48,41 @@ _HEADERS: Final = {
 _PROCESSORS: Final = ("x86_64", "aarch64")
 _PYTHON_NAMES: Final = {"AMD64": "x86_64", "arm64": "aarch64"}
 _FOLDERS_2: Final = {"linux": "linux64", "darwin": "darwin64", "windows": "win64"}
-"""Of FMI 2.0, which names no processor but x86."""
+"""Folders of FMI 2.0, which names no processor but x86."""
 
 
 def local_library(sources: Mapping[str, str], name: str, version: Version) -> dict[str, bytes]:
-    """For machines like this one, by place in the unit; nothing where no compiler is, or it fails."""
-    compiler = next((path for each in ("cc", "gcc", "clang") if (path := shutil.which(each))), None)
+    """Library for machines like this one, by its path in the unit; none without a compiler that works."""
+    compiler = next((tool for each in ("cc", "gcc", "clang") if (tool := shutil.which(each))), None)
     processor = _PYTHON_NAMES.get(platform.machine(), platform.machine())
-    place = _place(version, name, sys.platform, processor)
-    if compiler is None or place is None:
+    path = _path(version, name, sys.platform, processor)
+    if compiler is None or path is None:
         return {}
     try:
-        return {place: _compiled([compiler, "-O2"], sources, Path(place).name, ["-lm"])}
+        return {path: _compiled([compiler, "-O2"], sources, Path(path).name, ["-lm"])}
     except OSError:
         return {}
 
 
 def every_library(sources: Mapping[str, str], name: str, version: Version) -> dict[str, bytes]:
-    """For Linux, macOS and Windows on both processors, as far as the standard names them.
+    """Libraries for Linux, macOS and Windows on both processors, as far as the standard names them.
 
     The cross-compiler keeps what it compiles in its own cache: some seconds for a system the first time.
 
     Raises: OSError: the cross-compiler fails.
     """
-    asked = [(system, processor) for system in _SYSTEMS for processor in _PROCESSORS]
-    places = {each: place for each in asked if (place := _place(version, name, *each))}
-    made = {}
-    for done, ((system, processor), place) in enumerate(places.items(), start=1):
-        with announced(f"compiling for {system} on {processor}, {done} of {len(places)} ..."):
+    machines = [(system, processor) for system in _SYSTEMS for processor in _PROCESSORS]
+    paths = {each: path for each in machines if (path := _path(version, name, *each))}
+    libraries = {}
+    for done, ((system, processor), path) in enumerate(paths.items(), start=1):
+        with announced(f"compiling for {system} on {processor}, {done} of {len(paths)} ..."):
             target = f"{processor}-{_SYSTEMS[system]}"
             compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, *_SMALL]
             compiler += _OF_PROCESSOR[processor]
-            own = {**_HEADERS, "windows.c": template("windows")} if system == "windows" else {}
-            made[place] = _compiled(compiler, {**sources, **own}, Path(place).name, _OF_SYSTEM[system])
-    return made
+            further = {**_HEADERS, "windows.c": template("windows")} if system == "windows" else {}
+            texts = {**sources, **further}
+            libraries[path] = _compiled(compiler, texts, Path(path).name, _OF_SYSTEM[system])
+    return libraries
 
 
 def _compiled(
@@ -95,13 +96,13 @@ def _compiled(
         command = [*compiler, *_OPTIONS, *compiled, *further, "-o", library]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode:
-            told = (done.stderr.strip() or "no message").splitlines()[-1]
-            raise OSError(f"{Path(compiler[0]).name} does not compile {library}: {told}")
+            message = (done.stderr.strip() or "no message").splitlines()[-1]
+            raise OSError(f"{Path(compiler[0]).name} does not compile {library}: {message}")
         return Path(folder, library).read_bytes()
 
 
-def _place(version: Version, name: str, system: str, processor: str) -> str | None:
-    """In the unit; None: the standard, or this program, names no such machine."""
+def _path(version: Version, name: str, system: str, processor: str) -> str | None:
+    """Path of a library in the unit; None: the standard, or this program, names no such machine."""
     if system not in _SUFFIXES or processor not in _PROCESSORS:
         return None
     if version == "fmi2" and processor != "x86_64":

@@ -15,35 +15,43 @@ from ringbalance.results.result import csv_text
 
 _FOLDER: Final = "extra/org.fmi-standard.fmi-ls-ref"
 _MANIFEST: Final = "http://fmi-standard.org/fmi-ls-manifest"
-_STEP: Final = 0.01
-"""s, between two rows."""
-_PRESSURES: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
-"""Pa."""
-_OPENINGS: Final = (0.06, 0.02, 0.03)
-"""s, asked of the disc's first chambers one after the other, five rows apart at least."""
-_TURN: Final = (3e-6, 0.0), (3e-6, 2e-6), (-1e-6, 1e-6), (-1e-9, 0.0)
-"""m, vibrations that the controller sees, 60 rows each."""
+_STEP_S: Final = 0.01
+_PRESSURES_PA: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
+_OPEN_TIMES_S: Final = (0.06, 0.02, 0.03)
+"""Commands to the disc's first chambers one after the other, five rows apart at least."""
+_VIBRATIONS_M: Final = (3e-6, 0.0), (3e-6, 2e-6), (-1e-6, 1e-6), (-1e-9, 0.0)
+"""Vibrations that the controller sees, 60 rows each."""
 
 
 def reference_files(block: Block, name: str) -> dict[str, bytes]:
-    """Inputs, outputs and the manifest that names them, by place in the unit."""
+    """Inputs, outputs and the manifest that names them, by path in the unit."""
     row = list(block.start)
     inputs: list[Mapping[str, float]] = []
     outputs: list[Mapping[str, float]] = []
     for stimulus in _stimuli(block):
         inputs.append(stimulus)
-        outputs.append(block.run(row, _STEP, stimulus))
+        outputs.append(block.run(row, _STEP_S, stimulus))
     integers = {each.name for each in block.variables if each.kind != "Real"}
+
+    ET.register_namespace("fmi-ls", _MANIFEST)
+    standard = {"name": "org.fmi-standard.fmi-ls-ref", "version": "1.0.0-alpha.1"}
+    standard["description"] = "Inputs and outputs to compare a host with"
+    heads = {f"{{{_MANIFEST}}}fmi-ls-{key}": text for key, text in standard.items()}
+    root = ET.Element("fmiReferences", heads)
+    for source, role in ((f"{name}_in.csv", "stimulus"), (f"{name}_out.csv", "result")):
+        ET.SubElement(root, "Related", type="text/csv", source=source, role=role)
+    ET.indent(root)
+    manifest: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return {
         f"{_FOLDER}/{name}_in.csv": _csv(inputs, 0, integers),
         f"{_FOLDER}/{name}_out.csv": _csv(outputs, 1, integers),
-        f"{_FOLDER}/fmi-ls-manifest.xml": _manifest(name),
+        f"{_FOLDER}/fmi-ls-manifest.xml": manifest,
     }
 
 
 def _csv(rows: list[Mapping[str, float]], later: int, integers: set[str]) -> bytes:
     """Args: `later`: steps from the beginning to the first row."""
-    times = [repr((place + later) * _STEP) for place in range(len(rows))]
+    times = [repr((row + later) * _STEP_S) for row in range(len(rows))]
     columns = {
         name: [str(int(row[name])) if name in integers else repr(row[name]) for row in rows]
         for name in rows[0]
@@ -57,27 +65,15 @@ def _stimuli(block: Block) -> Iterator[Mapping[str, float]]:
     if block.kind == "law":
         most = sum(block.start[:2])
         for share in (0.1, 0.3, 0.5, 0.8):
-            for pressure in _PRESSURES:
+            for pressure in _PRESSURES_PA:
                 for primed in (0.0, 1.0):
                     fills = share * most, (1 - share) * most
                     yield dict(zip(zeros, (*fills, pressure, primed), strict=True))
     elif block.kind == "disc":
-        for name, opening in zip(zeros, _OPENINGS, strict=False):
+        for name, open_time in zip(zeros, _OPEN_TIMES_S, strict=False):
             for step in range(8):
-                yield {**zeros, name: max(opening - step * _STEP, 0.0)}
+                yield {**zeros, name: max(open_time - step * _STEP_S, 0.0)}
     else:
-        for x, y in _TURN:
+        for x, y in _VIBRATIONS_M:
             for _ in range(60):
                 yield {**zeros, "vibration_x": x, "vibration_y": y}
-
-
-def _manifest(name: str) -> bytes:
-    ET.register_namespace("fmi-ls", _MANIFEST)
-    told = {"name": "org.fmi-standard.fmi-ls-ref", "version": "1.0.0-alpha.1"}
-    told["description"] = "Inputs and outputs to compare a host with"
-    root = ET.Element("fmiReferences", {f"{{{_MANIFEST}}}fmi-ls-{key}": text for key, text in told.items()})
-    for source, role in ((f"{name}_in.csv", "stimulus"), (f"{name}_out.csv", "result")):
-        ET.SubElement(root, "Related", type="text/csv", source=source, role=role)
-    ET.indent(root)
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text

@@ -37,7 +37,7 @@ class Function:
 
     @property
     def names(self) -> set[str]:
-        """All that it uses."""
+        """Names that it uses."""
         nodes = [node for each in self.body for node in ast.walk(each)]
         return {node.id for node in nodes if isinstance(node, ast.Name)}
 
@@ -51,25 +51,25 @@ class Source:
 
     @classmethod
     def of_modules(cls, modules: Sequence[ModuleType], entries: Sequence[str]) -> Source:
-        """What some functions need of modules that import each other's names, a later one's before.
+        """Source that some functions need, of modules that import each other's names, a later one's before.
 
         Raises: ValueError: something in it that is not of the subset, or a constant of two values.
         """
-        whole = [cls.of_text(inspect.getsource(each)) for each in modules]
-        functions = {name: each for source in whole for name, each in source.functions.items()}
+        sources = [cls.of_text(inspect.getsource(each)) for each in modules]
+        functions = {name: each for source in sources for name, each in source.functions.items()}
         needed, todo = set(entries), list(entries)
         while todo:
             names = functions[todo.pop()].names
             todo += [name for name in names - needed if name in functions]
             needed |= names
-        constants = {name: value for source in whole for name, value in source.constants.items()}
+        constants = {name: value for source in sources for name, value in source.constants.items()}
         used: dict[str, int | float] = {}
-        for source in whole:
-            known = {**constants, **source.constants}
+        for source in sources:
+            values = {**constants, **source.constants}
             for name in set().union(
                 *(source.functions[each].names for each in needed & source.functions.keys())
             ):
-                if name in known and used.setdefault(name, known[name]) != known[name]:
+                if name in values and used.setdefault(name, values[name]) != values[name]:
                     raise ValueError(f"two modules mean different numbers by {name}")
         return cls(
             constants={name: used[name] for name in constants if name in used},
@@ -89,8 +89,24 @@ class Source:
             if isinstance(node, ast.Assign)
             for name, value in _pairs(node)
         }
-        functions = [_function(node) for node in tree.body if isinstance(node, ast.FunctionDef)]
-        return cls(constants=constants, functions={each.name: each for each in functions})
+        functions = {}
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef):
+                docstring = ast.get_docstring(node) or ""
+                # What marks a function for the program's own compiled code is nothing to another host.
+                node.decorator_list = []
+                arguments = {
+                    each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args
+                }
+                functions[node.name] = Function(
+                    name=node.name,
+                    summary=docstring.split("\n")[0],
+                    arguments=arguments,
+                    result=ast.unparse(node.returns or ast.Constant("?")),
+                    body=node.body[1 if docstring else 0 :],
+                    text=ast.unparse(node),
+                )
+        return cls(constants=constants, functions=functions)
 
 
 def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
@@ -101,28 +117,14 @@ def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
                 yield name, value
 
 
-def _function(node: ast.FunctionDef) -> Function:
-    documented = ast.get_docstring(node) or ""
-    # What marks a function for the program's own compiled code is nothing to another host.
-    node.decorator_list = []
-    return Function(
-        name=node.name,
-        summary=documented.split("\n")[0],
-        arguments={each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args},
-        result=ast.unparse(node.returns or ast.Constant("?")),
-        body=node.body[1 if documented else 0 :],
-        text=ast.unparse(node),
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class Language:
-    """What two languages write differently."""
+    """Forms of one language."""
 
     types: Mapping[str, str]
     """Format of a declared name."""
     operators: Mapping[type, str]
-    """Of comparisons and of `and`, `or`, `not`."""
+    """Signs of comparisons and of `and`, `or`, `not`."""
     to_whole: str
     to_number: str
     truths: tuple[str, str]
@@ -131,7 +133,7 @@ class Language:
     """Format of a variable's name."""
     function: str
     constants: bool
-    """Whether constants go by their names."""
+    """True if constants go by their names."""
     assign: str
     open_if: str
     else_if: str
@@ -140,7 +142,7 @@ class Language:
     open_while: str
     close_while: str
     element: Mapping[str, str]
-    """Format of what stands in rows, by their type, from their name and places."""
+    """Format of a number in rows, by their type, from their name and indices."""
 
 
 C99: Final = Language(
@@ -235,7 +237,7 @@ class Writer:
     source: Source
     function: Function
     types: dict[str, str] = field(default_factory=dict)
-    """Of arguments, and of local variables as they are met."""
+    """Types of arguments, and of local variables as they are met."""
 
     def lines(self) -> list[str]:
         """The body, one statement a line."""
@@ -299,8 +301,8 @@ class Writer:
         yield "RETURN;"
 
     def _typed(self, node: ast.expr, kind: str) -> str:
-        text, given = self._expression(node)
-        if given != kind:
+        text, actual = self._expression(node)
+        if actual != kind:
             raise self._refused(node)
         return text
 
@@ -335,7 +337,12 @@ class Writer:
             case ast.UnaryOp(op=ast.Not() as no, operand=operand):
                 return f"{signs[type(no)]}({self._typed(operand, TRUTH)})", TRUTH
             case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _BINARY:
-                return self._arithmetic(left, operator, right)
+                kind = self._expression(left)[1]
+                if isinstance(operator, _NOT_OF.get(kind, ast.operator)):
+                    raise self._refused(left)
+                # Every operation in brackets of its own: no language's order of them matters.
+                sign = _BINARY[type(operator)]
+                return f"{self._operand(left, kind)} {sign} {self._operand(right, kind)}", kind
             case ast.Compare(left=left, ops=[comparison], comparators=[right]):
                 kind = self._expression(left)[1]
                 sign = signs[type(comparison)]
@@ -358,30 +365,24 @@ class Writer:
         text = self._typed(node, kind)
         return f"({text})" if isinstance(node, ast.BinOp | ast.UnaryOp | ast.BoolOp | ast.Compare) else text
 
-    def _arithmetic(self, left: ast.expr, operator: ast.operator, right: ast.expr) -> tuple[str, str]:
-        kind = self._expression(left)[1]
-        if isinstance(operator, _NOT_OF.get(kind, ast.operator)):
-            raise self._refused(left)
-        # Every operation in brackets of its own: no language's order of them matters.
-        return f"{self._operand(left, kind)} {_BINARY[type(operator)]} {self._operand(right, kind)}", kind
-
     def _call(self, node: ast.expr, name: str, arguments: Sequence[ast.expr]) -> tuple[str, str]:
         if name == "sqrt" and len(arguments) == 1:
             root = "sqrt({})" if self.language is C99 else "SQRT({})"
             return root.format(self._typed(arguments[0], NUMBER)), NUMBER
         if name == "int":
             text, kind = self._expression(arguments[0])
-            whole = kind == WHOLE
-            return text if whole else self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
+            if kind == WHOLE:
+                return text, WHOLE
+            return self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
         if name == "float":
             return self.language.to_number.format(self._typed(arguments[0], WHOLE)), NUMBER
         if name not in self.source.functions:
             raise self._refused(node)
         called = self.source.functions[name]
-        given = [
+        texts = [
             self._typed(each, kind) for each, kind in zip(arguments, called.arguments.values(), strict=True)
         ]
-        return f"{self.language.function.format(name)}({', '.join(given)})", called.result
+        return f"{self.language.function.format(name)}({', '.join(texts)})", called.result
 
     def _refused(self, node: ast.stmt | ast.expr) -> ValueError:
         return ValueError(f"{self.function.name}: not of the subset that is translated: {ast.unparse(node)}")
@@ -411,8 +412,8 @@ def python_functions(source: Source) -> str:
 
 def c_functions(source: Source) -> str:
     """All functions of a source in C99, each `static`, and its constants; nothing is exported."""
-    whole = [f"    {name} = {value}" for name, value in source.constants.items() if isinstance(value, int)]
-    parts = ["enum {\n" + ",\n".join(whole) + "\n};\n"]
+    integers = [f"    {name} = {value}" for name, value in source.constants.items() if isinstance(value, int)]
+    parts = ["enum {\n" + ",\n".join(integers) + "\n};\n"]
     parts += [
         f"static const double {name} = {number_text(value)};\n"
         for name, value in source.constants.items()

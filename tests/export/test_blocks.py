@@ -42,7 +42,7 @@ def loop_in_c(folder: Path, disc: Block, controller: Block, *, samples: int, lon
     """Time, vibration x and y, then open time and fill of each chamber, a row for each sample."""
 
     def places(block: Block, begins: str) -> str:
-        return ", ".join(str(each.place) for each in block.variables if each.name.startswith(begins))
+        return ", ".join(str(each.index) for each in block.variables if each.name.startswith(begins))
 
     of_chambers = {
         "asked": places(disc, "open_time"),
@@ -149,7 +149,7 @@ def test_the_controller_passes_over_what_is_no_number_and_forgets_nothing(blocks
     assert not any(told[f"open_time_{letter}"] for letter in "abcdef")
     changed = {place for place, (a, b) in enumerate(zip(before, row, strict=True)) if a != b and b == b}
     module = block.modules[-1]
-    openings = {each.place for each in block.variables if each.name.startswith("open_time")}
+    openings = {each.index for each in block.variables if each.name.startswith("open_time")}
     assert changed <= {module.SAMPLES, module.WAIT, module.SINCE, *openings}
 
 

@@ -10,7 +10,7 @@ import pytest
 from law_queries import answers, queries
 
 from ringbalance.export import chamber, compact
-from ringbalance.export.compact import LARGEST, TOLERANCE, CompactLaw, compact_law
+from ringbalance.export.compact import MAX_BYTES, TOLERANCE, CompactLaw, compact_law
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -27,7 +27,7 @@ OK, EXTRAPOLATED, BLOCKED, INVALID = 0, 1, 2, 4
 
 def test_it_is_small_and_within_its_tolerance_of_the_calibrated_law(laws: Both) -> None:
     law, compact = laws
-    assert compact.size <= 4096 == LARGEST
+    assert compact.size <= 4096 == MAX_BYTES
     asked = queries(law, 6000)
     x, y, p, primed = asked
     right = law.evaluate(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=primed.astype(bool))
@@ -95,7 +95,7 @@ def test_rough_levels_are_called_so(six: Both, monkeypatch: pytest.MonkeyPatch) 
     law, exact = six
     scene = load_scene(scenes.replace("__init__.py", "six_chamber.toml"))
     assert isinstance(scene, Scene)
-    monkeypatch.setattr(compact, "_OF_LEVELS", 1e8 * compact._OF_LEVELS)
+    monkeypatch.setattr(compact, "_LEVEL_ERROR", 1e8 * compact._LEVEL_ERROR)
     rough = compact_law(scene=scene, law=law)
     fills = np.linspace(1e-3, 0.999 * law.max_fill_ratio, 500)
     tables = rough.constants, rough.tables.cells, rough.tables.levels
@@ -142,6 +142,6 @@ def test_odd_discs_have_a_compact_law(tmp_path: Path, numbers: tuple[float | str
     assert isinstance(scene, Scene)
     law = chamber_and_law(scene)[1]
     made = compact_law(scene=scene, law=law)
-    assert made.size <= LARGEST
+    assert made.size <= MAX_BYTES
     # Where levels would have no room, velocities are tabulated less exactly, and the export says how much.
     assert made.departure <= 3 * TOLERANCE

@@ -215,7 +215,7 @@ def test_disc_and_controller_have_the_bits_of_python(
     block = blocks[kind]
     machine = Machine(st_files(block, "disc")["disc.st"])
     mine, row = list(block.start), list(block.start)
-    places = {each.name: each.place for each in block.variables}
+    places = {each.name: each.index for each in block.variables}
     for step in range(3):
         given = {name: value * (step < 2) for name, value in inputs.items()}
         for name, value in given.items():

@@ -51,7 +51,7 @@ LAMINAR, LEAST_GAS, CLOSE, SHORTEST = 0.999, 1e-3, 1e-9, 1e-7
 
 
 def gas_volume(c: Law, fill: float) -> float:
-    """Of the gas that belongs to a chamber, m^3."""
+    """Volume of the gas that belongs to a chamber, m^3."""
     d = int(c[BLOCK])
     return larger(1.0 - fill, LEAST_GAS) * c[d + VOLUME] + c[d + DEAD]
 
@@ -61,16 +61,16 @@ def passed(c: Law, ratio: float) -> float:
     b = c[int(c[BLOCK]) + CRITICAL]
     if ratio <= b:
         return 1.0
-    kept = smaller(ratio, larger(LAMINAR, b))
-    part = (kept - b) / (1.0 - b)
+    turbulent = smaller(ratio, larger(LAMINAR, b))
+    part = (turbulent - b) / (1.0 - b)
     ellipse = sqrt(larger(1.0 - part * part, 0.0))
-    if ratio > kept:
-        return ellipse * (1.0 - ratio) / (1.0 - kept)
+    if ratio > turbulent:
+        return ellipse * (1.0 - ratio) / (1.0 - turbulent)
     return ellipse
 
 
 def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: float) -> None:
-    """Of a chamber's pressure, Pa/s, and of its content p V/T, W/K, with the growth of its volume, m^3/s."""
+    """Rates of a chamber's pressure, Pa/s, and content p V/T, W/K, with the growth of its volume, m^3/s."""
     d = int(c[BLOCK])
     w[RATES + GAS + side] = 0.0
     w[RATES + CONTENT + side] = 0.0
@@ -102,16 +102,16 @@ def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
         w[VELOCITY] = -w[VELOCITY]
 
 
-def keep_primed(w: Query, place: int) -> None:
-    """Keep whether the tube holds a continuous column; while a parted one flows, that stays as it was."""
+def keep_primed(w: Query, flag: int) -> None:
+    """Keep if the tube holds a continuous column; while a parted one flows, that stays as it was."""
     if w[PRIMED_AFTER] != 0.0:
-        w[place] = 1.0
+        w[flag] = 1.0
     elif w[REGIME] == BLOCKED:
-        w[place] = 0.0
+        w[flag] = 0.0
 
 
 def set_rates(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
-    """Of a pair's fill, 1/s, and of its gases."""
+    """Rates of a pair's fill, 1/s, and of its gases."""
     d = int(c[BLOCK])
     set_tube(c, k, p, q, w, at)
     x = w[at + X]
@@ -198,27 +198,27 @@ def settle(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
 
 
 def length(c: Law, w: Query, at: int, left: float) -> float:
-    """Of the next part, s: to where a valve moves, or a driven chamber comes to its residual fill."""
+    """Length of the next part, s: until a valve moves, or a driven chamber comes to its residual fill."""
     d = int(c[BLOCK])
-    found = smaller(left, c[d + LONGEST])
+    part = smaller(left, c[d + LONGEST])
     falls = c[d + PER_SECOND] * w[VELOCITY]
     fill = w[at + X]
     side = 0
     while side < 2:
         if w[at + OPENS + side] > 0.0:
-            found = smaller(found, w[at + OPENS + side])
+            part = smaller(part, w[at + OPENS + side])
         if w[at + CLOSES + side] > 0.0:
-            found = smaller(found, w[at + CLOSES + side])
+            part = smaller(part, w[at + CLOSES + side])
         if w[at + VALVE + side] != 0.0 and falls > 0.0:
-            found = smaller(found, larger((fill - c[d + RESIDUAL]) / falls, SHORTEST))
+            part = smaller(part, larger((fill - c[d + RESIDUAL]) / falls, SHORTEST))
         fill = c[d + TOTAL] - w[at + X]
         falls = -falls
         side = side + 1
-    return found
+    return part
 
 
 def tick(w: Query, at: int, time: float) -> None:
-    """The clocks of the valves."""
+    """Advance the clocks of the valves."""
     side = 0
     while side < 2:
         if w[at + OPENS + side] > 0.0:
@@ -235,7 +235,7 @@ def tick(w: Query, at: int, time: float) -> None:
 
 
 def show(c: Law, k: Cells, p: Pieces, w: Query) -> None:
-    """Fills, the disc's moment, kg m, and the vibration with it, m."""
+    """Show fills, the disc's moment, kg m, and the vibration with it, m."""
     d = int(c[BLOCK])
     w[MOMENT_X] = 0.0
     w[MOMENT_Y] = 0.0
@@ -245,9 +245,9 @@ def show(c: Law, k: Cells, p: Pieces, w: Query) -> None:
         axis = d + DIRECTIONS + 2 * pair
         w[at + LIQUID] = w[at + X]
         w[at + LIQUID + 1] = c[d + TOTAL] - w[at + X]
-        along = moment(c, k, p, w[at + LIQUID]) - moment(c, k, p, w[at + LIQUID + 1])
-        w[MOMENT_X] = w[MOMENT_X] + along * c[axis]
-        w[MOMENT_Y] = w[MOMENT_Y] + along * c[axis + 1]
+        difference = moment(c, k, p, w[at + LIQUID]) - moment(c, k, p, w[at + LIQUID + 1])
+        w[MOMENT_X] = w[MOMENT_X] + difference * c[axis]
+        w[MOMENT_Y] = w[MOMENT_Y] + difference * c[axis + 1]
         pair = pair + 1
     x = c[d + INFLUENCE_X] * w[MOMENT_X] - c[d + INFLUENCE_Y] * w[MOMENT_Y]
     y = c[d + INFLUENCE_X] * w[MOMENT_Y] + c[d + INFLUENCE_Y] * w[MOMENT_X]
@@ -267,7 +267,7 @@ def pass_pair(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int, time: f
 
 
 def step(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> None:
-    """Let a time pass, s, with each valve open from its beginning on for as long as is asked."""
+    """Let a time pass, s, with each valve open from its beginning on for its commanded time."""
     pair = 0
     while pair < int(c[int(c[BLOCK]) + PAIRS]):
         at = FIRST_PAIR + PER_PAIR * pair

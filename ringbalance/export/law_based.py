@@ -94,27 +94,27 @@ SHORTEST_PART, SLOWEST_FALL = 1e-9, 1e-12
 
 
 def settings(c: Law) -> int:
-    """Place of the first one."""
+    """Place of the first setting."""
     d = int(c[BLOCK])
     return d + DIRECTIONS + 2 * int(c[d + PAIRS])
 
 
 def memory(c: Law) -> int:
-    """Place of its first number."""
+    """Place of the first number of the algorithm's memory."""
     return FIRST_PAIR + PER_PAIR * int(c[int(c[BLOCK]) + PAIRS])
 
 
-def beside(c: Law) -> int:
-    """Place of what a host sees beside the vibration."""
+def host_row(c: Law) -> int:
+    """Place of the first number that a host sees besides the vibration."""
     return change_of(memory(c), int(c[int(c[BLOCK]) + PAIRS]))
 
 
 def chamber_of(c: Law, chamber: int) -> int:
-    """Place of what belongs to a chamber."""
-    return beside(c) + FIRST_CHAMBER + PER_CHAMBER * chamber
+    """Place of a chamber's numbers."""
+    return host_row(c) + FIRST_CHAMBER + PER_CHAMBER * chamber
 
 
-def along(c: Law, k: Cells, p: Pieces, fill: float) -> float:
+def pair_moment(c: Law, k: Cells, p: Pieces, fill: float) -> float:
     """Moment of a pair by the fill of its positive chamber, kg m."""
     return moment(c, k, p, fill) - moment(c, k, p, c[int(c[BLOCK]) + TOTAL] - fill)
 
@@ -127,7 +127,7 @@ def set_moment(c: Law, k: Cells, p: Pieces, w: Query) -> None:
     w[r + NOW_Y] = 0.0
     pair = 0
     while pair < int(c[d + PAIRS]):
-        value = along(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
+        value = pair_moment(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
         at = change_of(r, pair)
         set_should(w, r, pair, value, w[at + SHOULD] != 0.0)
         w[at + MOMENT_NOW] = value
@@ -138,21 +138,21 @@ def set_moment(c: Law, k: Cells, p: Pieces, w: Query) -> None:
 
 def fill_for(c: Law, k: Cells, p: Pieces, wanted: float, lowest: float, highest: float) -> float:
     """Fill of a pair's positive chamber at a moment, kg m; straight on beyond the bounds."""
-    low = along(c, k, p, lowest)
-    high = along(c, k, p, highest)
+    low = pair_moment(c, k, p, lowest)
+    high = pair_moment(c, k, p, highest)
     if highest <= lowest:
         return lowest
     little = END_STEP * (highest - lowest)
     if wanted <= low:
-        return lowest + (wanted - low) / (along(c, k, p, lowest + little) - low) * little
+        return lowest + (wanted - low) / (pair_moment(c, k, p, lowest + little) - low) * little
     if wanted >= high:
-        return highest + (wanted - high) / (high - along(c, k, p, highest - little)) * little
+        return highest + (wanted - high) / (high - pair_moment(c, k, p, highest - little)) * little
     a = lowest
     b = highest
     tried = 0
     while tried < HALVINGS:
         middle = (a + b) / 2.0
-        if along(c, k, p, middle) >= wanted:
+        if pair_moment(c, k, p, middle) >= wanted:
             b = middle
         else:
             a = middle
@@ -161,9 +161,9 @@ def fill_for(c: Law, k: Cells, p: Pieces, wanted: float, lowest: float, highest:
 
 
 def falling(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float) -> float:
-    """How fast the fill of a driven chamber falls, 1/s, after the tube was as the last query left it."""
+    """Rate at which the fill of a driven chamber falls, 1/s; the tube is as the last query left it."""
     d = int(c[BLOCK])
-    r = beside(c)
+    r = host_row(c)
     set_levels(c, k, q, w, within(c, fill), within(c, c[d + TOTAL] - fill))
     w[UP_GAS] = c[GAS_FACTOR] * (c[d + SUPPLY] - c[AMBIENT])
     w[DOWN_GAS] = 0.0
@@ -177,7 +177,7 @@ def falling(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, fill: float) -> fl
 
 def try_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, change: float) -> float:
     """Valve-open time for a fill to change where no more liquid is expected, s: as if chambers were level."""
-    w[beside(c) + FLOW_PRIMED] = 1.0
+    w[host_row(c) + FLOW_PRIMED] = 1.0
     speed = falling(c, k, p, q, w, c[int(c[BLOCK]) + TOTAL] / 2.0)
     return smaller(change / larger(speed, SLOWEST_FALL), c[settings(c) + PERIOD])
 
@@ -187,7 +187,7 @@ def flow_time(
 ) -> float:
     """Valve-open time, s, in which a driven chamber comes from a fill to a lower one, or the flow stalls."""
     d = int(c[BLOCK])
-    r = beside(c)
+    r = host_row(c)
     end = larger(target, larger(0.0, c[d + TOTAL] - c[LARGEST_FILL]))
     x = fill
     part = larger(fill - end, 0.0) / PARTS
@@ -196,10 +196,10 @@ def flow_time(
     while x > end and part > least and time < longest:
         primed = w[r + FLOW_PRIMED]
         dx = smaller(part, x - end)
-        one = falling(c, k, p, q, w, x - dx * (0.5 - GAUSS))
-        two = falling(c, k, p, q, w, x - dx * (0.5 + GAUSS))
-        if one > 0.0 and two > 0.0:
-            time = time + dx * (0.5 / one + 0.5 / two)
+        early = falling(c, k, p, q, w, x - dx * (0.5 - GAUSS))
+        late = falling(c, k, p, q, w, x - dx * (0.5 + GAUSS))
+        if early > 0.0 and late > 0.0:
+            time = time + dx * (0.5 / early + 0.5 / late)
             x = x - dx
         else:
             part = part / 2.0
@@ -219,7 +219,7 @@ def gas_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, pair: int, wanted
     if wanted > fill:
         fill = total - fill
         target = total - wanted
-    w[beside(c) + FLOW_PRIMED] = w[at + IS_PRIMED]
+    w[host_row(c) + FLOW_PRIMED] = w[at + IS_PRIMED]
     first = falling(c, k, p, q, w, fill)
     if first == 0.0:
         return c[e + PERIOD]
@@ -229,7 +229,7 @@ def gas_time(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, pair: int, wanted
 
 
 def open_valve(c: Law, w: Query, pair: int, side: int, time: float) -> None:
-    """For a time and its chamber's offset, s, unless the time is below the least."""
+    """Open a valve for a time and its chamber's offset, s, unless the time is below the least."""
     e = settings(c)
     half = int(c[int(c[BLOCK]) + PAIRS])
     chamber = pair + side * half
@@ -240,7 +240,7 @@ def open_valve(c: Law, w: Query, pair: int, side: int, time: float) -> None:
         w[at + ASKED + side] = larger(opened - c[e + OFFSETS + chamber], 0.0)
         command(c, w, at)
         w[at + ASKED + side] = 0.0
-        w[beside(c) + OPENED] = 1.0
+        w[host_row(c) + OPENED] = 1.0
         w[change_of(memory(c), pair) + SHOULD] = 1.0
 
 
@@ -254,8 +254,8 @@ def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     highest = c[d + TOTAL] - lowest
     pair = 0
     while pair < half:
-        now = along(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
-        set_bounds(w, r, pair, now, along(c, k, p, lowest), along(c, k, p, highest))
+        now = pair_moment(c, k, p, w[FIRST_PAIR + PER_PAIR * pair + X])
+        set_bounds(w, r, pair, now, pair_moment(c, k, p, lowest), pair_moment(c, k, p, highest))
         pair = pair + 1
     kx = w[r + LEARNT_X]
     ky = w[r + LEARNT_Y]
@@ -268,7 +268,7 @@ def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
         change = w[change_of(r, pair) + CHANGE]
         if change != 0.0:
             fill = w[FIRST_PAIR + PER_PAIR * pair + X]
-            wanted = fill_for(c, k, p, along(c, k, p, fill) + change, lowest, highest)
+            wanted = fill_for(c, k, p, pair_moment(c, k, p, fill) + change, lowest, highest)
             side = 0
             if wanted >= fill:
                 side = 1
@@ -280,7 +280,7 @@ def aim(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
 
 
 def shut(c: Law, w: Query) -> None:
-    """Close the valves of what is followed."""
+    """Close the valves of the pairs that are followed."""
     pair = 0
     while pair < int(c[int(c[BLOCK]) + PAIRS]):
         at = FIRST_PAIR + PER_PAIR * pair
@@ -297,7 +297,7 @@ def sample(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     """React to the vibration as it is; one that is not a number changes nothing."""
     e = settings(c)
     r = memory(c)
-    b = beside(c)
+    b = host_row(c)
     amplitude = sqrt(w[r + SEEN_X] * w[r + SEEN_X] + w[r + SEEN_Y] * w[r + SEEN_Y])
     w[b + RESTS] = 0.0
     if not amplitude <= GREATEST:
@@ -327,7 +327,7 @@ def control(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, time: float) -> No
     while pair < half:
         pass_pair(c, k, p, q, w, FIRST_PAIR + PER_PAIR * pair, time)
         pair = pair + 1
-    r = beside(c)
+    r = host_row(c)
     first = chamber_of(c, 0)
     period = c[settings(c) + PERIOD]
     if waits(w, r + WAIT, first, 2 * half, period, time):

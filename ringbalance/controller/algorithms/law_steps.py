@@ -1,4 +1,4 @@
-"""What the law-based algorithm learns, and how it splits a correction, in + - * / sqrt and comparisons alone.
+"""Learning and splitting of a correction by the law-based algorithm, in + - * / sqrt and comparisons alone.
 
 The program's loop compiles these functions and an export translates them, see `reduced_model.pieces.point`.
 `m` is a row of numbers that has the algorithm's memory from the place `r` on; the names below are places in
@@ -54,11 +54,11 @@ def distance(m: Query, r: int, ux: float, uy: float) -> float:
 
 @both_ways
 def see_response(m: Query, r: int, half: int, amplitude_square: float, phase_square: float) -> bool:
-    """See whether the vibration has not moved as it should, and one pair that gave nothing explains it.
+    """Judge if the vibration has not moved as it should, and if one pair that gave nothing explains it.
 
-    Only what neither noise nor a coefficient that is still learnt makes is taken for that. Any other pair
-    that was asked for more than noise gives liquid.
-    Returns: whether all opened pairs are followed as they move.
+    Differences that noise or a coefficient still learnt can make do not count. Any other pair with a command
+    above the noise gives liquid.
+    Returns: true if all opened pairs are followed as they move.
     """
     x = m[r + SEEN_X]
     y = m[r + SEEN_Y]
@@ -115,7 +115,7 @@ def set_bounds(m: Query, r: int, pair: int, now: float, least: float, most: floa
 
 @both_ways
 def is_try(m: Query, r: int, pair: int, side: int) -> bool:
-    """Whether a chamber gave nothing before; opening the opposite one gives it liquid again."""
+    """True if a chamber gave nothing before; opening the opposite one gives it liquid again."""
     at = change_of(r, pair)
     sense = 1.0
     if side == 0:
@@ -157,31 +157,31 @@ def learn(
     vx = kx + gain * (ux * dx + uy * dy)
     vy = ky + gain * (ux * dy - uy * dx)
     magnitude = sqrt(vx * vx + vy * vy)
-    kept = smaller(larger(magnitude, assumed / MAGNITUDE_RANGE), assumed * MAGNITUDE_RANGE)
+    bounded = smaller(larger(magnitude, assumed / MAGNITUDE_RANGE), assumed * MAGNITUDE_RANGE)
     if magnitude == 0.0:
         vx = kx
         vy = ky
         magnitude = sqrt(kx * kx + ky * ky)
-    m[r + LEARNT_X] = vx * (kept / magnitude)
-    m[r + LEARNT_Y] = vy * (kept / magnitude)
-    m[r + VARIANCE] = larger(m[r + VARIANCE] * rest / (expected + rest), law_square * kept * kept)
+    m[r + LEARNT_X] = vx * (bounded / magnitude)
+    m[r + LEARNT_Y] = vy * (bounded / magnitude)
+    m[r + VARIANCE] = larger(m[r + VARIANCE] * rest / (expected + rest), law_square * bounded * bounded)
 
 
 @both_ways
-def shared(m: Query, before: int, sign: float, after: int, here: float, x: float, y: float) -> bool:
-    """Whether a vector lies between two pairs' directions, each taken with a sign; they then share it."""
+def shared(m: Query, before: int, sign: float, after: int, after_sign: float, x: float, y: float) -> bool:
+    """Split a vector over two pairs if it is between their directions, each with a sign; true if it is."""
     ax = sign * m[before + AXIS_X]
     ay = sign * m[before + AXIS_Y]
-    bx = here * m[after + AXIS_X]
-    by = here * m[after + AXIS_Y]
+    bx = after_sign * m[after + AXIS_X]
+    by = after_sign * m[after + AXIS_Y]
     between = ax * by - ay * bx
-    one = (x * by - y * bx) / between
-    two = (ax * y - ay * x) / between
+    part_before = (x * by - y * bx) / between
+    part_after = (ax * y - ay * x) / between
     slack = -NEARLY * sqrt(x * x + y * y)
-    if one < slack or two < slack:
+    if part_before < slack or part_after < slack:
         return False
-    m[before + CHANGE] = sign * larger(one, 0.0)
-    m[after + CHANGE] = here * larger(two, 0.0)
+    m[before + CHANGE] = sign * larger(part_before, 0.0)
+    m[after + CHANGE] = after_sign * larger(part_after, 0.0)
     return True
 
 
@@ -206,29 +206,29 @@ def share(m: Query, r: int, half: int, x: float, y: float) -> None:
     turn = 0
     while turn < 2 * half:
         pair = turn
-        here = 1.0
+        pair_sign = 1.0
         if turn >= half:
             pair = turn - half
-            here = -1.0
+            pair_sign = -1.0
         at = change_of(r, pair)
         if m[at + FIXED] == 0.0:
-            if shared(m, last, sign, at, here, x, y):
+            if shared(m, last, sign, at, pair_sign, x, y):
                 return
             last = at
-            sign = here
+            sign = pair_sign
         turn = turn + 1
 
 
 @both_ways
 def stopped(m: Query, at: int) -> bool:
-    """Whether the change of a free pair is beyond a bound, to which it is then taken."""
-    kept = smaller(larger(m[at + CHANGE], m[at + LOWEST_CHANGE]), m[at + HIGHEST_CHANGE])
-    if m[at + FIXED] != 0.0 or kept == m[at + CHANGE]:
+    """Take the change of a free pair to the bound that it exceeds; true if it exceeds one."""
+    bounded = smaller(larger(m[at + CHANGE], m[at + LOWEST_CHANGE]), m[at + HIGHEST_CHANGE])
+    if m[at + FIXED] != 0.0 or bounded == m[at + CHANGE]:
         return False
     m[at + FIXED] = -1.0
-    if m[at + CHANGE] > kept:
+    if m[at + CHANGE] > bounded:
         m[at + FIXED] = 1.0
-    m[at + CHANGE] = kept
+    m[at + CHANGE] = bounded
     return True
 
 

@@ -31,9 +31,9 @@ INTEGRAL, BEFORE_X, BEFORE_Y, BEFORE, SINCE, HAS_BEFORE, WANTED = 5, 6, 7, 8, 9,
 RESPONSE, FIRST_CHAMBER = 12, 13
 # fmt: on
 
-# A chamber is judged that was asked for as much as this of the longest share, and of noise; it gives nothing
-# where less than this of what it should moves.
-OF_LONGEST, OF_NOISE, OF_ASKED = 0.5, 12.0, 0.1
+# A chamber is judged whose share is at least this part of the longest one and this multiple of noise; it
+# gives nothing where less than this part of the expected vibration goes.
+OF_LONGEST, OF_NOISE, OF_EXPECTED = 0.5, 12.0, 0.1
 
 
 @both_ways
@@ -50,24 +50,24 @@ def direction(c: Law, chamber: int) -> int:
 
 @both_ways
 def place_of(c: Law, chamber: int) -> int:
-    """Place of what belongs to a chamber, counted as for `direction`."""
+    """Place of a chamber's memory, counted as for `direction`."""
     return FIRST_CHAMBER + PER_CHAMBER * ((direction(c, chamber) - DIRECTIONS) // 3)
 
 
 @both_ways
 def set_open_time(c: Law, w: Query, chamber: int, share: float) -> None:
-    """Of a chamber with its offset, unless its share is below the least; one that gives nothing is tried.
+    """Set a chamber's open time with its offset, unless its share is below the least.
 
-    The opposite chamber then has liquid again.
+    A chamber that gives nothing is tried for a period; the opposite one then has liquid again.
     """
     at = direction(c, chamber)
-    place = place_of(c, chamber)
-    asked = share
-    if w[place + GAVE_NOTHING] != 0.0:
-        asked = smaller(share, c[PERIOD])
-    if asked > 0.0 and asked >= c[LEAST]:
-        w[place + SHARE] = asked
-        w[place + OPEN_TIME] = smaller(asked + c[at + 2], c[MOST])
+    row = place_of(c, chamber)
+    time = share
+    if w[row + GAVE_NOTHING] != 0.0:
+        time = smaller(share, c[PERIOD])
+    if time > 0.0 and time >= c[LEAST]:
+        w[row + SHARE] = time
+        w[row + OPEN_TIME] = smaller(time + c[at + 2], c[MOST])
         w[place_of(c, chamber + int(c[CHAMBERS]) // 2) + GAVE_NOTHING] = 0.0
 
 
@@ -81,32 +81,32 @@ def cross(c: Law, before: int, after: int) -> float:
 
 @both_ways
 def emptied(c: Law, w: Query, chamber: int) -> bool:
-    """Whether a chamber has no more liquid to give, by a sensor or by what it gave last."""
-    place = place_of(c, chamber)
-    return w[place + AT_RESIDUAL] != 0.0 or w[place + GAVE_NOTHING] != 0.0
+    """True if a chamber has no more liquid to give, by a sensor or by its last response."""
+    row = place_of(c, chamber)
+    return w[row + AT_RESIDUAL] != 0.0 or w[row + GAVE_NOTHING] != 0.0
 
 
 @both_ways
 def judge(c: Law, w: Query, chamber: int, moved: float, longest: float, noise: float) -> None:
-    """See whether a chamber gave what its share asks for by the gain, or by the best response if less.
+    """Judge if a chamber gave what its share calls for by the gain, or by the best response if less.
 
     Args: `moved`: vibration that it took away, m. `noise`: standard deviation of that, m.
     """
-    place = place_of(c, chamber)
-    asked = w[place + SHARE]
+    row = place_of(c, chamber)
+    time = w[row + SHARE]
     usual = 1.0
     if w[RESPONSE] > 0.0:
         usual = w[RESPONSE]
-    if asked >= OF_LONGEST * longest and usual * asked > OF_NOISE * noise * c[GAIN]:
-        w[place + GAVE_NOTHING] = 1.0
-        if moved * c[GAIN] >= OF_ASKED * usual * asked:
-            w[place + GAVE_NOTHING] = 0.0
-            w[RESPONSE] = smaller(1.0, larger(w[RESPONSE], moved * c[GAIN] / asked))
+    if time >= OF_LONGEST * longest and usual * time > OF_NOISE * noise * c[GAIN]:
+        w[row + GAVE_NOTHING] = 1.0
+        if moved * c[GAIN] >= OF_EXPECTED * usual * time:
+            w[row + GAVE_NOTHING] = 0.0
+            w[RESPONSE] = smaller(1.0, larger(w[RESPONSE], moved * c[GAIN] / time))
 
 
 @both_ways
 def see_response(c: Law, w: Query) -> None:
-    """Judge the chambers of the last command by what the vibration has done since, and forget the command."""
+    """Judge the chambers of the last command by the change of the vibration, and forget the command."""
     count = int(c[CHAMBERS])
     before = count
     after = count
@@ -128,17 +128,17 @@ def see_response(c: Law, w: Query) -> None:
     noise = sqrt(2.0 * c[AMPLITUDE_SQUARE] + squares * c[PHASE_SQUARE])
     x = w[BEFORE_X] - x
     y = w[BEFORE_Y] - y
-    along = x * c[LAG_COSINE] - y * c[LAG_SINE]
-    across = x * c[LAG_SINE] + y * c[LAG_COSINE]
+    gas_x = x * c[LAG_COSINE] - y * c[LAG_SINE]
+    gas_y = x * c[LAG_SINE] + y * c[LAG_COSINE]
     a = direction(c, before)
     if after == count:
-        judge(c, w, before, along * c[a] + across * c[a + 1], longest, noise)
+        judge(c, w, before, gas_x * c[a] + gas_y * c[a + 1], longest, noise)
     else:
         b = direction(c, after)
         between = cross(c, before, after)
         noise = noise / larger(between, -between)
-        judge(c, w, before, (along * c[b + 1] - across * c[b]) / between, longest, noise)
-        judge(c, w, after, (across * c[a] - along * c[a + 1]) / between, longest, noise)
+        judge(c, w, before, (gas_x * c[b + 1] - gas_y * c[b]) / between, longest, noise)
+        judge(c, w, after, (gas_y * c[a] - gas_x * c[a + 1]) / between, longest, noise)
     chamber = 0
     while chamber < count:
         w[place_of(c, chamber) + SHARE] = 0.0
@@ -148,18 +148,18 @@ def see_response(c: Law, w: Query) -> None:
 @both_ways
 def nearest(c: Law, x: float, y: float) -> int:
     """The chamber before a direction, next to which it lies."""
-    found = 0
+    next_before = 0
     best = -2.0
     chamber = 0
     while chamber < int(c[CHAMBERS]):
         a = direction(c, chamber)
         b = direction(c, chamber + 1)
-        along = x * (c[a] + c[b]) + y * (c[a + 1] + c[b + 1])
-        if along > best:
-            best = along
-            found = chamber
+        projection = x * (c[a] + c[b]) + y * (c[a + 1] + c[b + 1])
+        if projection > best:
+            best = projection
+            next_before = chamber
         chamber = chamber + 1
-    return found
+    return next_before
 
 
 @both_ways
@@ -224,9 +224,9 @@ def sample(c: Law, w: Query) -> None:
     w[BEFORE] = amplitude
     w[SINCE] = 0.0
     w[HAS_BEFORE] = 1.0
-    along = (x * c[LAG_COSINE] - y * c[LAG_SINE]) / amplitude
-    across = (x * c[LAG_SINE] + y * c[LAG_COSINE]) / amplitude
-    split(c, w, along, across, larger(0.0, smaller(w[WANTED], c[MOST])))
+    gas_x = (x * c[LAG_COSINE] - y * c[LAG_SINE]) / amplitude
+    gas_y = (x * c[LAG_SINE] + y * c[LAG_COSINE]) / amplitude
+    split(c, w, gas_x, gas_y, larger(0.0, smaller(w[WANTED], c[MOST])))
 
 
 @both_ways

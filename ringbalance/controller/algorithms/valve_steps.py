@@ -1,4 +1,4 @@
-"""What the controllers do with valves, in + - * / and comparisons alone.
+"""Valves and clock of the controllers, in + - * / and comparisons alone.
 
 `w` holds of each chamber, from the place `first` on, how long its valve stays open, whether a sensor says
 that it has no more liquid to give, what was asked of it last, and whether that moved nothing.  A vibration
@@ -15,7 +15,7 @@ GREATEST, INSTANT = 1e6, 1e-9
 
 @both_ways
 def longest_open(w: Query, first: int, chambers: int) -> float:
-    """How long the last valve stays open, s."""
+    """Time until the last valve closes, s."""
     longest = 0.0
     chamber = 0
     while chamber < chambers:
@@ -26,7 +26,7 @@ def longest_open(w: Query, first: int, chambers: int) -> float:
 
 @both_ways
 def cut_short(w: Query, first: int, chambers: int, time: float) -> bool:
-    """Let a time pass, s, and close valves of chambers with no more liquid; whether there were any."""
+    """Let a time pass, s, and close valves of chambers with no more liquid; true if there were any."""
     cut = False
     chamber = 0
     while chamber < chambers:
@@ -43,7 +43,7 @@ def cut_short(w: Query, first: int, chambers: int, time: float) -> bool:
 
 @both_ways
 def waits(w: Query, wait: int, first: int, chambers: int, period: float, time: float) -> bool:
-    """Let a time pass, s; whether the next sample is still to come, one period after the last valve."""
+    """Let a time pass, s; true if the next sample is still to come, one period after the last valve."""
     w[wait] = w[wait] - time
     if cut_short(w, first, chambers, time):
         w[wait] = longest_open(w, first, chambers) + period

@@ -100,7 +100,7 @@ PROBLEMS: Final = {
 
 def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
     """Points of a grid that meet what is required, with the median of their gas, J."""
-    required_fraction = balancer_of(space.scene).asked_fraction()
+    required_fraction = balancer_of(space.scene).required_fraction()
     for point in points:
         first = race(
             space.hasty,

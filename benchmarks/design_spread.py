@@ -60,7 +60,7 @@ def answer(start: int, seed: int) -> Answer:
     seconds = time.process_time() - begun
     balancer = balancer_of(design.recommended_scene)
     first = FIRST_VERDICT_DEVICE + CHECKED
-    (judgement,) = judged_all(balancer, [{}], first=CHECKED, most=CHECKED, start=first, whole=False)
+    (judgement,) = judged_all(balancer, [{}], first=CHECKED, most=CHECKED, start=first, complete=False)
     return Answer(start=start, seed=seed, design=design, fraction=judgement.fraction.value, seconds=seconds)
 
 

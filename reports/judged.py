@@ -8,12 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import WATCH_TIME_S, Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all, plain_settings
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning import LONGER, Tuning
+from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning
 from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
 from ringbalance.results.requirements import MET, Proportion
@@ -43,16 +43,16 @@ def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Rec
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
-    """Judge the scene's own and the recommended settings, both watched for `LONGER` too."""
+    """Judge the scene's own and the recommended settings, both watched for `LONG_WATCH_TIME_S` too."""
 
     def watched(judgement: Judgement) -> Record:
         fraction = judgement.fraction.document()
-        return {"further_s": LONGER, "fraction": fraction, "verdict": judgement.verdict}
+        return {"further_s": LONG_WATCH_TIME_S, "fraction": fraction, "verdict": judgement.verdict}
 
     best, scene_judgement, document = tuning.recommended, tuning.own, tuning.to_dict()
     own_document, recommended, moved = None, None, None
     if scene_judgement is not None:
-        (own_longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER)
+        (own_longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, watch_time=LONG_WATCH_TIME_S)
         own_document = judgement_record(scene_judgement) | {"longer": watched(own_longer)}
     if scene_judgement is None or best.settings:
         recommended = judgement_record(best) | {"longer": tuning.longer and watched(tuning.longer)}
@@ -110,7 +110,7 @@ def judgement_record(judgement: Judgement) -> Record:
         "settings": plain_settings(judgement.settings),
         "asked": judgement.required_fraction,
         "required": required,
-        "further_s": FURTHER,
+        "further_s": WATCH_TIME_S,
         "settled": settled_record(judgement.outcomes),
     }
 

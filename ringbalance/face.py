@@ -196,4 +196,4 @@ def tune(
         ['controller.gas_time_offset', 'controller.integral_time', 'controller.proportional', 'gas.pressure']
     """
     balancer = balancer_of(scene, flow_law=flow_law)
-    return tuned(balancer, along=pressure, remedies=remedies, progress=progress)
+    return tuned(balancer, scan=pressure, remedies=remedies, progress=progress)

@@ -84,7 +84,7 @@ _VERDICT_OPACITY: Final = {MET: 0.28, OPEN: 0.1}
 def _tuning(work: Work) -> Record:
     """Settings by runs; `scene`: the scene with those recommended."""
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
-    tuning = tuned(balancer, along=True, remedies=None)
+    tuning = tuned(balancer, scan=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     recommended_run = None
     if tuning.recommended.settings:

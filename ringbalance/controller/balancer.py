@@ -29,7 +29,7 @@ from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
 from ringbalance.scene.units import DIMENSIONS
 
-FURTHER: Final = 60.0
+WATCH_TIME_S: Final = 60.0
 """s, for which a run that has held its limit is watched."""
 REQUIRED_FRACTION: Final = 0.9
 """Fraction of the devices that must meet every demand where a scene states none."""
@@ -74,10 +74,10 @@ class Draws:
     numbers: tuple[int, ...]
     devices: bool = True
     """True if the inputs are drawn; False: each is as in the scene, and the noise alone differs."""
-    whole: bool = True
+    complete: bool = True
     """True if every run is carried out; False: one that is known not to settle ends with the least vibration
     that the device can come to."""
-    until: float = math.inf
+    deadline: float = math.inf
     """s, at which a run that is above its limit may end undecided; where runs are watched to their end, none
     does."""
 
@@ -87,9 +87,9 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
     @classmethod
-    def block(cls, start: int, count: int, *, whole: bool = True, until: float = math.inf) -> Draws:
+    def block(cls, start: int, count: int, *, complete: bool = True, deadline: float = math.inf) -> Draws:
         """Devices `start` to `start + count - 1`."""
-        return cls(numbers=tuple(range(start, start + count)), whole=whole, until=until)
+        return cls(numbers=tuple(range(start, start + count)), complete=complete, deadline=deadline)
 
 
 AS_GIVEN: Final = Draws.first(1, devices=False)
@@ -237,7 +237,7 @@ class Remedy:
     changes: Settings
     """By path, SI, as `SceneFile.with_values` takes them."""
     name: str = ""
-    """Of a thing that can be bought."""
+    """Name of a thing that can be bought; else empty."""
     continuous: bool = False
     """True if a value between this and another of its kind can be had as well."""
 
@@ -293,15 +293,15 @@ class Balancer(ABC):
         settings: Sequence[Settings],
         draws: Draws,
         *,
-        further: float = FURTHER,  # noqa: ARG002
+        watch_time: float = WATCH_TIME_S,  # noqa: ARG002
     ) -> tuple[Outcomes, ...]:
         """Run several settings, without traces.
 
-        Args: `further`: s, for which a run is watched after it has held its limit, unless to its end.
+        Args: `watch_time`: s, for which a run is watched after it has held its limit, unless to its end.
         """
         return tuple(self.run(each, draws) for each in settings)
 
-    def asked_fraction(self) -> float:
+    def required_fraction(self) -> float:
         """Fraction of the devices that must meet every demand."""
         return REQUIRED_FRACTION
 

@@ -35,8 +35,8 @@ from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile, with_values_at
 
-FEWEST: Final = 16
-MOST: Final = 64
+FIRST_DEVICES: Final = 16
+MAX_DEVICES: Final = 64
 """Numbers of devices, first and largest; doubled until a difference is shown."""
 _DIFFERENCE_LEVEL: Final = 0.05 / 3
 """Significance level of each of the tests after 16, 32 and 64 devices; 0.05 for all three together."""
@@ -264,7 +264,7 @@ def compare(
     second: Balancer,
     *,
     rotor: str | None = None,
-    most: int = MOST,
+    most: int = MAX_DEVICES,
     progress: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Put two balancers on one rotor, choose settings for each, and run both as the same drawn devices.
@@ -321,8 +321,8 @@ def compare(
             fault if fault.file == home.file else replace(fault, problem=prefix + fault.problem)
             for fault in error.faults
         ) from error
-    asked = max(first.asked_fraction(), second.asked_fraction())
-    return Comparison(rotor=common, span=span, asked=asked, sides=(sides[0], sides[1]))
+    required = max(first.required_fraction(), second.required_fraction())
+    return Comparison(rotor=common, span=span, asked=required, sides=(sides[0], sides[1]))
 
 
 def _run_both(
@@ -330,7 +330,7 @@ def _run_both(
 ) -> list[Outcomes]:
     """Run both balancers as the same devices, whose number doubles until a difference is shown."""
     outcomes: list[Outcomes] = []
-    count, block = 0, min(FEWEST, most)
+    count, block = 0, min(FIRST_DEVICES, most)
     while block:
         progress(f"{count} of at most {most} drawn devices")
         draws = Draws.block(FIRST_VERDICT_DEVICE + count, block)

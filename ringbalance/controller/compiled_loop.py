@@ -201,7 +201,7 @@ def _hold(loop: Record, run: Record) -> None:
         if run.above > loop.allowed:
             run.held_since, run.held = math.inf, math.inf
             run.lost += 1
-    run.settled = 1 if run.time >= run.held + loop.further * (1.0 - 1e-9) else 0
+    run.settled = 1 if run.time >= run.held + loop.watch_time * (1.0 - 1e-9) else 0
 
 
 @in_place

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
-from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS
+from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE_CHANGE, TAIL_POINTS
 from ringbalance.reduced_model.injection.dynamics import WORK, X
 from ringbalance.reduced_model.injection.events import command, forget
 from ringbalance.reduced_model.injection.lift import shown
@@ -28,7 +28,7 @@ def vibration(loop: Record, plant: Record, run: Record) -> complex:
 def time_left(loop: Record, run: Record) -> float:
     """Time until the run ends undecided, s: one within its limit in time is watched until it has settled."""
     watched = min(run.since, run.held_since) <= loop.time_limit and run.settled == 0
-    more = loop.hold_time + loop.further + 2.0 * loop.period if watched else 0.0
+    more = loop.hold_time + loop.watch_time + 2.0 * loop.period if watched else 0.0
     return float(loop.time_limit + more - run.time)
 
 
@@ -192,7 +192,7 @@ def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
     for i in range(half):
         motion = motions[i]
         moves = motion.primed > 0 or motion.direction != 0 or (run.floods > 0 and plant.inertia == 0)
-        run.runs_back[i] = 1 if moves and motion.ran_back > NOTICEABLE else 0
+        run.runs_back[i] = 1 if moves and motion.ran_back > NOTICEABLE_CHANGE else 0
         run.fill[i] = plant.total / 2.0 if run.runs_back[i] > 0 else shown(plant, motion, motion.state[X])
         back = back or run.runs_back[i] > 0
     run.drains = 1 if back and abs(vibration(loop, plant, run)) > loop.limit else 0
@@ -205,11 +205,11 @@ def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
 @in_place
 def keep_instant(loop: Record, run: Record, instants: FloatArray, time: float) -> None:
     """Add a row to the trace, one for one time: a valve may open for less than the clock resolves."""
-    if run.instants < instants.shape[0] and (time > run.kept or run.samples == 0):
+    if run.instants < instants.shape[0] and (time > run.noted or run.samples == 0):
         instants[run.instants, 0] = time
         for i in range(loop.chambers // 2):
             instants[run.instants, 1 + i] = run.fill[i]
-        run.instants, run.kept = run.instants + 1, time
+        run.instants, run.noted = run.instants + 1, time
 
 
 @in_place
@@ -225,7 +225,7 @@ def keep_injections(
         motion, fill = motions[pair], _driven_fill(plant, run, pair)
         if run.drives[pair] == 0.0:
             forget(motion, fill)
-        moved = abs(fill - motion.fill_before) > NOTICEABLE
+        moved = abs(fill - motion.fill_before) > NOTICEABLE_CHANGE
         filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
         run.gas += motion.closing_pressure * filled
         # Noise keeps opening the other valve a little.

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.liquid_ring.loop_factor import vibration_left
 from ringbalance.controller.simulation import GasUse, Simulation
 from ringbalance.physics import balancing
@@ -49,7 +49,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "status": simulation.status,
         "limit_m": simulation.limit,
         "hold_time_s": simulation.hold_time,
-        "further_time_s": FURTHER,
+        "further_time_s": WATCH_TIME_S,
         "loop_factor": simulation.loop.value,
         "loop_factor_limit": simulation.loop.limit,
         "vibration_rate_m_per_s": simulation.loop.rate,

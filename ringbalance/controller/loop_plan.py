@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.law_based import LawBased
-from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.compiled_loop import continue_runs
 from ringbalance.controller.loop_records import (
     GAS_POINTS,
@@ -73,7 +73,7 @@ class LoopPlan:
         most_samples: int,
         sensed: bool = False,
         to_time_limit: bool = False,
-        further: float = FURTHER,
+        watch_time: float = WATCH_TIME_S,
     ) -> LoopPlan:
         """Prepare runs of scenes that differ in settings of the controller alone.
 
@@ -82,7 +82,7 @@ class LoopPlan:
             most_samples: after which a run ends undecided.
             sensed: whether the caller's sensor writes its samples into the run.
             to_time_limit: whether a settled run continues.
-            further: s, for which a run is watched after it has held its limit.
+            watch_time: s, for which a run is watched after it has held its limit.
         """
         loops, starts = np.zeros(len(scenes), dtype=LOOP), np.zeros(len(scenes), dtype=RUN)
         starts["loop"], starts["speed"] = np.arange(len(scenes)), 1.0
@@ -93,8 +93,8 @@ class LoopPlan:
             settings, sensor = scene.controller, scene.sensor
             loop["chambers"], loop["limit"] = scene.disc.chambers, settings.limit
             loop["period"], loop["hold_time"] = settings.period, settings.hold_time
-            loop["time_limit"], loop["further"] = scene.run.time_limit, further
-            loop["allowed"] = ALLOWED * further / settings.period
+            loop["time_limit"], loop["watch_time"] = scene.run.time_limit, watch_time
+            loop["allowed"] = ALLOWED * watch_time / settings.period
             loop["amplitude_noise"], loop["phase_noise"] = sensor.amplitude_noise, sensor.phase_noise
             loop["exact"] = sensor.amplitude_noise == sensor.phase_noise == 0
             loop["idle_tolerated"] = IDLE_OPERATIONS + scene.disc.chambers

@@ -33,7 +33,7 @@ USABLE: Final = 2
 UNUSABLE: Final = 1
 TOO_SHORT: Final = 2
 """Reasons for which no valve opens though the algorithm is not content."""
-NOTICEABLE: Final = 1e-12
+NOTICEABLE_CHANGE: Final = 1e-12
 """Change of a fill ratio that counts as movement."""
 NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
 """Causes for which a loop stopped cycling; it continues, or
@@ -43,7 +43,7 @@ NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
     the controller rests, the sensor is exact and no liquid can move: nothing will change,
     the time is up,
     there are as many samples as a run may have,
-    the amplitude has been within its limit for the hold time and, but for few samples, for the further time.
+    the amplitude has been within its limit for the hold time and, but for few samples, for the watch time.
 """
 
 _LOOP_REALS: Final = (
@@ -51,7 +51,7 @@ _LOOP_REALS: Final = (
     "period",  # s
     "hold_time",  # s
     "time_limit",  # s, by which the amplitude must have come within its limit
-    "further",  # s, for which it is watched after the hold time
+    "watch_time",  # s, for which it is watched after the hold time
     "allowed",  # samples above the limit in that time
     "amplitude_noise",  # standard deviation, m
     "phase_noise",  # standard deviation, rad
@@ -101,7 +101,7 @@ _RUN_REALS: Final = (
     "drift",  # how far liquid has run back with the gas off
     "on",  # s, from the last command to the closing of its last valve
     "off",  # s, from then to the next sample
-    "kept",  # s, of the last instant of the trace
+    "noted",  # s, of the last instant of the trace
     "seen_amplitude",  # of this sample, m
     "seen_phase",  # rad
     "first_seen",  # m, of the first sample; not a number where that showed none
@@ -115,7 +115,7 @@ _RUN_REALS: Final = (
 _RUN_INTEGERS: Final = (
     "loop",  # number of its settings
     "plant",  # and of its device
-    "settled",  # 1 if a hold was followed by the further time
+    "settled",  # 1 if a hold was followed by the watch time
     "lost",  # holds that were not
     "usable",
     "resting",  # 1 if the algorithm is content

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.liquid_ring.loop_factor import default_gain
 from ringbalance.controller.liquid_ring.plant import (
-    LEAST_PRESSURE,
+    LEAST_PRESSURE_PA,
     NEARLY_EMPTY,
     starting_pressure,
 )
@@ -76,7 +76,7 @@ def _numbers(run: Simulation) -> dict[str, Value]:
         "time": float(run.state["time"]),
         "time_limit": run.scene.run.time_limit,
         "hold_time": settings.hold_time,
-        "further": FURTHER,
+        "further": WATCH_TIME_S,
         "lost": int(run.state["lost"]),
         "settling_time": run.settling_time,
         "since": float(run.state["since"]),
@@ -165,7 +165,7 @@ def _pressures(run: Simulation) -> dict[str, Value]:
             fill=fill,
             opposite_fill=min(total - fill, law.max_fill_ratio),
             primed=False,
-            above=max(plant.gas_pressure, LEAST_PRESSURE),
+            above=max(plant.gas_pressure, LEAST_PRESSURE_PA),
         )
 
     lowest = max(0.0, total - law.max_fill_ratio)

@@ -15,7 +15,7 @@ from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.liquid_ring.loop_factor import LoopFactor
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL, LiquidRing
-from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, SAMPLES
+from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE_CHANGE, RISING, SAMPLES
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
@@ -61,7 +61,7 @@ class Injection:
     @property
     def moved(self) -> bool:
         """True if any liquid passed."""
-        return abs(self.fill_after - self.fill_before) > NOTICEABLE
+        return abs(self.fill_after - self.fill_before) > NOTICEABLE_CHANGE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,7 +306,7 @@ class Simulation(PresentedResult):
             return Outcome.DRIFTING
         higher = self.amplitude[-1] > self.amplitude[0] + self.noise_floor
         if cause == RISING or (cause == IDLE and higher):
-            return Outcome.DRIFTING if state["drift"] > NOTICEABLE else Outcome.DIVERGING
+            return Outcome.DRIFTING if state["drift"] > NOTICEABLE_CHANGE else Outcome.DIVERGING
         if self.loop.unstable:
             return Outcome.UNSTABLE
         if self.unreachable_amplitude > limit:
@@ -336,7 +336,7 @@ class Simulation(PresentedResult):
     def _out_of_time(self) -> Outcome:
         if 2 * self.unusable > len(self.samples):
             return Outcome.NO_SAMPLES
-        if self.state["drift"] > NOTICEABLE:
+        if self.state["drift"] > NOTICEABLE_CHANGE:
             return Outcome.DRIFTING
         if NOISE_DEVIATIONS * self.scene.sensor.amplitude_noise > self.limit:
             return Outcome.NOISE

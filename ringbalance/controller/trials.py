@@ -21,7 +21,7 @@ Point = Mapping[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
+class SearchAxis:
     """Axis of a search."""
 
     name: str
@@ -39,16 +39,16 @@ class Trials:
     """Settings of one kind of controller."""
 
     kind: str
-    axes: tuple[Axis, ...]
+    axes: tuple[SearchAxis, ...]
     settings: Callable[[Point], Mapping[str, Any] | None]
     """At a point, by path, SI, rounded as a scene file has them; None: there is none."""
     stated: bool = True
     """True if the scene states settings of its own that can be judged."""
-    kept: bool = True
+    kind_stated: bool = True
     """True if the scene gives this kind, so that a merely faster one does not replace it."""
-    along: Axis | None = None
-    """What is chosen only where the others do not suffice, or on request, and is answered for at every level,
-    such as the supply's pressure; a point without it is at the scene's."""
+    scan_axis: SearchAxis | None = None
+    """Axis chosen on only where the others do not suffice, or on request, with an answer at every level, such
+    as the supply's pressure; a point without it is at the scene's."""
 
 
 def rounded(value: float, digits: int = 3) -> float:

@@ -142,7 +142,7 @@ def run_design(
     doubt: float | None = None
     with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
         crew = executor or pool
-        required_fraction = balancer.asked_fraction()
+        required_fraction = balancer.required_fraction()
         search = hunt(
             space,
             required_fraction=required_fraction,
@@ -220,7 +220,7 @@ def _effects(
                 moves.append((name, dict(choice)))
     base = {path: value for path, value in point.items() if path in space.paths}
     points = [point, *(space.followed({**base, **changes}) for _, changes in moves)]
-    draws = Draws.block(FIRST_VERDICT_DEVICE, _EFFECT_DEVICES, whole=False)
+    draws = Draws.block(FIRST_VERDICT_DEVICE, _EFFECT_DEVICES, complete=False)
     calls = [partial(devices_row, space.hasty, each, settings=settings, draws=draws) for each in points]
     judgement, now_met, *then_met = deal(executor, [judge, *calls])
     effects = [

@@ -142,8 +142,8 @@ def race(
         if not field:
             return None
         start = block * DEVICES
-        draws = Draws.block(start, HEATS[0], whole=False)
-        ran = balancer.run_all([each for _, each in field], draws, further=_WATCH_TIME_S)
+        draws = Draws.block(start, HEATS[0], complete=False)
+        ran = balancer.run_all([each for _, each in field], draws, watch_time=_WATCH_TIME_S)
         running = [
             Race(grid_point=grid_point, judgement=Judgement.of(balancer, each, outcomes))
             for (grid_point, each), outcomes in zip(field, ran, strict=True)
@@ -154,8 +154,8 @@ def race(
                 return running[0]
             least = running[0].met - _MAX_BEHIND_DEVICES
             running = [each for each in running if each.met > least][:survivors]
-            draws = Draws.block(start + first, end - first, whole=False)
-            ran = balancer.run_all([each.settings for each in running], draws, further=_WATCH_TIME_S)
+            draws = Draws.block(start + first, end - first, complete=False)
+            ran = balancer.run_all([each.settings for each in running], draws, watch_time=_WATCH_TIME_S)
             running = [each.extended(outcomes) for each, outcomes in zip(running, ran, strict=True)]
         return min(running, key=lambda each: each.order)
     except (SceneError, *BREAKDOWNS):
@@ -219,7 +219,7 @@ def judged_design(
         first = 0
         for last in sorted({few, min(_CHOICE_DEVICES, most), most}):
             count, start = last - first, (FIRST_VERDICT_DEVICE if verdict else FIRST_CHOOSING_DEVICE) + first
-            ran = judged_all(balancer, running, first=count, most=count, start=start, whole=verdict)
+            ran = judged_all(balancer, running, first=count, most=count, start=start, complete=verdict)
             pairs = zip(judgements, ran, strict=True)
             judgements = [a.extended(b.outcomes) for a, b in pairs] if judgements else list(ran)
             best = max(judgements, key=lambda judgement: judgement.fraction.value)
@@ -245,7 +245,7 @@ def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Dr
     """True for each device of a design that meets every demand; None: the scene is refused or breaks down."""
     try:
         balancer = quick_balancer(scene.with_values(point))
-        (outcomes,) = balancer.run_all([settings], draws, further=_WATCH_TIME_S)
+        (outcomes,) = balancer.run_all([settings], draws, watch_time=_WATCH_TIME_S)
         return Judgement.of(balancer, settings, outcomes).meets
     except (SceneError, *BREAKDOWNS):
         return None

@@ -35,9 +35,9 @@ def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
     """
     try:
         balancer = quick_balancer(scene.with_values(point))
-        judge = partial(judged_all, balancer, [{}], whole=False)
+        judge = partial(judged_all, balancer, [{}], complete=False)
         until = _FIRST_LOOK_TIME * balancer.demands()[0].required
-        (judgement,) = judge(most=min(_FIRST_LOOK_DEVICES, runs), until=until)
+        (judgement,) = judge(most=min(_FIRST_LOOK_DEVICES, runs), deadline=until)
         if judgement.fraction.count or judgement.verdict == OPEN:
             (judgement,) = judge(first=min(_SECOND_LOOK_DEVICES, runs), most=runs)
     except (SceneError, *BREAKDOWNS) as error:

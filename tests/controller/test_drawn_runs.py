@@ -151,11 +151,11 @@ def test_runs_of_many_settings_and_devices_are_those_of_each_alone(balancer: Liq
         for gain in GAINS
     ]
     numbers = (1, 2, 5, 17)
-    together = balancer.run_all(settings, Draws(numbers=numbers, whole=False))
-    assert balancer.run_all([], Draws(numbers=numbers, whole=False)) == ()
+    together = balancer.run_all(settings, Draws(numbers=numbers, complete=False))
+    assert balancer.run_all([], Draws(numbers=numbers, complete=False)) == ()
     for each, outcomes in zip(settings, together, strict=True):
         for place, number in enumerate(numbers):
-            (alone,) = balancer.run_all([each], Draws(numbers=(number,), whole=False))
+            (alone,) = balancer.run_all([each], Draws(numbers=(number,), complete=False))
             assert alone.ended == outcomes.ended[place : place + 1]
             for name in ARRAYS:
                 assert getattr(alone, name)[0].tobytes() == getattr(outcomes, name)[place].tobytes()

@@ -14,7 +14,7 @@ from pairs import Passage
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.algorithms.law_based import controller_of
-from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.loop import simulate
@@ -298,7 +298,7 @@ def test_a_run_within_its_limit_in_time_is_watched_until_it_has_settled(
         for end in (settled.settling_time + 1.2, settled.settling_time - 0.1)
     )
     assert after.settling_time == settled.settling_time
-    assert after.time[-1] >= settled.settling_time + scene.controller.hold_time + FURTHER
+    assert after.time[-1] >= settled.settling_time + scene.controller.hold_time + WATCH_TIME_S
     assert before.outcome is Outcome.TIME_LIMIT
     assert before.verdict is RunVerdict.NOT_SETTLED
 

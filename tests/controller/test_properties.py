@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from transfers import Drive, adaptive_ode, closed_form, marched
 
 from ringbalance import bundled_scene, load_scene
-from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -96,7 +96,7 @@ def check(scene: Scene, model: BalancerModel, modelled: tuple[str, ...] | None =
     assert np.all(np.isfinite(run.amplitude) & np.isfinite(run.phase))
     assert np.all(np.diff(run.time) > 0)
     # A run within its limit in time is watched until it has settled.
-    watched = scene.controller.hold_time + FURTHER + 2 * scene.controller.period
+    watched = scene.controller.hold_time + WATCH_TIME_S + 2 * scene.controller.period
     assert run.time[-1] <= (scene.run.time_limit + watched) * (1 + 1e-12)
     assert run.status
     assert run.settled == (run.settling_time is not None)

@@ -90,7 +90,7 @@ def test_runs_that_end_early_meet_the_same() -> None:
         balancer = quick_balancer(sample.point_scene(row))
         demands = balancer.demands()
         full, early = (
-            balancer.run_all([{}], Draws.block(FIRST_VERDICT_DEVICE, 16, whole=False, until=until))[0]
+            balancer.run_all([{}], Draws.block(FIRST_VERDICT_DEVICE, 16, complete=False, deadline=until))[0]
             for until in (math.inf, 2 * demands[0].required)
         )
         for demand in demands:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import (
     AS_GIVEN,
-    FURTHER,
+    WATCH_TIME_S,
     Balancer,
     Demand,
     Draws,
@@ -47,7 +47,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Information, Trials
+from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Information, SearchAxis, Trials
 from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -115,7 +115,7 @@ class EccentricMassBalancer(Balancer):
         settings: Sequence[Settings],
         draws: Draws,
         *,
-        further: float = FURTHER,  # noqa: ARG002
+        watch_time: float = WATCH_TIME_S,  # noqa: ARG002
     ) -> tuple[Outcomes, ...]:
         """Run several settings; masses at rest are watched to the end of the run. See `Balancer`."""
         devices = self._devices(draws)
@@ -160,7 +160,7 @@ class EccentricMassBalancer(Balancer):
             return [EccentricDevice(scene=self.scene, inputs={})] * len(draws.numbers)
         return [device(self.scene, number, self._rotors) for number in draws.numbers]
 
-    def asked_fraction(self) -> float:
+    def required_fraction(self) -> float:
         """Fraction of the devices that the scene requires to meet every demand."""
         return self.scene.requirement.fraction
 
@@ -188,7 +188,7 @@ class EccentricMassBalancer(Balancer):
         changes = advised(self.scene)
         if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
             return ()
-        loops = Axis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
+        loops = SearchAxis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
         kind = self.scene.balancer
         return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 

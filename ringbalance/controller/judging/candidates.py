@@ -29,29 +29,29 @@ _SETTLED: Final = 0.9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
+class SearchPoint:
     """A point of what a balancer offers to try."""
 
     trials: Trials
     places: tuple[int, ...]
     """Indices of its levels on the axes."""
-    along: float | None
-    """Level on the axis along which the answer is drawn; None: the scene's."""
+    level: float | None
+    """Level on the scan axis; None: the scene's."""
 
     @cached_property
     def settings(self) -> Settings | None:
         """By path; None: there are none."""
         levels = {axis.name: axis.levels[at] for axis, at in zip(self.trials.axes, self.places, strict=True)}
-        if self.along is not None and self.trials.along is not None:
-            levels[self.trials.along.name] = self.along
+        if self.level is not None and self.trials.scan_axis is not None:
+            levels[self.trials.scan_axis.name] = self.level
         return self.trials.settings(levels)
 
     @property
     def key(self) -> tuple[str, tuple[int, ...], float | None]:
         """Hashable name of this point."""
-        return self.trials.kind, self.places, self.along
+        return self.trials.kind, self.places, self.level
 
-    def neighbours(self) -> list[Candidate]:
+    def neighbours(self) -> list[SearchPoint]:
         """Candidates one level away on one axis."""
         return [
             replace(self, places=(*self.places[:axis], at + by, *self.places[axis + 1 :]))
@@ -60,13 +60,13 @@ class Candidate:
             if 0 <= at + by < len(self.trials.axes[axis].levels)
         ]
 
-    def at(self, along: float) -> Candidate:
-        """Candidate with another level of the scan axis."""
-        return replace(self, along=along)
+    def at(self, level: float) -> SearchPoint:
+        """SearchPoint with another level of the scan axis."""
+        return replace(self, level=level)
 
-    def is_beside(self, other: Candidate) -> bool:
+    def is_beside(self, other: SearchPoint) -> bool:
         """True if both are at most one level apart on every axis."""
-        alike = self.trials.kind == other.trials.kind and self.along == other.along
+        alike = self.trials.kind == other.trials.kind and self.level == other.level
         return alike and all(abs(a - b) <= 1 for a, b in zip(self.places, other.places, strict=True))
 
 
@@ -74,7 +74,7 @@ class Candidate:
 class Tried:
     """A candidate and what became of it."""
 
-    candidate: Candidate
+    candidate: SearchPoint
     judgement: Judgement
 
     @property
@@ -105,19 +105,19 @@ class Tried:
         # By shares: of a kind that serves no device fewer have run.
         more, share = self.fraction - scenes.fraction, _SETTLED * scenes.fraction
         faster = _AS_FAST * self.time(share) < scenes.time(share)
-        return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kept)
+        return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kind_stated)
 
 
 def chosen(tried: Iterable[Tried]) -> Tried | None:
     """Most devices; of these as fast as the fastest; of these the one amid most others that are as good."""
-    whole = list(tried)
-    most = max((each.count for each in whole), default=0)
+    every = list(tried)
+    most = max((each.count for each in every), default=0)
     if most == 0:
-        return whole[0] if whole else None
-    best = [each for each in whole if each.count == most]
+        return every[0] if every else None
+    best = [each for each in every if each.count == most]
     share = _SETTLED * best[0].fraction
     fastest = min(each.time(share) for each in best)
-    plateau = [each for each in whole if each.count >= most - 1 and each.time(share) <= _AS_FAST**2 * fastest]
+    plateau = [each for each in every if each.count >= most - 1 and each.time(share) <= _AS_FAST**2 * fastest]
 
     def amid(each: Tried) -> int:
         return sum(each.candidate.is_beside(other.candidate) for other in plateau)

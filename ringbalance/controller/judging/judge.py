@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Demand, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import WATCH_TIME_S, Balancer, Demand, Draws, Outcomes, Settings
 from ringbalance.results.requirements import OPEN, Proportion
 from ringbalance.results.rows import Value
 from ringbalance.scene.arrays import BoolArray, finite
@@ -42,7 +42,7 @@ class Judgement:
         """Judge outcomes by the demands of a balancer."""
         return cls(
             settings=settings,
-            required_fraction=balancer.asked_fraction(),
+            required_fraction=balancer.required_fraction(),
             demands=balancer.demands(),
             outcomes=outcomes,
         )
@@ -143,11 +143,13 @@ def judged(
     *,
     most: int | None = None,
     start: int = FIRST_VERDICT_DEVICE,
-    further: float = FURTHER,
+    watch_time: float = WATCH_TIME_S,
     progress: Callable[[str], None] | None = None,
 ) -> Judgement:
     """Judge one choice of settings; see `judged_all`."""
-    return judged_all(balancer, [settings], most=most, start=start, further=further, progress=progress)[0]
+    return judged_all(balancer, [settings], most=most, start=start, watch_time=watch_time, progress=progress)[
+        0
+    ]
 
 
 def best_of(
@@ -170,16 +172,16 @@ def judged_all(
     first: int | None = None,
     most: int | None = None,
     start: int = FIRST_VERDICT_DEVICE,
-    further: float = FURTHER,
-    whole: bool = True,
-    until: float = math.inf,
+    watch_time: float = WATCH_TIME_S,
+    complete: bool = True,
+    deadline: float = math.inf,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Judgement, ...]:
     """Judge settings on the same devices, whose number doubles until each verdict is known.
 
     Args: `first`, `most`: numbers of devices, default the balancer's `verdict_draws`. `start`: number of the
-        first device. `further`: as in `Balancer.run_all`. `whole`, `until`: as in `Draws`. `progress`: called
-        with a text.
+        first device. `watch_time`: as in `Balancer.run_all`. `complete`, `deadline`: as in `Draws`.
+        `progress`: called with a text.
     """
     most = most or balancer.verdict_draws[1]
     count, block = 0, min(first or balancer.verdict_draws[0], most)
@@ -188,8 +190,8 @@ def judged_all(
     while undecided and count < most:
         if progress is not None:
             progress(f"{count} of at most {most} drawn devices")
-        draws = Draws.block(start + count, block, whole=whole, until=until)
-        outcomes = balancer.run_all([settings[i] for i in undecided], draws, further=further)
+        draws = Draws.block(start + count, block, complete=complete, deadline=deadline)
+        outcomes = balancer.run_all([settings[i] for i in undecided], draws, watch_time=watch_time)
         for i, new in zip(undecided, outcomes, strict=True):
             before = judgements.get(i)
             judgements[i] = before.extended(new) if before else Judgement.of(balancer, settings[i], new)

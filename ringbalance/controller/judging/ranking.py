@@ -114,16 +114,16 @@ def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
     inputs = []
     for group, parts in groups.items():
         strongest = max(parts)[1]
-        drawn = balancer.drawn_input(strongest)
+        source = balancer.drawn_input(strongest)
         inputs.append(
             Deciding(
                 name=group,
-                path=drawn.path,
+                path=source.path,
                 outcome=name,
                 index=sum(index for index, _ in parts),
                 noise=math.sqrt(2 * (_BINS - 1) * len(parts)) / meets.size,
-                common=drawn.common,
-                measure=drawn.measure,
+                common=source.common,
+                measure=source.measure,
                 middle=Proportion.where(meets[np.abs(outcomes.inputs[strongest] - 0.5) < 0.25]),
             )
         )

@@ -46,7 +46,7 @@ class Remedied:
     judgement: Judgement
     size: float
     """Sum of |ln(new/old)| over all changed numbers; 1 for a value that the scene does not have."""
-    along: str = ""
+    scan_path: str = ""
     """Path of the axis along which settings may move, such as the supply's pressure: what they set is changed
     by the remedy, too."""
 
@@ -58,7 +58,7 @@ class Remedied:
     @property
     def changes(self) -> Settings:
         """Changes of the scene by path, SI, without the settings of its controller."""
-        moved = {path: value for path, value in self.judgement.settings.items() if path == self.along}
+        moved = {path: value for path, value in self.judgement.settings.items() if path == self.scan_path}
         return {**_merged(self.remedies), **moved}
 
     @property
@@ -94,7 +94,12 @@ class Remedied:
 
 
 def tried_remedies(
-    balancer: Balancer, own: Judgement, *, search: Search, along: str = "", progress: Progress | None = None
+    balancer: Balancer,
+    unchanged: Judgement,
+    *,
+    search: Search,
+    scan_path: str = "",
+    progress: Progress | None = None,
 ) -> tuple[Remedied, ...]:
     """Judge the remedies that a balancer offers, and sort them, the best first.
 
@@ -103,13 +108,13 @@ def tried_remedies(
     one kind meets.  Where no remedy is enough by itself, the best two are tried together.  The best, and all
     that meet, are then judged on devices on which nothing was chosen.
 
-    Args: `own`: judgement of the best settings of the unchanged scene. `search`: finds settings. `along`: as
-        in `Remedied`.
+    Args: `unchanged`: judgement of the best settings of the unchanged scene. `search`: finds settings.
+        `scan_path`: as in `Remedied`.
     """
     kinds: dict[str, list[Remedy]] = {}
     for remedy in balancer.remedies():
         kinds.setdefault(remedy.code, []).append(remedy)
-    judge = partial(_judge, balancer, search=search, along=along, progress=progress)
+    judge = partial(_judge, balancer, search=search, scan_path=scan_path, progress=progress)
     rows: list[Remedied] = []
     for alternatives in kinds.values():
         missed: Remedied | None = None
@@ -127,11 +132,11 @@ def tried_remedies(
                 }
                 halfway = Remedy(code=remedy.code, changes=changes, continuous=True)
                 rows += filter(None, [judge([halfway])])
-            fraction, before = row.judgement.fraction, (missed.judgement if missed else own).fraction
+            fraction, before = row.judgement.fraction, (missed.judgement if missed else unchanged).fraction
             if row.met or fraction.count == 0 or fraction.high < before.low:
                 break
             missed = row
-        if own.fraction.count == 0 and any(row.met for row in rows):
+        if unchanged.fraction.count == 0 and any(row.met for row in rows):
             break
     if not any(row.met for row in rows):
         for first, second in combinations(sorted(rows, key=lambda row: row.order), 2):
@@ -157,7 +162,7 @@ def tried_choices(
     balancer: Balancer,
     *,
     search: Search,
-    along: str = "",
+    scan_path: str = "",
     progress: Progress | None = None,
     some: slice = slice(None),
 ) -> tuple[Remedied, ...]:
@@ -165,7 +170,7 @@ def tried_choices(
 
     Args: `some`: places of those to judge in the order of the balancer.
     """
-    judge = partial(_judge, balancer, search=search, along=along, progress=progress)
+    judge = partial(_judge, balancer, search=search, scan_path=scan_path, progress=progress)
     rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
     return tuple(row for row in rows if row is not None)
 
@@ -175,7 +180,7 @@ def _judge(
     remedies: Sequence[Remedy],
     *,
     search: Search,
-    along: str,
+    scan_path: str,
     progress: Progress | None,
     start: int = FIRST_CHOOSING_DEVICE,
 ) -> Remedied | None:
@@ -198,7 +203,7 @@ def _judge(
         except (TypeError, ValueError, ZeroDivisionError):
             sizes.append(1.0)
     size = round(math.fsum(sizes), 9)
-    return Remedied(remedies=tuple(remedies), judgement=judgement, size=size, along=along)
+    return Remedied(remedies=tuple(remedies), judgement=judgement, size=size, scan_path=scan_path)
 
 
 def _changed(balancer: Balancer, changes: Settings) -> Balancer:

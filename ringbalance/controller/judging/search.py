@@ -17,9 +17,16 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.balancer import Balancer, Draws, Settings
-from ringbalance.controller.judging.candidates import DEVICES, Candidate, Tried, chosen, is_decided, is_worse
+from ringbalance.controller.judging.candidates import (
+    DEVICES,
+    SearchPoint,
+    Tried,
+    chosen,
+    is_decided,
+    is_worse,
+)
 from ringbalance.controller.judging.judge import Judgement
-from ringbalance.controller.trials import Axis, Trials
+from ringbalance.controller.trials import SearchAxis, Trials
 from ringbalance.scene.origins import value_at
 
 Progress = Callable[[str], None]
@@ -29,15 +36,17 @@ _HEATS: Final = ((0, 8), (8, 16), (16, DEVICES))
 _FINAL: Final = (DEVICES, 4 * DEVICES)
 """Devices that choose between the last few settings, by first and last number."""
 _FINALISTS: Final = 8
-_FEW: Final = 3
+_CLEAR_FINALISTS: Final = 3
 """Finalists where the best serve enough of the first devices: to tell a plateau's middle from its edge."""
-_ENOUGH: Final = 0.9
+_GOOD_FRACTION: Final = 0.9
 """Fraction of the devices from which on the best settings need not be looked for more widely."""
 _ROUNDS: Final = 6
 """Rounds in which neighbours are tried."""
 _ALONG: Final = 3
 """Rounds at a level of the scan axis, from the best of a neighbouring level."""
-_CURVE: Final = tuple(Draws.block(256 + first, count, whole=False) for first, count in ((0, 16), (16, 48)))
+_SCAN_DRAWS: Final = tuple(
+    Draws.block(256 + first, count, complete=False) for first, count in ((0, 16), (16, 48))
+)
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
 none of the first settle is answered by them."""
 
@@ -50,27 +59,27 @@ def search(
     balancer: Balancer,
     trials: Sequence[Trials],
     *,
-    along: float | None = None,
+    level: float | None = None,
     ran: Mapping[str, _Ran] | None = None,
     progress: Progress,
 ) -> tuple[Tried, ...]:
     """The best settings of every kind of controller, the kind to take first.
 
-    Args: `along`: level on `Trials.along`; default the scene's. `ran`: by kind, what ran at that level.
+    Args: `level`: on `Trials.scan_axis`; default the scene's. `ran`: by kind, what ran at that level.
     """
     winners: list[Tried] = []
     for space in trials:
         evaluated = dict((ran or {}).get(space.kind, {}))
-        _climb(balancer, evaluated, _coarse(space, along), rounds=_ROUNDS, wide=True, progress=progress)
+        _climb(balancer, evaluated, _coarse(space, level), rounds=_ROUNDS, wide=True, progress=progress)
         served = [each for each in evaluated.values() if each]
         best = chosen(served)
         if best is not None and best.count:
             # 32 of 32 devices are no proof of 0.9: more devices choose between the finalists.
-            if best.fraction < _ENOUGH:
+            if best.fraction < _GOOD_FRACTION:
                 finalists = sorted(served, key=lambda each: (-each.count, each is not best))[:_FINALISTS]
             else:
                 finalists, others = [best], [each for each in served if each is not best]
-                while len(finalists) < _FEW and (following := chosen(others)) and following.count:
+                while len(finalists) < _CLEAR_FINALISTS and (following := chosen(others)) and following.count:
                     finalists.append(following)
                     others.remove(following)
             best = chosen(_on_more(balancer, finalists))
@@ -89,9 +98,9 @@ def _ordered(best: Iterable[Tried], trials: Sequence[Trials]) -> tuple[Tried, ..
     return tuple(sorted(every, key=order))
 
 
-def _coarse(trials: Trials, along: float | None) -> list[Candidate]:
+def _coarse(trials: Trials, level: float | None) -> list[SearchPoint]:
     return [
-        Candidate(trials=trials, places=places, along=along)
+        SearchPoint(trials=trials, places=places, level=level)
         for places in product(*(axis.first for axis in trials.axes))
     ]
 
@@ -99,7 +108,7 @@ def _coarse(trials: Trials, along: float | None) -> list[Candidate]:
 def _climb(
     balancer: Balancer,
     tried: _Ran,
-    field: list[Candidate],
+    field: list[SearchPoint],
     *,
     rounds: int,
     wide: bool,
@@ -116,13 +125,13 @@ def _climb(
         if not (fresh := [each for each in field if each.key not in tried]):
             break
         progress(f"{len(fresh)} settings, {fresh[0].trials.kind.replace('_', ' ')}")
-        known = [each for each in (*tried.values(), other) if each]
-        ran = _raced(balancer, fresh, leading=max(known, key=lambda each: each.fraction, default=None))
+        earlier = [each for each in (*tried.values(), other) if each]
+        ran = _raced(balancer, fresh, leading=max(earlier, key=lambda each: each.fraction, default=None))
         tried |= {each.key: None for each in fresh} | {each.candidate.key: each for each in ran}
         served = [each for each in tried.values() if each]
         best = chosen(served)
         starts = [best] if best is not None and (best.count or wide) else []
-        if best is not None and wide and best.fraction < _ENOUGH:
+        if best is not None and wide and best.fraction < _GOOD_FRACTION:
             apart = [each for each in served if not each.candidate.is_beside(best.candidate)]
             starts += filter(None, [chosen(apart)])
         field = [near for each in starts for near in each.candidate.neighbours()]
@@ -132,18 +141,18 @@ def _on_more(balancer: Balancer, tried: Sequence[Tried]) -> list[Tried]:
     """On the devices that choose between the last few, too."""
     first, end = _FINAL
     settings = [each.judgement.settings for each in tried]
-    ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False))
+    ran = balancer.run_all(settings, Draws.block(first, end - first, complete=False))
     return [each.joined(outcomes) for each, outcomes in zip(tried, ran, strict=True)]
 
 
-def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | None = None) -> list[Tried]:
+def _raced(balancer: Balancer, field: Sequence[SearchPoint], *, leading: Tried | None = None) -> list[Tried]:
     """Drop candidates that are significantly worse than the best. Args: `leading`: best of earlier ones."""
     running: dict[int, Tried | None] = {i: None for i, each in enumerate(field) if each.settings is not None}
     for first, last in _HEATS:
         if not running:
             break
         settings = [field[i].settings or {} for i in running]
-        ran = balancer.run_all(settings, Draws.block(first, last - first, whole=False))
+        ran = balancer.run_all(settings, Draws.block(first, last - first, complete=False))
         for i, outcomes in zip(running, ran, strict=True):
             before = running[i]
             judgement = Judgement.of(balancer, field[i].settings or {}, outcomes)
@@ -158,7 +167,7 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | N
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Along:
+class ScanLevel:
     """The best settings at one level of an axis, over devices that they were not chosen on."""
 
     level: float
@@ -167,58 +176,58 @@ class Along:
 
     @property
     def usable_moment(self) -> tuple[float, float, float]:
-        """Of a tenth of the devices at most, of half of them, of a tenth at least, kg m."""
+        """Usable moment of a tenth of the devices at most, of half of them, of a tenth at least, kg m."""
         low, middle, high = np.quantile(self.judgement.outcomes.usable_moment, [0.1, 0.5, 0.9])
         return float(low), float(middle), float(high)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Curve:
+class Scan:
     """Best settings at every level of an axis."""
 
-    levels: tuple[Along, ...]
-    top: Along
+    levels: tuple[ScanLevel, ...]
+    top: ScanLevel
     """The level to take."""
     searched: Sequence[Tried]
     """The best of every kind of controller there, the kind to take first."""
 
 
-def searched_along(
-    balancer: Balancer, trials: Sequence[Trials], found: Sequence[Tried], *, progress: Progress
-) -> Curve | None:
+def scanned(
+    balancer: Balancer, trials: Sequence[Trials], winners: Sequence[Tried], *, progress: Progress
+) -> Scan | None:
     """The best settings at every level of an axis, on more levels until the best is within them; None: there
     is no axis.
 
     The level to take is searched as widely as the scene's, and then the others once more from what serves
     there, so that the answer does not depend on the level from which the search set out.
-    Args: `found`: the best of every kind of controller at the scene's own level.
+    Args: `winners`: the best of every kind of controller at the scene's own level.
     """
-    axis = trials[0].along
+    axis = trials[0].scan_axis
     if axis is None:
         return None
     level = value_at(balancer.scene, axis.name)
-    own = min(range(len(axis.levels)), key=lambda at: abs(axis.levels[at] - level))
-    searched = {own: found} if axis.levels[own] == level else {}
+    nearest = min(range(len(axis.levels)), key=lambda at: abs(axis.levels[at] - level))
+    searched = {nearest: winners} if axis.levels[nearest] == level else {}
     levels = _Levels(balancer=balancer, trials=trials, axis=axis, searched=searched)
-    answered: dict[int, Along] = {}
+    answered: dict[int, ScanLevel] = {}
     places: Sequence[int] = axis.first
-    levels.add(sorted(places, key=lambda at: abs(at - own)))
+    levels.add(sorted(places, key=lambda at: abs(at - nearest)))
     if levels.top is not None:
         levels.search(levels.top, progress)
     while True:
-        levels.add(sorted(places, key=lambda at: abs(at - own)))
+        levels.add(sorted(places, key=lambda at: abs(at - nearest)))
         progress(f"{len(answered)} levels of {axis.name}")
         answered |= levels.answered(answered)
         top = _top({at: each.judgement.fraction.count for at, each in answered.items()})
         served = answered[top].judgement.fraction.count > 0
-        beside = (top - 1, top + 1) if served else (min(answered) - 1, max(answered) + 1)
-        places = [at for at in beside if at not in answered and 0 <= at < len(axis.levels)]
+        next_places = (top - 1, top + 1) if served else (min(answered) - 1, max(answered) + 1)
+        places = [at for at in next_places if at not in answered and 0 <= at < len(axis.levels)]
         if not places:
             if top in levels.searched or not served:
                 break
             levels.search(top, progress)
-    along = tuple(answered[at] for at in sorted(answered))
-    return Curve(levels=along, top=answered[top], searched=levels.searched.get(top, ()))
+    ordered = tuple(answered[at] for at in sorted(answered))
+    return Scan(levels=ordered, top=answered[top], searched=levels.searched.get(top, ()))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -227,7 +236,7 @@ class _Levels:
 
     balancer: Balancer
     trials: Sequence[Trials]
-    axis: Axis
+    axis: SearchAxis
     searched: dict[int, Sequence[Tried]]
     """By place of a level that was searched widely: the best of every kind of controller."""
     ran: dict[int, dict[str, _Ran]] = field(default_factory=dict)
@@ -242,8 +251,8 @@ class _Levels:
         for at in places:
             for trials in self.trials:
                 self._climb(at, trials, self._nearest(at, trials.kind))
-        known = self._known
-        for before, at in (*pairwise(known), *pairwise(reversed(known))):
+        evaluated = self._evaluated
+        for before, at in (*pairwise(evaluated), *pairwise(reversed(evaluated))):
             for trials in self.trials:
                 if trials.kind in self._serving(before):
                     self._climb(at, trials, before)
@@ -252,17 +261,17 @@ class _Levels:
         """Search a level as widely as the scene's."""
         if at not in self.searched:
             level, ran = self.axis.levels[at], self.ran.get(at)
-            self.searched[at] = search(self.balancer, self.trials, along=level, ran=ran, progress=progress)
+            self.searched[at] = search(self.balancer, self.trials, level=level, ran=ran, progress=progress)
 
     @property
     def top(self) -> int | None:
         """Place of the level that serves most of the devices of the search; None: none serves any."""
-        best = {at: chosen(self._serving(at).values()) for at in self._known}
+        best = {at: chosen(self._serving(at).values()) for at in self._evaluated}
         counts = {at: each.fraction * DEVICES for at, each in best.items() if each}
         return _top(counts) if counts else None
 
     @property
-    def _known(self) -> list[int]:
+    def _evaluated(self) -> list[int]:
         return sorted({*self.searched, *self.ran})
 
     def _serving(self, at: int) -> dict[str, Tried]:
@@ -272,8 +281,8 @@ class _Levels:
 
     def _nearest(self, at: int, kind: str) -> int | None:
         """Place of the nearest level where a kind of controller serves."""
-        serving = (place for place in self._known if kind in self._serving(place))
-        return min(serving, key=lambda place: abs(place - at), default=None)
+        serving = (each for each in self._evaluated if kind in self._serving(each))
+        return min(serving, key=lambda each: abs(each - at), default=None)
 
     def _climb(self, at: int, trials: Trials, near: int | None) -> None:
         """From what serves at another level; from all that is tried at first where nothing does."""
@@ -298,32 +307,38 @@ class _Levels:
     def _needless(self, at: int, kind: str, near: int | None) -> bool:
         """True if a kind of controller beside the scene's is not tried: the scene's serves enough, or too few
         at every level from one on at which the other serves no more."""
-        asked, own = self.balancer.asked_fraction(), self.trials[0].kind
-        known = self._known
-        fractions = {each: best[own].fraction for each in known if own in (best := self._serving(each))}
-        if near is None or fractions.get(at, 0.0) >= asked:
-            return fractions.get(at, 0.0) >= asked
-        there = self._compared(near)
-        no_more = own in there and not there[kind].replaces(there[own])
-        between = (each for each in known if min(at, near) <= each <= max(at, near))
-        return no_more and all(fractions.get(each, 0.0) < asked for each in between)
+        required, scenes_kind = self.balancer.required_fraction(), self.trials[0].kind
+        evaluated = self._evaluated
+        fractions = {
+            each: best[scenes_kind].fraction
+            for each in evaluated
+            if scenes_kind in (best := self._serving(each))
+        }
+        if near is None or fractions.get(at, 0.0) >= required:
+            return fractions.get(at, 0.0) >= required
+        best_there = self._compared(near)
+        no_more = scenes_kind in best_there and not best_there[kind].replaces(best_there[scenes_kind])
+        between = (each for each in evaluated if min(at, near) <= each <= max(at, near))
+        return no_more and all(fractions.get(each, 0.0) < required for each in between)
 
-    def answered(self, before: Mapping[int, Along]) -> dict[int, Along]:
+    def answered(self, before: Mapping[int, ScanLevel]) -> dict[int, ScanLevel]:
         """Levels on devices of their own, but those that have been under the same settings."""
         settings: dict[int, Settings] = {}
-        for at in self._known:
+        for at in self._evaluated:
             level = self.axis.levels[at]
             best = _ordered(self._compared(at).values(), self.trials)
-            asked = (best[0].candidate.at(level).settings if best else None) or {self.axis.name: level}
-            if at not in before or before[at].judgement.settings != asked:
-                settings[at] = asked
+            chosen_settings = (best[0].candidate.at(level).settings if best else None) or {
+                self.axis.name: level
+            }
+            if at not in before or before[at].judgement.settings != chosen_settings:
+                settings[at] = chosen_settings
         judgements: dict[int, Judgement] = {}
-        asked_at = list(settings)
-        for draws in _CURVE:
-            if not asked_at:
+        pending = list(settings)
+        for draws in _SCAN_DRAWS:
+            if not pending:
                 break
-            ran = self.balancer.run_all([settings[at] for at in asked_at], draws)
-            for at, outcomes in zip(asked_at, ran, strict=True):
+            ran = self.balancer.run_all([settings[at] for at in pending], draws)
+            for at, outcomes in zip(pending, ran, strict=True):
                 earlier = judgements.get(at)
                 judgements[at] = (
                     earlier.extended(outcomes)
@@ -331,8 +346,8 @@ class _Levels:
                     else Judgement.of(self.balancer, settings[at], outcomes)
                 )
             # The first devices are enough where none of them is served.
-            asked_at = [at for at in asked_at if judgements[at].fraction.count]
-        return {at: Along(level=self.axis.levels[at], judgement=each) for at, each in judgements.items()}
+            pending = [at for at in pending if judgements[at].fraction.count]
+        return {at: ScanLevel(level=self.axis.levels[at], judgement=each) for at, each in judgements.items()}
 
     def _compared(self, at: int) -> dict[str, Tried]:
         """Best of every kind at a level, on more devices where those of the search leave the kind open."""
@@ -352,11 +367,11 @@ def _top(count: Mapping[int, float]) -> int:
 
 
 def searched(
-    balancer: Balancer, *, along: float | None = None, progress: Progress = lambda _: None
+    balancer: Balancer, *, level: float | None = None, progress: Progress = lambda _: None
 ) -> Settings:
-    """The best settings; none where nothing is to be tried. Args: `along`: as `search`."""
+    """The best settings; none where nothing is to be tried. Args: `level`: as `search`."""
     offered = balancer.trials()
-    if along is None and not any(each.axes for each in offered):
+    if level is None and not any(each.axes for each in offered):
         return {}
-    found = search(balancer, offered, along=along, progress=progress)
-    return (found[0].candidate.settings if found else None) or {}
+    winners = search(balancer, offered, level=level, progress=progress)
+    return (winners[0].candidate.settings if winners else None) or {}

@@ -13,32 +13,32 @@ from ringbalance.controller.judging.judge import Judgement, best_of, judged, jud
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import (
-    Along,
     Progress,
+    ScanLevel,
+    scanned,
     search,
     searched,
-    searched_along,
 )
-from ringbalance.controller.judging.tuning import LONGER, Tuning
+from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning
 from ringbalance.results.requirements import MET
 from ringbalance.results.rows import Finding
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import value_at, with_values_at
 
 _MAX_LONGER_DEVICES: Final = 4 * BLOCK
-"""Devices watched for `LONGER` where one block is undecided."""
+"""Devices watched for `LONG_WATCH_TIME_S` where one block is undecided."""
 
 
 def tuned(
     balancer: Balancer,
     *,
-    along: bool = False,
+    scan: bool = False,
     remedies: bool | None = False,
     progress: Progress | None = None,
 ) -> Tuning:
     """Choose and judge settings for a balancer.
 
-    Args: `along`: scan the axis `Trials.along`, such as the supply's pressure, in any case; otherwise only
+    Args: `scan`: scan the axis `Trials.scan_axis`, such as the supply's pressure, in any case; otherwise only
             where the scene's own level does not meet what is required.
         `remedies`: try remedies where the requirement is not met, and things that can be bought; None:
             the remedies alone; False: neither.
@@ -49,16 +49,16 @@ def tuned(
 
     # The scene's own settings and the best, on the same devices, on which nothing was chosen.
     states_own = not spaces or spaces[0].stated
-    given: list[Settings] = [{}] if states_own or not winners else []
-    proposed = [each for each in _worth_judging(winners) if each not in given]
-    chosen = best_of(balancer, [*proposed, *given], progress=report)
-    fresh = given if chosen in given else [*given, chosen]
+    stated: list[Settings] = [{}] if states_own or not winners else []
+    proposed = [each for each in _worth_judging(winners) if each not in stated]
+    chosen = best_of(balancer, [*proposed, *stated], progress=report)
+    fresh = stated if chosen in stated else [*stated, chosen]
     judgements = judged_all(balancer, fresh, progress=report)
-    own, best = judgements[0] if states_own else None, judgements[-1]
+    unchanged, best = judgements[0] if states_own else None, judgements[-1]
 
-    levels: tuple[Along, ...] = ()
-    if winners and (along or best.verdict != MET):
-        curve = searched_along(balancer, spaces, winners, progress=report)
+    levels: tuple[ScanLevel, ...] = ()
+    if winners and (scan or best.verdict != MET):
+        curve = scanned(balancer, spaces, winners, progress=report)
         levels, winners_there = (curve.levels, curve.searched) if curve else ((), ())
         chosen = best_of(balancer, [best.settings, *_worth_judging(winners_there)], progress=report)
         if chosen != best.settings:
@@ -69,26 +69,26 @@ def tuned(
     if not balancer.watched_to_end and best.fraction.count:
         most = max(BLOCK, min(_MAX_LONGER_DEVICES, balancer.verdict_draws[1]))
         (longer,) = judged_all(
-            balancer, [best.settings], first=BLOCK, most=most, further=LONGER, progress=report
+            balancer, [best.settings], first=BLOCK, most=most, watch_time=LONG_WATCH_TIME_S, progress=report
         )
 
     # What limits the capacity where that decides a verdict, of the scene's settings first.
     capacity: tuple[Finding, ...] = ()
-    for name, each in (("the scene's settings", own), ("the recommended settings", best)):
+    for name, each in (("the scene's settings", unchanged), ("the recommended settings", best)):
         if each is not None and each.verdict != MET and not capacity:
             scene = with_values_at(balancer.scene, each.settings)
             capacity = balancer.beyond_capacity(scene, each.outcomes.ended, name)
 
-    axis = spaces[0].along if spaces else None
+    axis = spaces[0].scan_axis if spaces else None
     axis_name = axis.name if axis else ""
     level = best.settings.get(axis.name) if axis else None
     final_level = value_at(balancer.scene, axis.name) if axis and level is None else level
     mend = remedies is not False and best.verdict != MET
-    find = partial(searched, along=level)
+    find = partial(searched, level=level)
     return Tuning(
         given=balancer.scene,
         recommended=best,
-        own=own,
+        own=unchanged,
         longer=longer,
         tried={each.candidate.trials.kind: each.judgement for each in winners},
         # The recommended level carries the recommended verdict.
@@ -99,9 +99,11 @@ def tuned(
         capacity=capacity,
         ranking=ranked(balancer, best),
         remedies=(
-            tried_remedies(balancer, best, search=find, along=axis_name, progress=report) if mend else ()
+            tried_remedies(balancer, best, search=find, scan_path=axis_name, progress=report) if mend else ()
         ),
-        choices=(tried_choices(balancer, search=find, along=axis_name, progress=report) if remedies else ()),
+        choices=(
+            tried_choices(balancer, search=find, scan_path=axis_name, progress=report) if remedies else ()
+        ),
         open_choice=bool(balancer.choices()),
     )
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Final
 
-from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.balancer import WATCH_TIME_S
 from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
-from ringbalance.controller.judging.search import Along
+from ringbalance.controller.judging.search import ScanLevel
 from ringbalance.controller.rotor import assumed_rotor
 from ringbalance.controller.trials import Information
 from ringbalance.results.numbers import format_given, percent
@@ -24,7 +24,7 @@ from ringbalance.scene.describe import setting_text
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import SceneFile, raw_value_at, with_values_at
 
-LONGER: Final = 300.0
+LONG_WATCH_TIME_S: Final = 300.0
 """Time for which settled devices are watched once more under the recommended settings, s."""
 _VERDICT_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
 _EXACT: Final = "_exact"
@@ -51,10 +51,10 @@ class Tuning(Result):
     own: Judgement | None
     """Judgement of the scene's own settings on the same devices; None: the scene states none."""
     longer: Judgement | None
-    """Judgement of the recommended settings with devices watched for `LONGER`; None: runs go to their end."""
+    """Judgement of the recommended settings with a longer watch time; None: runs go to their end."""
     tried: Mapping[str, Judgement]
     """Best settings of every kind of controller on the devices of the search."""
-    along: tuple[Along, ...] = ()
+    along: tuple[ScanLevel, ...] = ()
     """Best settings at every level of the scan axis, such as the gas pressure."""
     along_name: str = ""
     """Path of the scan axis."""
@@ -102,8 +102,9 @@ class Tuning(Result):
             **best.document(),
             "settings": plain_settings(best.settings),
             "own": self.own and self.own.document(),
-            "further_s": FURTHER,
-            "longer": self.longer and {"further_s": LONGER, "fraction": self.longer.fraction.document()},
+            "further_s": WATCH_TIME_S,
+            "longer": self.longer
+            and {"further_s": LONG_WATCH_TIME_S, "fraction": self.longer.fraction.document()},
             "required": best.demands_document(),
             "along": {
                 "path": self.along_name,
@@ -203,7 +204,7 @@ class Tuning(Result):
 
     def _findings(self) -> Iterator[Finding]:
         """Sentences on the verdict, the settling times, the scene's own settings, causes and remedies."""
-        best, own, met = self.recommended, self.own, self.recommended.verdict == MET
+        best, unchanged, met = self.recommended, self.own, self.recommended.verdict == MET
         changes = {
             path: value[0] if isinstance(value, tuple) else value
             for path, value in best.settings.items()
@@ -215,14 +216,16 @@ class Tuning(Result):
         if times["p50"] is not None:
             code = "tuned_half" if times["p90"] is None else "tuned_times"
             yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
-        if own is None:
+        if unchanged is None:
             yield Finding(code="tuned_own_none")
         elif not best.settings:
             yield Finding(code="tuned_own_best")
         else:
-            yield Finding(code="tuned_own", values={**own.sentence_values, "verdict": own.verdict})
+            yield Finding(
+                code="tuned_own", values={**unchanged.sentence_values, "verdict": unchanged.verdict}
+            )
         if self.longer is not None:
-            values = {**self.longer.sentence_values, "time": LONGER, "first": FURTHER}
+            values = {**self.longer.sentence_values, "time": LONG_WATCH_TIME_S, "first": WATCH_TIME_S}
             yield Finding(code="tuned_longer", values=values)
         if not met and best.causes:
             yield Finding(code="tuned_causes", values={"causes": best.causes})

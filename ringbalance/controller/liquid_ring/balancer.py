@@ -13,7 +13,7 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import (
-    FURTHER,
+    WATCH_TIME_S,
     Balancer,
     Demand,
     Draws,
@@ -155,12 +155,12 @@ class LiquidRingBalancer(Balancer):
         return Outcomes.of(traced, trace=trace)
 
     def run_all(
-        self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
+        self, settings: Sequence[Settings], draws: Draws, *, watch_time: float = WATCH_TIME_S
     ) -> tuple[Outcomes, ...]:
         """Run several settings with the program's own algorithms and sensor, without traces."""
-        return self._drawn_runs.outcomes(settings, draws, further=further)
+        return self._drawn_runs.outcomes(settings, draws, watch_time=watch_time)
 
-    def asked_fraction(self) -> float:
+    def required_fraction(self) -> float:
         """Fraction of the devices that the scene requires to meet every demand."""
         return self.scene.requirement.fraction
 

@@ -14,7 +14,7 @@ from ringbalance.reduced_model.tube.path import crest_middle, crest_span
 from ringbalance.results.rows import Finding, Value
 from ringbalance.scene.models import Scene
 
-_NOTICEABLE: Final = 1e-3
+_NOTICEABLE_FILL: Final = 1e-3
 """Fill by which a running flow must go further to be reported."""
 
 
@@ -43,7 +43,7 @@ def beyond_capacity(
             yield Finding(code="capacity_creeps", values=values)
     if count := ended.count(Outcome.STALLED.value):
         further = max(running_fill(scene, model), residual)
-        if further < stalled - _NOTICEABLE:
+        if further < stalled - _NOTICEABLE_FILL:
             values = {**which, "count": count, "counted": moment(stalled), "reached": moment(further)}
             yield Finding(code="stall_passed", values=values)
 

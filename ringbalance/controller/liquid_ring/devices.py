@@ -109,7 +109,7 @@ class Spread:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Device:
+class RingDevice:
     """A drawn device: its scene, with the vibration that it starts with, and its law."""
 
     number: int
@@ -149,7 +149,7 @@ def devices(
     *,
     seed: int,
     rotors: Rotors | None = None,
-) -> tuple[Device, ...]:
+) -> tuple[RingDevice, ...]:
     """The devices of some numbers, with their laws made at once.
 
     Args: `rotors`: that the devices run on; default their own, drawn.
@@ -176,7 +176,7 @@ def devices(
         gravity, waves = gravity_shares(scene).mean > scene.tolerance, [z[WAVES] for z in deviation]
         laws = [(BalancerModel.of(law), 1.0) for law in nominal_laws(scenes, gravity=gravity, waves=waves)]
     return tuple(
-        Device(
+        RingDevice(
             number=number,
             scene=device,
             model=law,

@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.law_based import controller_of
-from ringbalance.controller.balancer import ARRAYS, FURTHER, Draws, Outcomes, Settings
-from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
+from ringbalance.controller.balancer import ARRAYS, WATCH_TIME_S, Draws, Outcomes, Settings
+from ringbalance.controller.liquid_ring.devices import RingDevice, Spread, devices
 from ringbalance.controller.liquid_ring.plant import (
     corners_of,
     largest_pair_moments,
@@ -22,7 +22,7 @@ from ringbalance.controller.liquid_ring.plant import (
     unreachable_moment,
 )
 from ringbalance.controller.loop_plan import LoopPlan
-from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING
+from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE_CHANGE, RISING
 from ringbalance.controller.rotor import Rotors
 from ringbalance.controller.simulation import Outcome, noise_floor
 from ringbalance.controller.terms import dynamics_of, run_terms
@@ -95,7 +95,7 @@ class DrawnRuns:
         return run_terms(scene=self.scene, model=self.model)
 
     def outcomes(
-        self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
+        self, settings: Sequence[Settings], draws: Draws, *, watch_time: float = WATCH_TIME_S
     ) -> tuple[Outcomes, ...]:
         """Outcomes of each setting.
 
@@ -115,14 +115,14 @@ class DrawnRuns:
             model = self.informed if kind == "law_based" else self.model
             some = [scenes[i] for i in indices]
             controllers = [controller_of(each, model, relative_error=RELATIVE_ERROR) for each in some]
-            plan = LoopPlan.of(some, controllers, most_samples=MOST_SAMPLES, further=further)
+            plan = LoopPlan.of(some, controllers, most_samples=MOST_SAMPLES, watch_time=watch_time)
             plan.loops["limit"] = self.limit
-            plan.loops["time_limit"] = min(self.scene.run.time_limit, draws.until)
+            plan.loops["time_limit"] = min(self.scene.run.time_limit, draws.deadline)
             plans[pressure, kind] = plan
 
         shape = len(settings), len(draws.numbers)
         numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
-        devices_run: list[Device] = []
+        devices_run: list[RingDevice] = []
         for block, members in groupby(draws.numbers, _group):
             requested = list(members)
             columns = slice(len(devices_run), len(devices_run) + len(requested))
@@ -131,7 +131,7 @@ class DrawnRuns:
                 row_of = {each.number: row for row, each in enumerate(under.group.devices)}
                 rows = np.array([row_of[number] for number in requested])
                 numbers[:, indices, columns], ends[indices, columns] = under.ran(
-                    plans[pressure, kind], rows, whole=draws.whole, limit=self.limit
+                    plans[pressure, kind], rows, complete=draws.complete, limit=self.limit
                 )
             devices_run += [under.group.devices[row] for row in rows]
         inputs = {
@@ -149,7 +149,7 @@ class DrawnRuns:
             for index in range(len(settings))
         )
 
-    def device(self, number: int) -> Device:
+    def device(self, number: int) -> RingDevice:
         """One of the devices."""
         block = _group(number)
         return self._devices(block)[block.index(number)]
@@ -159,10 +159,10 @@ class DrawnRuns:
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
-    def _devices(self) -> Callable[[range], tuple[Device, ...]]:
+    def _devices(self) -> Callable[[range], tuple[RingDevice, ...]]:
         """Devices of some numbers; the last ones are cached, as a search runs the same again and again."""
 
-        def made_together(block: range) -> tuple[Device, ...]:
+        def made_together(block: range) -> tuple[RingDevice, ...]:
             seed, rotors = self.scene.run.seed, self.rotors
             return devices(self.scene, self.model, self.spread, block, seed=seed, rotors=rotors)
 
@@ -173,7 +173,7 @@ class DrawnRuns:
         """Groups by numbers, true for drawn devices, and gas pressure; the last ones are cached."""
 
         def group(block: range, varied: bool, pressure: float) -> _Group:
-            exact = Device(
+            exact = RingDevice(
                 number=0, scene=self.scene, model=self.model, speed=1.0, moment=1.0, inputs={}, clipped=()
             )
             some = self._devices(block) if varied else [replace(exact, number=number) for number in block]
@@ -202,7 +202,7 @@ class DrawnRuns:
 class _Group:
     """Devices that are made at once, and what no gas pressure changes in them."""
 
-    devices: tuple[Device, ...]
+    devices: tuple[RingDevice, ...]
     """Devices of the group; those that differ in numbers alone stand beside each other."""
     scenes: tuple[Scene, ...]
     """Scenes as which the devices run."""
@@ -218,7 +218,7 @@ class _Group:
 
     @classmethod
     def of(
-        cls, devices: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str], noise: Any
+        cls, devices: Sequence[RingDevice], scenes: Sequence[Scene], *, modelled: Sequence[str], noise: Any
     ) -> _Group:
         """Args: `scenes`: of the devices, with their settings. `noise`: as `noise_table`, by number."""
         order = alike(scenes)
@@ -318,7 +318,7 @@ class _Under:
     """Least that compresses the gas, over its p V."""
 
     def ran(
-        self, plan: LoopPlan, rows: IntArray, *, whole: bool, limit: float
+        self, plan: LoopPlan, rows: IntArray, *, complete: bool, limit: float
     ) -> tuple[FloatArray, IntArray]:
         """Results of runs of some devices, shape (`ARRAYS`, settings, rows), and indices into `_ENDS`."""
         shape, group = (plan.loops.size, rows.size), self.group
@@ -326,7 +326,7 @@ class _Under:
         # With the liquid at its best, of devices whose chambers cannot bring it to the limit.
         numbers[0], numbers[1], numbers[2] = math.inf, self.unreachable[rows], math.nan
         numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
-        carried = whole | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
+        carried = complete | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
         if not carried.any():
             return numbers, ends
         rows = rows[carried]
@@ -346,7 +346,7 @@ class _Under:
             settled,
             self.beyond_disc[rows] > limit,
             self.unreachable[rows] > limit,
-            (runs["drains"] > 0) | (runs["drift"] > NOTICEABLE),
+            (runs["drains"] > 0) | (runs["drift"] > NOTICEABLE_CHANGE),
             runs["cause"] == RISING,
             runs["lost"] > 0,
             runs["cause"] == IDLE,

@@ -17,7 +17,7 @@ from typing import Any, Final
 from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.liquid_ring.loop_factor import loop_rate
 from ringbalance.controller.terms import dead_time
-from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Point, Trials, rounded
+from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Point, SearchAxis, Trials, rounded
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding, residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.errors import (
@@ -36,15 +36,15 @@ from ringbalance.scene.origins import raw_value_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 PRESSURE: Final = "gas.pressure"
-_GAIN: Final = Axis(
+_GAIN: Final = SearchAxis(
     name="loop factor", levels=(0.06, 0.1, 0.16, 0.25, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 1.9), first=(3, 5, 7, 9)
 )
-_OFFSET: Final = Axis(
+_OFFSET: Final = SearchAxis(
     name="offset over dead time",
     levels=(0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0),
     first=(0, 4, 8),
 )
-_INTEGRAL: Final = Axis(
+_INTEGRAL: Final = SearchAxis(
     name="period over integral time", levels=(0.0, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7), first=(2, 4, 6)
 )
 _SERIES: Final = "10 11 12 13 15 16 18 20 22 24 27 30 33 36 39 43 47 51 56 62 68 75 82 91"
@@ -54,10 +54,10 @@ _PRESSURES: Final = tuple(
 """Levels, Pa, alike for all scenes: the series E24 of IEC 60063, of steps of about a tenth."""
 _REACH: Final = 3.2
 """Times the scene's pressure, up and down, of the levels that may be tried."""
-_NEAR: Final = 1.8
+_FIRST_REACH: Final = 1.8
 """Times the scene's pressure, up and down, of the levels that are tried at first."""
-_OFFSET_STEP: Final = 1e-4
-"""s, to which an offset is rounded."""
+_OFFSET_STEP_S: Final = 1e-4
+"""Step to which an offset is rounded."""
 _OWN: Final = {"target_vector": (_GAIN, _OFFSET, _INTEGRAL), "law_based": (_OFFSET,), "trial": ()}
 _INSTEAD: Final = {"target_vector": ("law_based",), "law_based": ("target_vector",), "trial": ()}
 """Kinds of controller beside the scene's; valve-open times of a trial are its scene's."""
@@ -93,7 +93,7 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
             part = point[_INTEGRAL.name]
             values["controller.integral_time"] = rounded(controller.period / part) if part else None
         if _OFFSET.name in point:
-            offset = round(point[_OFFSET.name] * dead / _OFFSET_STEP) * _OFFSET_STEP
+            offset = round(point[_OFFSET.name] * dead / _OFFSET_STEP_S) * _OFFSET_STEP_S
             values["controller.gas_time_offset"] = (round(offset, 6),) if offset else None
         return {path: value for path, value in values.items() if value != raw_value_at(scene, path)}
 
@@ -102,8 +102,10 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
     if available is not None:
         pressures = {available, *(each for each in pressures if each < available)}
     levels = tuple(sorted(pressures))
-    first = tuple(at for at, each in enumerate(levels) if nominal / _NEAR <= each <= nominal * _NEAR)
-    pressure_axis = Axis(name=PRESSURE, levels=levels, first=first or (len(levels) - 1,), unit="Pa")
+    first = tuple(
+        at for at, each in enumerate(levels) if nominal / _FIRST_REACH <= each <= nominal * _FIRST_REACH
+    )
+    pressure_axis = SearchAxis(name=PRESSURE, levels=levels, first=first or (len(levels) - 1,), unit="Pa")
     gain = scene.origin_of("controller.proportional")
     stated = gain != "default" or controller.kind != "target_vector"
     kind_stated = scene.origin_of("controller.kind") == "given"
@@ -113,17 +115,17 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
             axes=_OWN[kind],
             settings=partial(settings, kind),
             stated=stated,
-            kept=kind_stated,
-            along=pressure_axis,
+            kind_stated=kind_stated,
+            scan_axis=pressure_axis,
         )
         for kind in (controller.kind, *_INSTEAD[controller.kind])
     )
 
 
-_NARROWER: Final = (0.7, 0.5, 0.35, 0.25)
-_WIDER: Final = (1.4, 2.0)
+_NARROWER_BORES: Final = (0.7, 0.5, 0.35, 0.25)
+_WIDER_BORES: Final = (1.4, 2.0)
 """Times the bore."""
-_SLOW: Final = 0.25
+_SLOW_FRACTION: Final = 0.25
 """Share of a run's time that valves open for the initial vibration alone, from which a bore is small."""
 _FASTER: Final = (2.0, 4.0)
 """Times the valve's conductance and over its lag."""
@@ -196,13 +198,13 @@ def drawn_input(name: str) -> DrawnInput:
 
 
 def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
-    for factor in _NARROWER:
+    for factor in _NARROWER_BORES:
         yield Remedy(code="bore", changes={"tube.bore": factor * scene.tube.bore})
     # Valve-open time in which the full tube would correct the initial vibration, s.
     rate = loop_rate(scene, model)
     open_time = scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
-    if open_time > _SLOW * (scene.requirement.settling_time or scene.run.time_limit):
-        for factor in _WIDER:
+    if open_time > _SLOW_FRACTION * (scene.requirement.settling_time or scene.run.time_limit):
+        for factor in _WIDER_BORES:
             yield Remedy(code="wider_bore", changes={"tube.bore": factor * scene.tube.bore})
 
 

@@ -27,7 +27,7 @@ _PRESSURES: Final = 257
 """Few calls of the law with many pressures cost least."""
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
-LEAST_PRESSURE: Final = 1.0
+LEAST_PRESSURE_PA: Final = 1.0
 """Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
 
 

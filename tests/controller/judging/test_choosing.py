@@ -17,17 +17,17 @@ import pytest
 import ringbalance as rb
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
-from ringbalance.controller.judging.search import Along, search, searched_along
+from ringbalance.controller.judging.search import ScanLevel, scanned, search
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.offers import trials
-from ringbalance.controller.trials import Axis, DrawnInput, Information, Trials
+from ringbalance.controller.trials import DrawnInput, Information, SearchAxis, Trials
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 
 PRESSURE = "gas.pressure"
-GAIN = Axis(name="gain", levels=tuple(map(float, range(12))), first=(0, 4, 8))
+GAIN = SearchAxis(name="gain", levels=tuple(map(float, range(12))), first=(0, 4, 8))
 BEST = 0.56e6
 Ran = defaultdict[int, set[tuple[object, ...]]]
 
@@ -48,14 +48,14 @@ class Machine:
         return Machine(cast("Scene", scene), self.ran, needs=self.needs)
 
     def trials(self) -> tuple[Trials, ...]:
-        along = trials(self.scene, paper_model(self.scene), limit=1e-6)[0].along
+        pressure_axis = trials(self.scene, paper_model(self.scene), limit=1e-6)[0].scan_axis
 
         def settings(point: Mapping[str, float]) -> Mapping[str, Any]:
             pressure = point.get(PRESSURE, self.scene.gas.pressure)
             moved = {} if pressure == self.scene.gas.pressure else {PRESSURE: pressure}
             return {**moved, "controller.gas_time_offset": (1e-4 * point[GAIN.name],)}
 
-        return (Trials(kind="toy", axes=(GAIN,), settings=settings, along=along),)
+        return (Trials(kind="toy", axes=(GAIN,), settings=settings, scan_axis=pressure_axis),)
 
     def remedies(self) -> tuple[Remedy, ...]:
         return tuple(
@@ -75,16 +75,16 @@ class Machine:
     def drawn_input(self, name: str) -> DrawnInput:
         return DrawnInput(common=False, measure="", path=name)
 
-    def asked_fraction(self) -> float:
+    def required_fraction(self) -> float:
         return 0.9
 
     def demands(self) -> Any:
         return (settles_within(2.0, stated=True),)
 
     def run_all(
-        self, settings: Sequence[Mapping[str, Any]], draws: Draws, *, further: float = 60.0
+        self, settings: Sequence[Mapping[str, Any]], draws: Draws, *, watch_time: float = 60.0
     ) -> tuple[Outcomes, ...]:
-        if further == 60.0:
+        if watch_time == 60.0:
             for number in draws.numbers:
                 for each in settings:
                     own = each.get(PRESSURE, self.scene.gas.pressure)
@@ -114,7 +114,7 @@ def at(scene: Scene, pressure: float) -> Scene:
     return scene.with_values({PRESSURE: f"{pressure} MPa"})
 
 
-def agree(curves: Sequence[Sequence[Along]]) -> int:
+def agree(curves: Sequence[Sequence[ScanLevel]]) -> int:
     """Hold fractions at levels of several curves beside each other's bounds. Returns: how many levels."""
     by_level = defaultdict(list)
     for curve in curves:
@@ -127,9 +127,9 @@ def agree(curves: Sequence[Sequence[Along]]) -> int:
     return len(shared)
 
 
-def curve_of(balancer: Any) -> tuple[Along, ...]:
+def curve_of(balancer: Any) -> tuple[ScanLevel, ...]:
     found = search(balancer, balancer.trials(), progress=lambda _: None)
-    curve = searched_along(balancer, balancer.trials(), found, progress=lambda _: None)
+    curve = scanned(balancer, balancer.trials(), found, progress=lambda _: None)
     assert curve is not None
     return curve.levels
 
@@ -183,7 +183,7 @@ class TwoKinds(Machine):
     """Whether both serve the same devices."""
     faster: float = 1.0
     """Times as fast as the first is the second; 0: it serves no device."""
-    kept: bool = False
+    kind_stated: bool = False
 
     def trials(self) -> tuple[Trials, ...]:
         (toy,) = super().trials()
@@ -191,8 +191,8 @@ class TwoKinds(Machine):
         def settings(point: Mapping[str, float]) -> Mapping[str, Any]:
             return {**(toy.settings(point) or {}), "controller.kind": "second"}
 
-        second = Trials(kind="second", axes=toy.axes, settings=settings, along=toy.along)
-        return replace(toy, kept=self.kept), second
+        second = Trials(kind="second", axes=toy.axes, settings=settings, scan_axis=toy.scan_axis)
+        return replace(toy, kind_stated=self.kind_stated), second
 
     def _outcomes(self, settings: Mapping[str, Any], draws: Draws) -> Outcomes:
         outcomes, numbers = super()._outcomes(settings, draws), np.array(draws.numbers)
@@ -222,13 +222,13 @@ def test_a_kind_that_serves_no_device_stands_behind_one_that_does(paper_scene: S
 
 
 @pytest.mark.parametrize(
-    ("faster", "kept", "kind"),
+    ("faster", "kind_stated", "kind"),
     [(1.0, False, "toy"), (1.25, False, "toy"), (1.35, False, "second"), (3.0, True, "toy")],
 )
 def test_of_kinds_that_serve_as_many_the_faster_is_taken_unless_the_scene_gives_one(
-    paper_scene: Scene, faster: float, kept: bool, kind: str
+    paper_scene: Scene, faster: float, kind_stated: bool, kind: str
 ) -> None:
-    machine = cast("Any", TwoKinds(at(paper_scene, 0.56), alike=True, faster=faster, kept=kept))
+    machine = cast("Any", TwoKinds(at(paper_scene, 0.56), alike=True, faster=faster, kind_stated=kind_stated))
     best, _ = search(machine, machine.trials(), progress=lambda _: None)
     assert best.candidate.trials.kind == kind
     assert tuned(machine).recommended.settings.get("controller.kind", "toy") == kind
@@ -240,7 +240,9 @@ def test_only_a_kind_that_a_scene_gives_is_kept_beside_a_faster_one() -> None:
         balancer_of(rb.load_scene(rb.bundled_scene(name))).trials()[0]
         for name in ("liquid_ring_paper", "grinding_spindle")
     )
-    assert (given.kind, given.kept) == (assumed.kind, not assumed.kept) == ("target_vector", True)
+    assert (
+        (given.kind, given.kind_stated) == (assumed.kind, not assumed.kind_stated) == ("target_vector", True)
+    )
 
 
 def test_a_remedy_names_the_pressure_that_goes_with_it(paper_scene: Scene) -> None:

@@ -42,16 +42,16 @@ class Machine:
     def choices(self) -> tuple[Remedy, ...]:
         return self.offered
 
-    def asked_fraction(self) -> float:
+    def required_fraction(self) -> float:
         return 0.9
 
     def demands(self) -> Any:
         return (settles_within(2.0, stated=True),)
 
     def run_all(
-        self, settings: Sequence[Mapping[str, Any]], draws: Draws, *, further: float = 60.0
+        self, settings: Sequence[Mapping[str, Any]], draws: Draws, *, watch_time: float = 60.0
     ) -> tuple[Outcomes, ...]:
-        del further
+        del watch_time
         q, n = quantiles("q", draws.numbers, seed=0), len(draws.numbers)
         share = 0.5 * (self.scene.controller.limit / 50e-9) * (1.5e-3 / self.scene.tube.bore)
         return tuple(

@@ -15,6 +15,6 @@ def test_a_slow_valve_gets_settings_nearly_as_good_as_any_known() -> None:
     balancer = balancer_of(load_scene(bundled_scene("six_chamber")).with_values(valve))
     known = {"controller.kind": "law_based", "controller.gas_time_offset": (0.0199,)}
     chosen, best = balancer.run_all(
-        [searched(balancer), known], Draws.block((1 << 21) + 4096, 256, whole=False)
+        [searched(balancer), known], Draws.block((1 << 21) + 4096, 256, complete=False)
     )
     assert np.mean(chosen.settled) >= np.mean(best.settled) - 0.05

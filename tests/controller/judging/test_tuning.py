@@ -73,9 +73,11 @@ def test_too_little_pressure_is_told_from_capacity() -> None:
 
 def test_no_pressure_above_the_one_that_is_available_is_searched() -> None:
     """[design] states it; the highest one itself is a level, and settings start at the scene's own."""
-    free = LiquidRingBalancer(bundled("liquid_ring_paper")).trials()[0].along
-    capped = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.6 MPa")).trials()[0].along
-    below = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.1 MPa")).trials()[0].along
+    free = LiquidRingBalancer(bundled("liquid_ring_paper")).trials()[0].scan_axis
+    capped = (
+        LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.6 MPa")).trials()[0].scan_axis
+    )
+    below = LiquidRingBalancer(bundled("liquid_ring_paper", design__pressure="0.1 MPa")).trials()[0].scan_axis
     assert free is not None
     assert capped is not None
     assert below is not None
@@ -114,7 +116,7 @@ def test_a_default_gain_is_not_the_scenes() -> None:
 def test_what_cannot_settle_is_not_run() -> None:
     """With the liquid at its best: the unbalance is twice the usable moment."""
     scene = bundled("liquid_ring_paper", rotor__initial_vibration={"amplitude": "20 um", "phase": "90 deg"})
-    (outcomes,) = balancer_of(scene).run_all([{}], Draws.block(0, 8, whole=False))
+    (outcomes,) = balancer_of(scene).run_all([{}], Draws.block(0, 8, complete=False))
     assert set(outcomes.ended) == {"capacity_exceeded"}
     assert np.all(outcomes.final_amplitude > scene.controller.limit)
     assert np.all(np.isnan(outcomes.energy))

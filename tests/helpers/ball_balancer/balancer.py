@@ -23,7 +23,7 @@ from ringbalance.controller.balancer import (
     Settings,
 )
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.trials import Axis, Trials, rounded
+from ringbalance.controller.trials import SearchAxis, Trials, rounded
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
@@ -128,7 +128,7 @@ class BallBalancer(Balancer):
 
     def trials(self) -> tuple[Trials, ...]:
         """The drag between its bounds."""
-        drag = Axis(
+        drag = SearchAxis(
             name="balls.drag", levels=tuple(np.geomspace(1 / 30, 30, 9).tolist()), first=(0, 2, 4, 6, 8)
         )
         value = self.scene.balls.drag

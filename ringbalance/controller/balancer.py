@@ -206,7 +206,7 @@ ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", 
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """One thing that is asked of every device, as a function of how its run ended."""
+    """Demand on every device, as a function of the outcome of its run."""
 
     code: str
     """Code of the finding on it, such as "settling_time"."""
@@ -218,7 +218,7 @@ class Demand:
     """SI."""
     unit: str
     stated: bool
-    """True if the scene states it; else every run is asked for it."""
+    """True if the scene states it; else it holds for every run."""
     amplitude: float | None = None
     """Vibration at or below which a device counts as settled, m zero-to-peak, where [requirement] says so."""
 
@@ -243,7 +243,7 @@ class Remedy:
 
 
 class Balancer(ABC):
-    """A balancer on its rotor, as a scene describes both; what every command knows of it.
+    """A balancer on its rotor, as a scene describes both: the interface that every command uses.
 
     Made by `balancer_of`; immutable, so that the same balancer gives the same rows in every process.  What is
     not abstract here suits a balancer whose runs are watched to their end and whose scene states nothing
@@ -259,7 +259,7 @@ class Balancer(ABC):
     energy_kind: str
     """Code of the sentence that says what its runs count as energy."""
     watched_to_end: bool = True
-    """True if every run is watched to its time limit, whatever is asked for."""
+    """True if every run is watched to its time limit, whatever the arguments say."""
 
     @property
     def models_used(self) -> tuple[Any, ...]:
@@ -321,7 +321,7 @@ class Balancer(ABC):
         return ()
 
     def choices(self) -> tuple[Remedy, ...]:
-        """Things that can be bought for what the scene leaves open; it is answered without them."""
+        """Parts that can be bought where the scene leaves them open; results do without them."""
         return ()
 
     def information(self, scene: SceneFile) -> Information:  # noqa: ARG002

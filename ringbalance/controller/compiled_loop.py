@@ -64,10 +64,10 @@ def continue_runs(
 
     Args:
         loops: one for each of some settings, type `LOOP`. plants: one for each device, type `PLANT`.
-        assumed: the device as the law-based algorithm has it; the others do not look at it.
+        assumed: the device that the law-based algorithm assumes; the others do not read it.
         runs: of type `RUN`, shape (n,), changed; each names its settings and its device.
         motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the pairs as they are and, with
-            one more, as the law-based algorithm believes them to be.
+            one more, as the law-based algorithm estimates them.
         noise: of every device, amplitude and phase in standard deviations, shape (devices, samples, 2).
         until: number of samples; with none runs begin.
         instants, injections, samples: rows of the trace of a single run (time and every pair's fill;
@@ -131,7 +131,7 @@ def _sense(loop: Record, run: Record, amplitude_noise: float, phase_noise: float
 def decide(
     loop: Record, assumed: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
 ) -> None:
-    """One step of the algorithm on what the sensor shows."""
+    """One step of the algorithm on a sample."""
     half, opened = loop.chambers // 2, False
     for i in range(half):
         run.asked[i] = 0.0

@@ -1,4 +1,4 @@
-"""From a command to the next sample in plain numbers: valves, liquid, and what is noted of it."""
+"""Compiled interval from a command to the next sample: valves, liquid, and their rows of the trace."""
 
 from __future__ import annotations
 

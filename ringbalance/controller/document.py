@@ -1,6 +1,6 @@
 """A finished run as the JSON document that scripts rely on, as a table of its histories, and for a person.
 
-Where a scene does not give its gas line, whole runs at both ends of the default range stand beside it.
+Where a scene gives no gas line, runs at both ends of the default range are reported as well.
 `conventions` has the run in the quantities and units of balancing shops and of operators of machines.
 """
 
@@ -33,7 +33,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
     """A run as a JSON document in SI.
 
     `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
-    what the sensor showed is under `samples`, null where a sample was dropped or not a number.
+    the samples of the sensor are under `samples`, null where one was dropped or not a number.
     """
     scene, gas = simulation.scene, simulation.gas
     measurements = [sample.measurement for sample in simulation.samples]

@@ -58,9 +58,9 @@ class LoopPlan:
     loops: Records
     """Type `LOOP`, one for each."""
     starts: Records
-    """Type `RUN`, with what the algorithm remembers at the start."""
+    """Type `RUN`, with the memory of the algorithm at the start."""
     assumed: Records | None
-    """Type `PLANT`, shape (1,): a device as the law-based algorithm has it; None: it does not look at one."""
+    """Type `PLANT`, shape (1,): device that the law-based algorithm assumes; None: another algorithm."""
     liquid: Records
     """Type `MOTION`: the pairs as the law-based algorithm estimates them, and one more; else empty."""
 
@@ -137,7 +137,7 @@ class LoopPlan:
             noise: of every device, at least so many samples, as `continue_runs` takes it.
             traced: whether the trace of the run, which is the only one, is kept.
             watch: called before each sample, as it may write into the run.
-        Returns: that trace; an empty one where none is asked for.
+        Returns: that trace; else an empty one.
         """
         pairs, most = int(self.loops["chambers"][0]) // 2, int(self.loops["most_samples"][0]) if traced else 0
         motions = np.zeros((runs.size, 2 * pairs + SPARE), dtype=MOTION)

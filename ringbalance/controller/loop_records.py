@@ -16,7 +16,7 @@ from ringbalance.controller.algorithms.valve_steps import PER_CHAMBER
 from ringbalance.controller.rotor import MAX_CHAMBERS
 
 GAS_POINTS: Final = 8
-"""Instants recorded within one command's valve-open time, beside the closing of each valve."""
+"""Instants recorded within one command's valve-open time, besides the closing of each valve."""
 TAIL_POINTS: Final = 12
 """Instants recorded within a wait, in which an operation continues after its valve has closed."""
 PAIRS: Final = MAX_CHAMBERS // 2
@@ -140,7 +140,7 @@ _RUN_PAIRS: Final = (
     "fill",  # x of the chamber on the positive side
     "asked",  # valve-open time of the command, s, zero for none
     "drives",  # part of it in which gas drives liquid, s: until gas enters the port
-    "lowest",  # fill that the driven chamber comes to by it
+    "lowest",  # fill that the driven chamber reaches by it
     "given",  # law-based: valve-open time of the last command, s
 )
 _RUN_FLAGS: Final = (
@@ -186,4 +186,4 @@ SAMPLE: Final = np.dtype(
 )
 """Rows of a trace; those of its instants are the time and every pair's fill."""
 NOTES: Final = 2, 1 + PAIRS, PAIRS + GAS_POINTS + TAIL_POINTS
-"""Shape of the room for what is noted between two samples, with the gas on and off."""
+"""Shape of the notes between two samples, with the gas on and off."""

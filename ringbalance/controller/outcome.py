@@ -145,7 +145,7 @@ def _dead_time(run: Simulation) -> list[Finding]:
 
 
 def _moments(run: Simulation) -> dict[str, Value]:
-    """The unbalance, the usable moment of a pair under the scene's gas, and what is left at best."""
+    """Unbalance, usable moment of a pair under the scene's gas, and vibration left at best."""
     return {
         "unbalance": abs(run.scene.rotor.initial_unbalance),
         "pair_moment": abs(run.plant.largest_pair_moment()),

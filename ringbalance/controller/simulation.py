@@ -1,4 +1,4 @@
-"""The record of one closed-loop run, its gas, how it can end, and what is counted in its samples."""
+"""Record of one closed-loop run: samples, injections, gas, outcome and counts."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class GasUse:
 
     fillings: int
     normal_volume: float
-    """Gas from the supply: what the chambers held above ambient pressure when their valves closed, all of
-    which is vented, and gas that passed through, normal m^3."""
+    """Gas from the supply: content of the chambers above ambient pressure as their valves close, all of which
+    is vented, and gas that passed through, normal m^3."""
     energy: float
     """Least work that compresses it, p V ln(p_1/p_a) a filling, J."""
     run_dry: int

@@ -1,4 +1,4 @@
-"""Surface and moment of a chamber beside the law's answer, from the pieces of an export; as `point`."""
+"""Surface and moment of a chamber besides the law's answer, from the pieces of an export; as `point`."""
 
 from math import sqrt
 

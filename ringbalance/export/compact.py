@@ -125,7 +125,7 @@ class CompactLaw:
         gas_pressure: float,
         primed: bool = False,
     ) -> Answer:
-        """Answer one query; nothing is refused, the status says what the answer is worth.
+        """Answer one query; nothing is refused, the status tells how valid the answer is.
 
         Args: as `FlowLaw.evaluate`.
         """
@@ -230,7 +230,7 @@ class _Piecewise:
         return np.asarray(polyval(x[inside] - x[last], polynomial) - self.value[inside])
 
     def largest(self, x: FloatArray, ends: IntArray, of: FloatArray | float = 1.0) -> float:
-        """Error of all pieces. Args: `of`: what it is relative to, at the samples."""
+        """Error of all pieces. Args: `of`: values at the samples that it is relative to."""
         scale, pairs = np.broadcast_to(of, x.shape), pairwise(ends.tolist())
         return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
 

@@ -1,4 +1,4 @@
-"""Reference results inside a unit: what a host's own run of it can be compared with.
+"""Reference results inside a unit, to compare a host's own run of it with.
 
 They stand where the layered standard FMI-LS-REF (1.0.0-alpha.1) puts them, in the form of the Reference FMUs:
 CSV with the time first, numbers in full; inputs hold from their row to the next.

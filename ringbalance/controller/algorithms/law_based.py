@@ -68,9 +68,9 @@ class LawBased(BuiltIn):
     """Valve-open times that take the whole residual away in one operation, t = (V/S) integral dx/u(x) for
     each pair.
 
-    The residual unbalance V/K asks for a change of the disc's moment; the moment curve turns it into fill
+    The residual unbalance V/K needs a change of the disc's moment; the moment curve turns it into fill
     ratios of the pairs, the flow law into valve-open times, with the chambers' fills followed by the same law
-    since the start.  After each operation K is re-estimated from what the vibration did (`learn`), so a
+    since the start.  After each operation K is estimated again from the vibration's response (`learn`), so a
     wrong influence coefficient, lag angle or speed of the flow spoils only the first operation.  There is no
     gain to tune.
 
@@ -153,7 +153,7 @@ def first_memory(axes: ComplexArray) -> FloatArray:
 
 
 def controller_of(scene: Scene, model: BalancerModel, *, relative_error: float = RELATIVE_ERROR) -> BuiltIn:
-    """The control algorithm that a scene asks for. Args: `model`, `relative_error`: as in `LawBased`."""
+    """The control algorithm of a scene. Args: `model`, `relative_error`: as in `LawBased`."""
     kind = scene.controller.kind
     if kind == "law_based":
         return LawBased(scene=scene, model=model, relative_error=relative_error)

@@ -1,4 +1,4 @@
 """Settings, requirements and remedies by runs of drawn devices, the same for every balancer.
 
-`judge` says in which fraction of devices a setting meets what is asked; the others use it.
+`judge` finds the fraction of devices in which settings meet the demands; the others use it.
 """

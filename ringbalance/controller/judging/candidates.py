@@ -30,7 +30,7 @@ _SETTLED: Final = 0.9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchPoint:
-    """A point of what a balancer offers to try."""
+    """A point of a balancer's settings to try."""
 
     trials: Trials
     places: tuple[int, ...]

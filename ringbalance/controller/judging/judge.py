@@ -28,7 +28,7 @@ _MAX_CAUSES: Final = 3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judgement:
-    """Outcomes of drawn devices under one choice of settings, compared with what is demanded."""
+    """Outcomes of drawn devices under one choice of settings, compared with the demands."""
 
     settings: Settings
     """Values that differ from the scene's, by path, SI."""

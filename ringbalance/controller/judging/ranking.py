@@ -1,4 +1,4 @@
-"""Sensitivity of a judgement to the drawn inputs: which input decides, and what is worth measuring.
+"""Sensitivity of a judgement to the drawn inputs: the input that decides, and the worthwhile measurements.
 
 The outcome is whether a device meets every demand; where all do, how soon it settles; where none does, the
 amplitude that remains.

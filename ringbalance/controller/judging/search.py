@@ -1,4 +1,4 @@
-"""Settings by runs: levels of what a balancer offers to try, raced over few drawn devices.
+"""Settings by runs: levels on the axes that a balancer offers, raced over few drawn devices.
 
 The fraction of devices that a setting serves is a plateau with steps of one device, so that nothing smooth is
 there to follow: coarse levels first, then the neighbours of the best until it is within them.  Settings that
@@ -115,7 +115,7 @@ def _climb(
     other: Tried | None = None,
     progress: Progress,
 ) -> None:
-    """Add what a field comes to, and the neighbours of the best again and again.
+    """Add the results of a field, and of the neighbours of the best again and again.
 
     Args: `wide`: follow a best that serves no device, too, and beside one that serves too few the best of
         those that are not next to it. `other`: the best of another kind of controller; what is surely worse

@@ -203,7 +203,7 @@ class _Group:
     """Devices that are made at once, and what no gas pressure changes in them."""
 
     devices: tuple[RingDevice, ...]
-    """Devices of the group; those that differ in numbers alone stand beside each other."""
+    """Devices of the group; those that differ in numbers alone follow each other."""
     scenes: tuple[Scene, ...]
     """Scenes as which the devices run."""
     kinds: tuple[tuple[slice, Scene], ...]

@@ -2,7 +2,7 @@
 
 From sample to sample, in the frame of the disc (x towards chamber A), with vibration v and valve-open time t
 as complex numbers: the plant v' = v - b exp(-j lag) t removes b per second in the direction of the gas, the
-controller t = Kc exp(j lag') (v + w' + q (v - v_before)), w' = w + i (v + v_before)/2 asks for it, i = dt/Ti
+controller t = Kc exp(j lag') (v + w' + q (v - v_before)), w' = w + i (v + v_before)/2 commands it, i = dt/Ti
 and q = Td/dt.  With g = Kc b exp(j (lag' - lag)) the loop is L(z) = g C(z)/(z - 1),
 C = 1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z).  A complex number c is the matrix ((Re c, -Im c), (Im c, Re c)):
 the loop of two inputs and two outputs has the margins and the sensitivity of the complex one over the whole

@@ -2,7 +2,7 @@
 
 Gas for a time T into a chamber of fill x moves (S/V) u T of fill to the opposite one, so the vibration
 changes by b T with b = kappa |dM/dx| (S/V) u, M the moment of the pair along x + x_opposite = const: that is
-kappa lambda rho S u.  The controller asks for T = Kc e along the residual, so a residual e becomes
+kappa lambda rho S u.  The controller commands T = Kc e along the residual, so a residual e becomes
 e (1 - h exp(j d)) with h = Kc b and d the error of the assumed lag angle.  It shrinks for h < 2 cos d and
 turns round from h = 1 / cos d on.  b differs from pair to pair, and with the chamber of a pair that is
 driven.  A residual that turns round is driven by both in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2,
@@ -59,7 +59,7 @@ class LoopFactor:
     value: float | None
     """h, part of a small residual that one injection removes; None for an algorithm without a gain."""
     fixed: bool
-    """True if h keeps its value; an algorithm that learns comes to one."""
+    """True if h keeps its value; an algorithm that learns approaches one."""
     limit: float
     """2 cos d, from which a small residual grows."""
     deviation: float | None
@@ -164,7 +164,7 @@ def vibration_rates(scene: Scene, model: BalancerModel) -> FloatArray:
     slope = np.abs(up - down) / (after - before)
     driven = np.stack([fills, total - fills], axis=-1)
     opposite = np.clip(total - driven, lowest, highest)
-    # An injection starts with what the tube holds while the gas is off.
+    # An injection starts with the content that the tube holds while the gas is off.
     rest = model.flow.evaluate(fill_ratio=driven, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
     flow = model.flow.evaluate(
         fill_ratio=driven,
@@ -277,7 +277,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
     used, lines = run_models(scene=scene, model=model), line_answers(scene, model)
     margins = None
     if loop.rate != 0.0 and settings.kind != "trial":
-        # The law-based algorithm comes to a loop factor of one.
+        # The law-based algorithm approaches a loop factor of one.
         fixed = settings.kind == "target_vector"
         margins = loop_margins(
             loop_factor=loop.value if fixed and loop.value else 1.0,

@@ -1,8 +1,8 @@
 """Trials that a liquid ring offers: settings, changes of its scene, and valves to choose.
 
-Settings are in units of what the loop and the valve do at a pressure.  What helps where too few devices meet
-what is asked follows from runs alone; here stands what can be built, and where a change has no meaning.  The
-gas pressure is none of the changes: the search of the settings answers for it.
+Settings are relative to the loop's rate and the valve's dead time at a pressure.  Runs alone show which
+change helps where too few devices meet the demands; this module lists changes that can be built and make
+sense.  The gas pressure is not among them: the search of the settings covers it.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _OFFSET_STEP_S: Final = 1e-4
 """Step to which an offset is rounded."""
 _OWN: Final = {"target_vector": (_GAIN, _OFFSET, _INTEGRAL), "law_based": (_OFFSET,), "trial": ()}
 _INSTEAD: Final = {"target_vector": ("law_based",), "law_based": ("target_vector",), "trial": ()}
-"""Kinds of controller beside the scene's; valve-open times of a trial are its scene's."""
+"""Further kinds of controller by the scene's; valve-open times of a trial are its scene's."""
 
 
 def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials, ...]:

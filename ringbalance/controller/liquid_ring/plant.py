@@ -18,8 +18,8 @@ from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.loop_models import Rotor
 
 NEAR_RESIDUAL: Final = 1e-6
-"""Fill ratio to which a chamber counts as at its residual fill, which a run and an ensemble know as well:
-what is left above it changes no vibration."""
+"""Fill ratio above its residual fill up to which a chamber counts as at it, in runs and ensembles: the rest
+changes no vibration."""
 _MAX_DOUBLINGS: Final = 40
 _REFINEMENTS: Final = 6
 """Each leaves a 256th of the range."""

@@ -67,10 +67,10 @@ def test_the_third_balancer_is_tuned_and_compared(balls: BallScene) -> None:
     assert tuned.recommended_scene.balancer == "ball"
     paper = load_scene(bundled_scene("liquid_ring_paper"))
     ring = balancer_of(paper.with_values({"run.time_limit": "2 s"}), flow_law="paper")
-    found = compare(balancer_of(balls), ring, rotor="first", most=4).to_dict()
-    assert found["balancer"] == ["ball", "liquid_ring"]
-    assert found["fraction"][0]["value"] > 0.5
-    assert found["rotor"]["unbalance_kg_m"] == pytest.approx([80e-6, 0.0])
+    result = compare(balancer_of(balls), ring, rotor="first", most=4).to_dict()
+    assert result["balancer"] == ["ball", "liquid_ring"]
+    assert result["fraction"][0]["value"] > 0.5
+    assert result["rotor"]["unbalance_kg_m"] == pytest.approx([80e-6, 0.0])
     with pytest.raises(rb.SceneError, match="below the critical speed"):
         compare(ring, balancer_of(balls), rotor="first")
 
@@ -116,10 +116,10 @@ def test_the_third_balancer_is_fitted(balls: BallScene, tmp_path: Path) -> None:
     )
     columns = "unbalance [g*mm],angle [deg],amplitude [um],phase [deg],series,note"
     path.write_text("\n".join([f"{head}{columns}", *rows]) + "\n", encoding="utf-8")
-    found = {each.name: each for each in rb.fit(balls, path).parameters}
-    assert list(found) == ["rotor.influence_coefficient", "rotor.lag_angle"]
-    assert found["rotor.influence_coefficient"].value == pytest.approx(0.52, rel=1e-3)
-    assert math.degrees(found["rotor.lag_angle"].value) == pytest.approx(172, abs=0.2)
+    result = {each.name: each for each in rb.fit(balls, path).parameters}
+    assert list(result) == ["rotor.influence_coefficient", "rotor.lag_angle"]
+    assert result["rotor.influence_coefficient"].value == pytest.approx(0.52, rel=1e-3)
+    assert math.degrees(result["rotor.lag_angle"].value) == pytest.approx(172, abs=0.2)
     path.write_text(template("run_up") + "90,400,10,a\n", encoding="utf-8")
     with pytest.raises(rb.SceneError, match="tell nothing of"):
         rb.fit(balls, path)

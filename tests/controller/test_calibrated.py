@@ -51,11 +51,11 @@ def test_quadrature_against_the_adaptive_integrator(
 ) -> None:
     drive = drive_of(calibrated, fill=fill, pressure=pressure)
     t = np.array([0.05, 0.3, 0.6]) if event is Event.NONE else np.array([0.05, 0.3, 2.0])
-    found, reference = MARCH(drive, t), adaptive_ode()(drive, t)
-    assert found.fill == pytest.approx(reference.fill, abs=1e-8)
-    assert (found.regime_start, found.event) == (start, event)
+    result, reference = MARCH(drive, t), adaptive_ode()(drive, t)
+    assert result.fill == pytest.approx(reference.fill, abs=1e-8)
+    assert (result.regime_start, result.event) == (start, event)
     if event is Event.EMPTY:
-        assert found.event_time == pytest.approx(reference.event_time, rel=1e-7)
+        assert result.event_time == pytest.approx(reference.event_time, rel=1e-7)
 
 
 def test_an_empty_tube_below_its_priming_pressure_stays_blocked(calibrated: BalancerModel) -> None:

@@ -18,15 +18,15 @@ def test_a_pulse_at_the_residual_fill_sends_over_what_lies_behind_the_middle_of_
 ) -> None:
     balancer = LiquidRingBalancer(paper_scene)
     ended = ("settled", "capacity_exceeded", "capacity_exceeded")
-    (found,) = beyond_capacity(paper_scene, balancer.model, ended)
+    (result,) = beyond_capacity(paper_scene, balancer.model, ended)
     least = residual_fill_ratio(paper_scene, law=balancer.model.flow)
     by_hand = DENSITY * crest_volume() * (arm(level(least)) + arm(level(_TOTAL - least)))
-    assert found.code == "capacity_creeps"
-    assert found.values["count"] == 2
-    assert found.values["moment"] == pytest.approx(by_hand, rel=5e-3)
+    assert result.code == "capacity_creeps"
+    assert result.values["count"] == 2
+    assert result.values["moment"] == pytest.approx(by_hand, rel=5e-3)
     # An own plant, with its own flow, crept by 0.036 um a pulse.
-    assert found.values["vibration"] == pytest.approx(INFLUENCE * by_hand, rel=1e-2)
-    assert found.values["vibration"] == pytest.approx(0.036e-6, rel=0.04)
+    assert result.values["vibration"] == pytest.approx(INFLUENCE * by_hand, rel=1e-2)
+    assert result.values["vibration"] == pytest.approx(0.036e-6, rel=0.04)
 
 
 @pytest.mark.parametrize("gas", [0.42e6, 0.425e6])
@@ -41,9 +41,9 @@ def test_a_long_injection_goes_on_below_the_stall_until_the_column_parts_over_a_
     fill = running_fill(weak, model)
     # The gas itself weighs a little on the liquid.
     assert pressure(CREST) + VAPOUR - pressure(level(fill)) == pytest.approx(gas, rel=5e-3)
-    (found,) = beyond_capacity(weak, model, ("stalled",))
-    assert found.code == "stall_passed"
-    assert found.values["reached"] > 1.2 * found.values["counted"]  # type: ignore[operator]
+    (result,) = beyond_capacity(weak, model, ("stalled",))
+    assert result.code == "stall_passed"
+    assert result.values["reached"] > 1.2 * result.values["counted"]  # type: ignore[operator]
 
 
 def test_nothing_is_said_where_no_device_ends_for_want_of_capacity(paper_scene: Scene) -> None:

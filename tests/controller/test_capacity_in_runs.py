@@ -55,12 +55,12 @@ def driven(scene: Scene, calibration: Calibration, *, share: float) -> Simulatio
 @pytest.mark.parametrize("pressure", [0.45e6, 0.5e6, 0.55e6, 0.7e6, 1.0e6])
 def test_a_chamber_empties_to_the_printed_fill(paper_scene: Scene, pressure: float) -> None:
     scene = paper_scene.with_values({"gas.pressure": pressure})
-    found = ringbalance.calibrate(scene)
+    result = ringbalance.calibrate(scene)
     # More than the gas can do at the lower pressures, than the disc can do at the others.
     stalls = pressure < 0.51e6
-    run = driven(scene, found, share=0.85 if stalls else 0.95)
+    run = driven(scene, result, share=0.85 if stalls else 0.95)
     assert run.outcome is (Outcome.STALLED if stalls else Outcome.CAPACITY_EXCEEDED)
-    judged(run, found)
+    judged(run, result)
 
 
 def judged(run: Simulation, found: Calibration) -> None:
@@ -114,10 +114,12 @@ speed = "{omega} rad/s"
 @pytest.mark.parametrize("number", range(10))
 def test_capacity_and_runs_agree_on_random_discs(tmp_path: Path, number: int) -> None:
     scene = random_scene(tmp_path, number)
-    found = ringbalance.calibrate(scene)
-    usable = float(found.answers.usable_moment / found.answers.moment)
-    run = driven(scene, found, share=1.1 * usable * float(found.answers.reach / found.answers.usable_moment))
-    judged(run, found)
+    result = ringbalance.calibrate(scene)
+    usable = float(result.answers.usable_moment / result.answers.moment)
+    run = driven(
+        scene, result, share=1.1 * usable * float(result.answers.reach / result.answers.usable_moment)
+    )
+    judged(run, result)
 
 
 def test_a_stalled_run_names_the_pressure_from_which_injections_begin(paper_scene: Scene) -> None:

@@ -53,9 +53,9 @@ def test_eccentric_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: 
     told = eccentric_scene(moved(driven, paper_scene))
     speed = told.rotor.speed_profile[0].speed
     assert speed == paper_scene.rotor.speed
-    found = PlantParameters.of(told).influence(speed)
-    assert abs(found) == pytest.approx(0.0108, rel=1e-12)
-    assert math.degrees(-cmath.phase(found)) == pytest.approx(17.0, rel=1e-12)
+    result = PlantParameters.of(told).influence(speed)
+    assert abs(result) == pytest.approx(0.0108, rel=1e-12)
+    assert math.degrees(-cmath.phase(result)) == pytest.approx(17.0, rel=1e-12)
     whirl = PlantParameters.of(told).steady_whirl(speed, told.masses.initial_angle)
     assert abs(whirl) == pytest.approx(10e-6, rel=1e-9)
     assert math.degrees(cmath.phase(whirl)) == pytest.approx(90.0, rel=1e-9)
@@ -153,15 +153,15 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
     compared = compare(under_paper_law(first), under_paper_law(second), most=16)
     # Of two fractions that are required, the larger one holds for both.
     assert compared.asked == 0.95
-    found = compared.to_dict()
-    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    result = compared.to_dict()
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
     for key in ("fraction", "time_s", "residual_ratio", "energy_J", "worst_amplitude_m", "settings"):
-        one, other = found[key]
+        one, other = result[key]
         assert one == other, key
-    assert found["better"] is None
-    assert 0 < found["residual_ratio"][0] < 0.05 / 10
+    assert result["better"] is None
+    assert 0 < result["residual_ratio"][0] < 0.05 / 10
     # The first injections, of a second, fill at least the 33.8 ml that a full chamber leaves, to 0.7 MPa.
-    assert found["energy_J"][0] > 2 * 0.801325e6 * 33.8e-6 * math.log(0.801325 / 0.101325)
+    assert result["energy_J"][0] > 2 * 0.801325e6 * 33.8e-6 * math.log(0.801325 / 0.101325)
     alone = judged(under_paper_law(brief), compared.sides[0].settings, most=16)
     assert compared.sides[0].fraction.count == pytest.approx(alone.fraction.count, abs=1)
 
@@ -205,7 +205,7 @@ def test_the_order_names_no_other_winner(paper_scene: Scene) -> None:
     """A disc beside itself with a narrower tube, with gas that moves nothing, and with a vague rotor."""
     brief = paper_scene.with_values({"run.time_limit": "12 s"})
     ring = under_paper_law(brief)
-    found = [
+    result = [
         _swapped(ring, under_paper_law(brief.with_values({path: value})))[0].better
         for path, value in (
             ("tube.bore", "0.9 mm"),
@@ -213,7 +213,7 @@ def test_the_order_names_no_other_winner(paper_scene: Scene) -> None:
             ("uncertainty.influence_coefficient", "10 %"),
         )
     ]
-    assert found == [None, 0, None]
+    assert result == [None, 0, None]
 
 
 def test_pairs_are_tested_exactly() -> None:
@@ -278,7 +278,7 @@ def test_the_order_of_ring_and_masses_makes_no_difference(paper_scene: Scene, sm
     one, other = (compare(*both, most=8) for both in ((ring, masses), (masses, ring)))
     assert one.rotor == other.rotor
     assert [side.fraction for side in one.sides] == [side.fraction for side in reversed(other.sides)]
-    times = [[side.middle("settling_time") for side in found.sides] for found in (one, other)]
+    times = [[side.middle("settling_time") for side in result.sides] for result in (one, other)]
     assert times[0] == times[1][::-1]
 
 
@@ -286,15 +286,15 @@ def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
     """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
     strong = with_tables(driven, run={"time_limit": 40.0})
     weak = with_tables(strong, masses={"mass": 0.06}, source="weak.toml")
-    found = compare(under_paper_law(strong), under_paper_law(weak), rotor="first", most=8)
-    good, poor = found.sides
-    assert (good.fraction.count, poor.fraction.count, found.better) == (8, 0, 0)
+    result = compare(under_paper_law(strong), under_paper_law(weak), rotor="first", most=8)
+    good, poor = result.sides
+    assert (good.fraction.count, poor.fraction.count, result.better) == (8, 0, 0)
     middle = good.middle("settling_time")
     assert middle is not None
     assert 0 < middle < 40
     assert (good.middle("energy") or 0) > 0
     # From the steady vibration the worst amplitude is no less than that.
-    assert good.worst_amplitude > 0.9 * found.rotor.amplitude
+    assert good.worst_amplitude > 0.9 * result.rotor.amplitude
     assert poor.middle("settling_time") is None
     # What two masses of 0.06 kg leave of 0.18 kg at the same radius, their centres one length apart.
     pair = 2 * 0.06 * math.cos(0.05 / 0.23 / 2)
@@ -311,11 +311,11 @@ def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     told = capsys.readouterr()
     # A run that SIGTERM interrupts prints no document: its exit code and its message say so.
     assert code in (0, 1), told.err
-    found = json.loads(told.out)
-    assert [scene["source"] for scene in found["scenes"]] == ["liquid_ring_paper.toml", "six_chamber.toml"]
-    assert found["rotor"]["source"] == "liquid_ring_paper.toml"
-    assert code == (0 if found["verdict"] == ["met", "met"] else 1)
-    assert all(energy > 0 for energy in found["energy_J"])
+    result = json.loads(told.out)
+    assert [scene["source"] for scene in result["scenes"]] == ["liquid_ring_paper.toml", "six_chamber.toml"]
+    assert result["rotor"]["source"] == "liquid_ring_paper.toml"
+    assert code == (0 if result["verdict"] == ["met", "met"] else 1)
+    assert all(energy > 0 for energy in result["energy_J"])
     assert main(["compare", masses, ring, "--rotor", "first"]) == 2
     told = capsys.readouterr()
     assert told.out == ""

@@ -31,9 +31,9 @@ def test_a_correction_is_sure_to_last_down_to_the_speed_that_vapour_leaves(
     paper_scene: Scene, fill: float, sure: float, perhaps: float
 ) -> None:
     """A full tube parts over the crest where (D_m - P) (n/n_0)^2 exceeds ambient less cavity pressure."""
-    found = Holding.of(paper_scene, fill_ratio=fill)
+    result = Holding.of(paper_scene, fill_ratio=fill)
     missing = pressure(CREST) - pressure(level(fill))
-    for speed, cavity, rpm in ((found.sure_speed, VAPOUR, sure), (found.likely_speed, VAPOUR / 2, perhaps)):
+    for speed, cavity, rpm in ((result.sure_speed, VAPOUR, sure), (result.likely_speed, VAPOUR / 2, perhaps)):
         by_hand = 10_000 * math.sqrt(-cavity / missing)
         assert by_hand == pytest.approx(rpm, rel=1e-3)
         assert (speed or 0.0) * 30 / math.pi == pytest.approx(by_hand, rel=1e-3)

@@ -197,5 +197,5 @@ def test_chambers_that_are_empty_are_found_by_what_the_vibration_does() -> None:
     scene = load_scene(bundled_scene("six_chamber")).with_values(
         {"controller.proportional": "0.117 s/um", "rotor.initial_vibration.amplitude": "16 um"}
     )
-    (found,) = balancer_of(scene).run_all([{"controller.gas_time_offset": (2.8e-3,)}], Draws.first(64))
-    assert np.count_nonzero(found.settled) >= 52
+    (result,) = balancer_of(scene).run_all([{"controller.gas_time_offset": (2.8e-3,)}], Draws.first(64))
+    assert np.count_nonzero(result.settled) >= 52

@@ -94,16 +94,16 @@ def test_the_derivatives_of_the_column_are_those_of_its_acceleration(
         def smaller(speed: float, at: FloatArray) -> float:
             return min(column.accelerations(known, tuple(at), speed, 1, primed, 0.0)[:2])
 
-        found = column.accelerations(known, tuple(at), speed, 1, primed, 0.0)
-        seen.add(found[0] < found[1])
+        result = column.accelerations(known, tuple(at), speed, 1, primed, 0.0)
+        seen.add(result[0] < result[1])
         slopes = [(smaller(speed * (1 + 1e-6), at) - smaller(speed * (1 - 1e-6), at)) / (2e-6 * speed)]
         for place in (0, 2, 1, 3):
             step = np.eye(4)[place]
             slopes.append((smaller(speed, at + step) - smaller(speed, at - step)) / 2.0)
         assert slopes[1] == pytest.approx(slopes[2], rel=1e-4)
-        scale = abs(found[3])
-        assert found[2] == pytest.approx(slopes[0], rel=1e-3)
-        assert [*found[3:]] == pytest.approx([slopes[1], *slopes[3:]], rel=1e-4, abs=1e-4 * scale)
+        scale = abs(result[3])
+        assert result[2] == pytest.approx(slopes[0], rel=1e-3)
+        assert [*result[3:]] == pytest.approx([slopes[1], *slopes[3:]], rel=1e-4, abs=1e-4 * scale)
     assert seen == {True, False}
 
 
@@ -140,10 +140,10 @@ def test_a_column_under_constant_head_starts_by_tanh(
     u0 = math.sqrt(2 * 0.7e6 / (1000 * 51))
     tau = 2 * 0.12 / (51 * u0)
     t = tau * np.array([0.1, 1.0, 3.0, 10.0])
-    found = pulse(plant(level, "tube inertia"), 1.0, t)
+    result = pulse(plant(level, "tube inertia"), 1.0, t)
     moved = u0 * tau * np.log(np.cosh(t / tau)) * model.tube_area / model.chamber_volume
-    assert 0.25 - found.fills == pytest.approx(moved, rel=1e-7)
-    assert found.motion.velocity == pytest.approx(u0 * math.tanh(10.0), rel=1e-8)
+    assert 0.25 - result.fills == pytest.approx(moved, rel=1e-7)
+    assert result.motion.velocity == pytest.approx(u0 * math.tanh(10.0), rel=1e-8)
 
 
 def test_a_column_without_drive_slows_down_by_its_loss(
@@ -156,10 +156,10 @@ def test_a_column_without_drive_slows_down_by_its_loss(
     coasting = dynamics.kept_plant(total=0.5)
     coasting["one_way"], coasting["port_pressure"] = False, -1.0
     t = np.array([1e-3, 10e-3, 0.1])
-    found = pulse(dynamics, 0.0, t, motion=Motion(velocity=5.0))
+    result = pulse(dynamics, 0.0, t, motion=Motion(velocity=5.0))
     tau = 2 * 0.12 / (51 * 5.0)
     moved = 5.0 * tau * np.log1p(t / tau) * model.tube_area / model.chamber_volume
-    assert 0.25 - found.fills == pytest.approx(moved, rel=1e-7)
+    assert 0.25 - result.fills == pytest.approx(moved, rel=1e-7)
 
 
 def test_liquid_swings_in_a_full_tube_with_the_peaks_of_its_energy(
@@ -172,10 +172,10 @@ def test_liquid_swings_in_a_full_tube_with_the_peaks_of_its_energy(
     dynamics = plant(easy, "tube inertia")
     dynamics.kept_plant(total=0.5)["one_way"] = False
     t = np.linspace(1e-3, 2.0, 2000)
-    found = pass_time(dynamics, PairState(fill=0.251, total=0.5, primed=True), instants=t)
+    result = pass_time(dynamics, PairState(fill=0.251, total=0.5, primed=True), instants=t)
     rate, c = dynamics.tube_area / dynamics.chamber_volume, 1.2 / 0.12
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(found.fills))) != 0) + 1
-    peaks = [0.001 / rate, *(abs(found.fills[turns] - 0.25) / rate)]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(result.fills))) != 0) + 1
+    peaks = [0.001 / rate, *(abs(result.fills[turns] - 0.25) / rate)]
     assert len(peaks) > 6
     for before, after in pairwise(peaks):
         assert (1 + c * before) * math.exp(-c * before) == pytest.approx(
@@ -222,16 +222,16 @@ def test_the_derivatives_of_the_gas_are_those_of_its_rates(
 
         def rates(state: FloatArray) -> tuple[float, float]:
             p, volume, content = state.tolist()
-            found = line_rates(known, p, content, volume, 3e-5, is_open)
-            return found[0], found[1]
+            result = line_rates(known, p, content, volume, 3e-5, is_open)
+            return result[0], result[1]
 
         p, volume, content = start.tolist()
-        found = line_rates(known, p, content, volume, 3e-5, is_open)
+        result = line_rates(known, p, content, volume, 3e-5, is_open)
         for place, size in enumerate(start):
             step = np.eye(3)[place] * 1e-6 * size
             slope = (np.array(rates(start + step)) - rates(start - step)) / (2e-6 * size)
             scale = np.abs(np.array(rates(start))) / size
-            assert np.all(np.abs(slope - [found[2 + place], found[5 + place]]) <= 1e-6 * scale)
+            assert np.all(np.abs(slope - [result[2 + place], result[5 + place]]) <= 1e-6 * scale)
 
 
 @pytest.mark.parametrize("filling", [True, False])
@@ -254,8 +254,8 @@ def test_a_closed_chamber_fills_and_vents_by_the_quadrature(
         parts = sorted({start + AMBIENT, p_end, choked_end}, reverse=not filling)
         parts = [p for p in parts if min(start + AMBIENT, p_end) <= p <= max(start + AMBIENT, p_end)]
         time = sum(quad(lambda p: 1 / rate(p), a, b, epsrel=1e-12)[0] for a, b in pairwise(parts))
-        found = pass_time(dynamics, PairState(fill=0.25, total=0.5, motion=begun), instants=np.array([time]))
-        assert found.motion.gases[0] + AMBIENT == pytest.approx(p_end, rel=1e-7)
+        result = pass_time(dynamics, PairState(fill=0.25, total=0.5, motion=begun), instants=np.array([time]))
+        assert result.motion.gases[0] + AMBIENT == pytest.approx(p_end, rel=1e-7)
 
 
 def test_choked_filling_is_linear_in_time_and_faster_without_heat(
@@ -269,11 +269,11 @@ def test_choked_filling_is_linear_in_time_and_faster_without_heat(
     for exponent, process in ((1.0, "isothermal"), (1.4, "adiabatic")):
         own = replace(dynamics, line=line(process=process))
         t = np.array([time / exponent])
-        found = pass_time(own, PairState(fill=0.25, total=0.5, motion=open_), instants=t)
-        assert found.motion.gases[0] == pytest.approx(slope * time, rel=1e-9)
+        result = pass_time(own, PairState(fill=0.25, total=0.5, motion=open_), instants=t)
+        assert result.motion.gases[0] == pytest.approx(slope * time, rel=1e-9)
     # First law: what has come in, m c_p T_0, is what is there, p V/(gamma - 1), beyond the start.
-    mass_r = (found.motion.contents or (0.0, 0.0))[0] - AMBIENT * volume / 293.15
-    inside = found.motion.gases[0] * volume / 0.4
+    mass_r = (result.motion.contents or (0.0, 0.0))[0] - AMBIENT * volume / 293.15
+    inside = result.motion.gases[0] * volume / 0.4
     assert mass_r * 1.4 / 0.4 * 293.15 == pytest.approx(inside, rel=1e-9)
 
 

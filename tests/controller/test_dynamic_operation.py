@@ -169,7 +169,7 @@ class Independent:
         change.terminal = priming.terminal = True  # type: ignore[attr-defined]
         change.direction = -1.0 if moving else 1.0  # type: ignore[attr-defined]
         priming.direction = 1.0  # type: ignore[attr-defined]
-        found = solve_ivp(
+        result = solve_ivp(
             lambda _, state: self.rates(state, opened=opened, moving=moving, primed=primed),
             (0.0, end),
             y,
@@ -178,12 +178,12 @@ class Independent:
             atol=[1e-11, 1e-8, 1e-3, 1e-3, 1e-7],
             events=(change, priming) if moving and not primed else change,
         )
-        state = found.y[:, -1]
-        ended = found.t_events[0].size > 0
+        state = result.y[:, -1]
+        ended = result.t_events[0].size > 0
         if ended and moving:
             state[1] = 0.0
-        filled = primed or (moving and len(found.t_events) > 1 and found.t_events[1].size > 0)
-        return state, moving != ended, float(found.t[-1]), filled
+        filled = primed or (moving and len(result.t_events) > 1 and result.t_events[1].size > 0)
+        return state, moving != ended, float(result.t[-1]), filled
 
 
 @pytest.mark.parametrize(("duration", "conductance"), [(0.06, 1e-8), (0.2, 3e-9)])
@@ -216,15 +216,15 @@ def test_an_operation_with_all_terms_against_scipy(
     assert len(stops) == 2
     assert primed
     instants = np.array([stops[0], 0.01 + duration, stops[1], 0.01 + duration + 0.15])
-    found = pulse(own, duration, instants)
-    assert found.fills[[1, 3]] == pytest.approx(np.array(fills), abs=1e-6)
-    assert found.fills[0] == 0.25
+    result = pulse(own, duration, instants)
+    assert result.fills[[1, 3]] == pytest.approx(np.array(fills), abs=1e-6)
+    assert result.fills[0] == 0.25
     # The flow begins and ends at the same times: a microsecond to either side is told apart.
     assert pulse(own, duration, np.array([stops[0] - 1e-6])).motion.velocity == 0
     assert pulse(own, duration, np.array([stops[0] + 1e-6])).motion.velocity > 0
     assert pulse(own, duration, np.array([stops[1] - 2e-6])).motion.velocity > 0
     assert pulse(own, duration, np.array([stops[1] + 2e-6])).motion.velocity == 0
-    work = found.motion.record.work
+    work = result.motion.record.work
     assert work == pytest.approx(y[4], rel=1e-5)
 
 
@@ -259,17 +259,17 @@ def test_what_stops_the_flow_is_reported(calibrated: BalancerModel, plant: Plant
 
 def test_the_opposite_chamber_can_be_full(model: BalancerModel, plant: Plant, pulse: Pulse) -> None:
     own = replace(plant(model, "tube inertia"), max_fill_ratio=0.3)
-    found = pulse(own, 3.0, np.array([3.2]), fill=0.25)
-    assert (found.motion.record.event, found.fill) == (Event.FULL, pytest.approx(0.2, abs=1e-15))
+    result = pulse(own, 3.0, np.array([3.2]), fill=0.25)
+    assert (result.motion.record.event, result.fill) == (Event.FULL, pytest.approx(0.2, abs=1e-15))
 
 
 def test_work_bounds_the_integrators_steps(
     calibrated: BalancerModel, plant: Plant, monkeypatch: pytest.MonkeyPatch, pulse: Pulse
 ) -> None:
     monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 20)
-    found = pulse(plant(calibrated, "tube inertia", "gas filling", **PIPED), 0.5, np.array([0.6]))
-    assert found.motion.record.event is Event.UNFINISHED
-    assert 0 <= found.fill <= 0.5
+    result = pulse(plant(calibrated, "tube inertia", "gas filling", **PIPED), 0.5, np.array([0.6]))
+    assert result.motion.record.event is Event.UNFINISHED
+    assert 0 <= result.fill <= 0.5
 
 
 @pytest.fixture
@@ -291,7 +291,7 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
     """Friction answers in 70 us, the levels within seconds: explicit steps would take half a million."""
     own = creeping
     instants = np.array([0.5, 5.0, 50.0])
-    found = pass_time(own, PairState(fill=0.3, total=0.5, primed=True), instants=instants)
+    result = pass_time(own, PairState(fill=0.3, total=0.5, primed=True), instants=instants)
 
     def rates(_: float, y: FloatArray) -> list[float]:
         flow = own.tube_area * max(y[1], 0.0) / own.chamber_volume
@@ -301,9 +301,9 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
     exact = solve_ivp(
         rates, (0.0, 50.0), [0.3, 0.0], method="Radau", t_eval=instants, rtol=1e-10, atol=[1e-13, 1e-12]
     )
-    assert found.motion.record.event is not Event.UNFINISHED
-    assert found.fills == pytest.approx(exact.y[0], abs=3e-9)
-    assert 0.25 < found.fills[2] < found.fills[1] < found.fills[0] < 0.3
+    assert result.motion.record.event is not Event.UNFINISHED
+    assert result.fills == pytest.approx(exact.y[0], abs=3e-9)
+    assert 0.25 < result.fills[2] < result.fills[1] < result.fills[0] < 0.3
 
 
 def test_a_creep_near_its_balance_takes_few_steps(creeping: Dynamics) -> None:
@@ -312,9 +312,9 @@ def test_a_creep_near_its_balance_takes_few_steps(creeping: Dynamics) -> None:
     left = []
     for offset in (1e-5, 1e-7):
         start = PairState(fill=0.25 + offset, total=0.5, primed=True)
-        found = pass_time(creeping, start, instants=np.array([20.0]))
-        assert found.motion.record.event is not Event.UNFINISHED
-        left.append((found.fill - 0.25) / offset)
+        result = pass_time(creeping, start, instants=np.array([20.0]))
+        assert result.motion.record.event is not Event.UNFINISHED
+        left.append((result.fill - 0.25) / offset)
     # Laminar: the same share is left of any offset.
     assert left[1] == pytest.approx(left[0], rel=1e-6)
     assert 0.9 < left[0] < 0.99

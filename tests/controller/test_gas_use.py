@@ -164,14 +164,14 @@ def test_a_pressure_on_the_axis_counts_with_its_column(
     here = calibrate(with_tables(scene, gas={"ambient_pressure": ambient}))
     there = calibrate(own)
     for name in ("priming_pressure_vented", "stall_pressure"):
-        near, far = (float(getattr(found.answers, name)) for found in (here, there))
+        near, far = (float(getattr(result.answers, name)) for result in (here, there))
         assert near == pytest.approx(far * factor)
     asked = {"fill_ratio": 0.25, "primed": True}
     at_axis = there.flow_law.evaluate(gas_pressure=0.7e6, **asked).velocity
     assert float(at_axis) == pytest.approx(
         float(here.flow_law.evaluate(gas_pressure=0.7e6 * factor, **asked).velocity)
     )
-    plants = [plant_of(own, found.model, "tube inertia") for found in (here, there)]
+    plants = [plant_of(own, result.model, "tube inertia") for result in (here, there)]
     near_u = forces(plants[0]).steady((0.25, 0.25), (0.7e6 * factor, 0.0), primed=True)[0]
     assert forces(plants[1]).steady((0.25, 0.25), (0.7e6, 0.0), primed=True)[0] == pytest.approx(near_u)
 
@@ -200,17 +200,17 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene, plant:
     done = injection(passage, 4.0)
     assert done.event is Event.EMPTY
     assert done.run_dry == pytest.approx(4.0 - instants[np.argmax(passage.fills == 0)], abs=2e-3)
-    found = GasUse.of(scene=scene, model=model, injections=[done])
+    result = GasUse.of(scene=scene, model=model, injections=[done])
     # A choked nozzle of 1.5 mm at 0.801 MPa and 20 degC passes 3.34 g/s of air at the most, 1.2929 kg/m^3.
     grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
-    assert found.passed_through == pytest.approx(grams * done.run_dry / 1.2929, rel=2e-3)
-    assert found.below_residual == found.run_dry == 1
-    warning = found.finding
+    assert result.passed_through == pytest.approx(grams * done.run_dry / 1.2929, rel=2e-3)
+    assert result.below_residual == result.run_dry == 1
+    warning = result.finding
     assert warning is not None
     assert (warning.code, warning.values["run_dry"]) == ("gas_passed_through", 1)
     brief = injection(pulse(plant(model), 0.1, np.array([0.1])), 0.1)
     assert GasUse.of(scene=scene, model=model, injections=[brief]).finding is None
-    residual = found.residual_fill_ratio
+    residual = result.residual_fill_ratio
     assert 0 < residual < 0.2
     low = replace(brief, fill_after=0.9 * residual)
     drawn = GasUse.of(scene=scene, model=model, injections=[low]).finding
@@ -218,7 +218,7 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene, plant:
     assert drawn.code == "gas_entered_port"
     # The supply adds its gauge pressure to the ambient gas that was there.
     content = 0.7e6 * model.chamber_volume / AMBIENT * 273.15 / scene.gas.temperature
-    assert found.normal_volume == pytest.approx(content + found.passed_through)
+    assert result.normal_volume == pytest.approx(content + result.passed_through)
 
 
 def test_with_a_line_the_chamber_runs_dry_too(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:

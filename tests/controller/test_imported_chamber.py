@@ -68,10 +68,10 @@ def test_an_untraced_run_is_the_traced_one(exact: Scene, model: BalancerModel, m
     runs = DrawnRuns(
         scene=exact, model=bent, spread=Spread.of(exact, bent, remade=False), limit=exact.controller.limit
     )
-    (found,) = runs.outcomes([{}], AS_GIVEN)
+    (result,) = runs.outcomes([{}], AS_GIVEN)
     assert abs(run.amplitude[-1] - plain.amplitude[-1]) > 1e-8
     # Steps of an untraced run may err by 1e-6 in fill, and a fill moves the vibration by some 50 um.
-    assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=5e-11)
+    assert result.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=5e-11)
 
 
 def test_the_papers_law_takes_a_chamber_with_much_less_space_than_its_sector(exact: Scene) -> None:

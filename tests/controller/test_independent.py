@@ -68,13 +68,13 @@ class Second:
 
     def moment(self, x: float) -> float:
         disc, rho = self.scene.disc, self.scene.liquid.density
-        found = quad(
+        result = quad(
             lambda r: 2 * r * r * math.sin(self.half_angle(r)),
             self.surface(x),
             disc.outer_radius,
             epsrel=1e-12,
         )
-        return float(rho * disc.axial_width * found[0])
+        return float(rho * disc.axial_width * result[0])
 
     def directed(
         self, x: float, y: float, p: float, q: float, *, primed: bool, back: bool
@@ -144,7 +144,7 @@ class Second:
             return math.copysign(1.0, start) * self.velocity(float(state[0]), total, p, primed=primed) - 1e-5
 
         gone.terminal = fills_up.terminal = stops.terminal = True  # type: ignore[attr-defined]
-        found = solve_ivp(
+        result = solve_ivp(
             lambda _, state: [-self.rate * self.velocity(float(state[0]), total, p, primed=primed)],
             (0.0, duration),
             [x],
@@ -153,9 +153,9 @@ class Second:
             atol=1e-10,
             events=(gone, stops) if primed else (gone, fills_up, stops),
         )
-        if not primed and found.t_events[1].size:
-            return self.after(float(found.y[0, -1]), total, p, duration - float(found.t[-1]), primed=True)
-        end = limit if found.t_events[0].size else float(found.y[0, -1])
+        if not primed and result.t_events[1].size:
+            return self.after(float(result.y[0, -1]), total, p, duration - float(result.t[-1]), primed=True)
+        end = limit if result.t_events[0].size else float(result.y[0, -1])
         empty = end == limit and limit in {0.0, total}
         return end, primed and not empty and self.velocity(end, total, p) != 0
 

@@ -125,23 +125,23 @@ def test_a_fill_beyond_empty_is_tried_for_a_probe_at_most(
 ) -> None:
     """No valve says that a chamber is empty: a try takes its whole time."""
     ring = ring_of(replace(model, flow=laws["constant"], tube_area=0.02 * model.chamber_volume))
-    found = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, probe=probe)
-    assert found == pytest.approx(0.25 / (0.02 * 5) + more)
+    result = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, probe=probe)
+    assert result == pytest.approx(0.25 / (0.02 * 5) + more)
 
 
 def test_a_chamber_that_an_earlier_command_has_emptied_is_asked_for_what_is_missing_alone(
     laws: Mapping[str, Any], model: BalancerModel, ring_of: RingOf
 ) -> None:
     ring = ring_of(replace(model, flow=laws["constant"], tube_area=0.02 * model.chamber_volume))
-    found = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, fill=0.0, ended=0.7, probe=10.0)
-    assert found == pytest.approx(0.1 / (0.02 * 5))
+    result = gas_time_of(ring, side=0, wanted=-0.1, longest=10.0, fill=0.0, ended=0.7, probe=10.0)
+    assert result == pytest.approx(0.1 / (0.02 * 5))
 
 
 def test_the_papers_gas_time_by_hand(model: BalancerModel, ring_of: RingOf) -> None:
-    found = gas_time_of(ring_of(model), side=1, wanted=0.4, longest=5.0)
+    result = gas_time_of(ring_of(model), side=1, wanted=0.4, longest=5.0)
     # Eq. 20 in the limit: 2 D/(u0 + u1) with D the metres of flow.
     flow = model.flow.evaluate(fill_ratio=np.array([0.25, 0.1]), gas_pressure=0.7e6)
-    assert found == pytest.approx(
+    assert result == pytest.approx(
         2 * 0.15 * model.chamber_volume / model.tube_area / float(flow.velocity.sum()), rel=1e-8
     )
 
@@ -156,8 +156,8 @@ def test_the_fill_for_a_moment_goes_on_straight_beyond_the_ends() -> None:
     plant["moment"][:, 0], plant["moment"][:, 1] = values, np.gradient(values)
     for x in (-0.2, 0.0, 0.1, 0.25, 0.5, 0.6):
         wanted = per_fill * (x - 0.25)
-        found = fill_for_moment(plant, wanted, 0.0, 0.5)
-        assert found == pytest.approx(x, abs=1e-10)
+        result = fill_for_moment(plant, wanted, 0.0, 0.5)
+        assert result == pytest.approx(x, abs=1e-10)
 
 
 # --- pairs ---
@@ -178,11 +178,11 @@ def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> t
 def test_within_bounds_the_changes_add_up(half: int, length: float, angle: float) -> None:
     axes = chamber_directions(2 * half)[:half]
     wanted = cmath.rect(length, angle)
-    found = pair_changes(wanted=wanted, bounds=[(-50.0, 50.0)] * half)
-    reached = complex(np.dot(axes, found))
+    result = pair_changes(wanted=wanted, bounds=[(-50.0, 50.0)] * half)
+    reached = complex(np.dot(axes, result))
     expected = wanted if half > 1 else complex(wanted.real)
     assert reached == pytest.approx(expected, abs=1e-11)
-    assert np.count_nonzero(np.abs(found) > 1e-11) <= 2
+    assert np.count_nonzero(np.abs(result) > 1e-11) <= 2
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -196,15 +196,15 @@ def test_what_one_pair_cannot_give_the_others_do(
 ) -> None:
     wide = [*room[:-2], (-10.0, 10.0), (-10.0, 10.0)]
     wanted = cmath.rect(length, angle)
-    found = pair_changes(wanted=wanted, bounds=wide)
+    result = pair_changes(wanted=wanted, bounds=wide)
     axes = chamber_directions(2 * len(wide))[: len(wide)]
-    assert complex(np.dot(axes, found)) == pytest.approx(wanted, abs=1e-9)
-    assert all(low - 1e-12 <= c <= high + 1e-12 for c, (low, high) in zip(found, wide, strict=True))
+    assert complex(np.dot(axes, result)) == pytest.approx(wanted, abs=1e-9)
+    assert all(low - 1e-12 <= c <= high + 1e-12 for c, (low, high) in zip(result, wide, strict=True))
 
 
 def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
-    found = pair_changes(wanted=3 + 1j, bounds=[(-2.0, 2.0), (-2.0, 2.0)])
-    assert found == pytest.approx((3.0, 1.0))
+    result = pair_changes(wanted=3 + 1j, bounds=[(-2.0, 2.0), (-2.0, 2.0)])
+    assert result == pytest.approx((3.0, 1.0))
     # A pair that has nothing left at all is asked as well.
     empty = pair_changes(wanted=-3 + 1j, bounds=[(0.0, 4.0), (-2.0, 2.0)])
     assert empty == pytest.approx((-3.0, 1.0))
@@ -276,15 +276,15 @@ def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float 
 
 
 def test_an_exact_response_is_believed_at_once() -> None:
-    found = learn(k=K, seen=-1.3j * K, noise=0.0)
-    assert found.value == pytest.approx(-1.3j * K)
-    assert found.variance == pytest.approx(0.0, abs=1e-30)
+    result = learn(k=K, seen=-1.3j * K, noise=0.0)
+    assert result.value == pytest.approx(-1.3j * K)
+    assert result.variance == pytest.approx(0.0, abs=1e-30)
 
 
 def test_a_response_within_the_noise_is_not_believed() -> None:
     expected = abs(K) ** 2 * 5e-8
-    found = learn(k=K, seen=-K, noise=expected * 1e4)
-    assert found.value == pytest.approx(K, rel=1e-3)
+    result = learn(k=K, seen=-K, noise=expected * 1e4)
+    assert result.value == pytest.approx(K, rel=1e-3)
     # Equal weights when the noise is as large as the doubt, 0.5 |K dU|.
     half = learn(k=K, seen=1.2 * K, noise=expected / 4)
     assert half.value == pytest.approx(1.1 * K)

@@ -96,9 +96,9 @@ class Column:
             return float(y[0] - self.leg[1])
 
         there.terminal = True  # type: ignore[attr-defined]
-        found = solve_ivp(rates, (0, 1.0), [start, 0.0], method="LSODA", rtol=1e-8, atol=1e-10, events=there)
-        assert found.t_events[0].size
-        return float(found.t[-1]), float(found.y[1, -1])
+        result = solve_ivp(rates, (0, 1.0), [start, 0.0], method="LSODA", rtol=1e-8, atol=1e-10, events=there)
+        assert result.t_events[0].size
+        return float(result.t[-1]), float(result.y[1, -1])
 
 
 @pytest.fixture(scope="module")
@@ -126,8 +126,8 @@ def test_liquid_passes_the_crest_when_a_second_model_has_it_there(
     through = (0.25 - seen.fills) * model.chamber_volume / model.tube_area
     # What lies beyond the middle of the crest counts, and the front goes on at the velocity of the reference.
     beyond = (column.leg[1] - column.leg[0]) / 2
-    found = float(np.interp(beyond + 1e-6, through, instants))
-    assert found == pytest.approx(time, rel=0.02)
+    result = float(np.interp(beyond + 1e-6, through, instants))
+    assert result == pytest.approx(time, rel=0.02)
 
 
 def test_without_inertia_the_front_moves_at_the_velocity_of_its_balance(
@@ -240,8 +240,8 @@ def test_a_leg_rises_with_the_gas_of_a_line(
     instants = np.linspace(1e-5, reference + 5e-3, 8001)
     seen = pulse(plant_of(scene, model, LIFT, INERTIA, FILLING), 1.0, instants)
     through = (0.25 - seen.fills) * model.chamber_volume / model.tube_area
-    found = float(np.interp((column.leg[1] - column.leg[0]) / 2, through, instants))
-    assert found == pytest.approx(reference, rel=0.01, abs=0.4e-3)
+    result = float(np.interp((column.leg[1] - column.leg[0]) / 2, through, instants))
+    assert result == pytest.approx(reference, rel=0.01, abs=0.4e-3)
 
 
 def test_the_front_counts_from_where_it_starts_and_has_the_slopes_that_it_states(

@@ -165,9 +165,9 @@ def test_a_gain_that_the_scene_does_not_give_is_named(scene: Scene, law: Complet
     bare = rb.load_scene(tmp_path / "bare.toml")
     assert isinstance(bare, Scene)
     loop = rb.linear_loop(bare, flow_law=law)
-    found = loop.to_dict()
-    assert found["disk_margin"] == loop.disk_margin
-    assert [(each["code"], each["values"]) for each in found["findings"]] == [
+    result = loop.to_dict()
+    assert result["disk_margin"] == loop.disk_margin
+    assert [(each["code"], each["values"]) for each in result["findings"]] == [
         ("default_gain", {"proportional": pytest.approx(0.08e6)})
     ]
     assert "gives no controller.proportional" in repr(loop)

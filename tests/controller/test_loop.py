@@ -37,10 +37,6 @@ def with_rotor(scene: Scene, **changes: Any) -> Scene:
     return with_tables(scene, rotor=changes)
 
 
-def with_gas(scene: Scene, pressure: float) -> Scene:
-    return with_tables(scene, gas={"pressure": pressure})
-
-
 def with_noise(scene: Scene, *, seed: int = 0) -> Scene:
     noisy = replace(scene.sensor, amplitude_noise=0.01e-6, phase_noise=math.radians(0.5))
     return with_tables(scene, sensor=noisy, run={"seed": seed})
@@ -52,10 +48,12 @@ def document(simulation: Simulation) -> str:
 
 def test_proportional_control_along_one_axis_by_hand(scene: Scene, model: BalancerModel) -> None:
     # Unbalance exactly at chamber A: every operation drives A, the amplitude is 10 um less what has moved.
-    along = with_rotor(
-        with_controller(scene, integral_time=None, derivative_time=0.0), initial_phase=-math.radians(17)
+    towards_a = with_tables(
+        scene,
+        controller={"integral_time": None, "derivative_time": 0.0},
+        rotor={"initial_phase": -math.radians(17)},
     )
-    run = simulate(along, model)
+    run = simulate(towards_a, model)
     area = math.pi / 4 * 1.5e-3**2
     volume = (math.pi / 4 * (44.5e-3**2 - 20.5e-3**2) - 2 * 2.777e-3 * 24e-3) * 62e-3
     omega2 = (10000 * 2 * math.pi / 60) ** 2
@@ -69,9 +67,9 @@ def test_proportional_control_along_one_axis_by_hand(scene: Scene, model: Balanc
         x, time = after, time + gas + 0.5
         amplitude = 10e-6 - 0.0108 * 72e-3 * 1000 * volume * (0.25 - x)
     gone = [(i.time, i) for i in run.injections]
-    found = [(time, one.duration, one.fill_before, one.fill_after) for time, one in gone]
+    result = [(time, one.duration, one.fill_before, one.fill_after) for time, one in gone]
     assert {i.chamber for i in run.injections} == {"A"}
-    assert np.array(found) == pytest.approx(np.array(expected), rel=1e-9)
+    assert np.array(result) == pytest.approx(np.array(expected), rel=1e-9)
     assert run.settled
     assert run.amplitude[-1] == pytest.approx(amplitude, rel=1e-6)
 
@@ -254,9 +252,10 @@ def test_noise_is_reproducible_by_seed(scene: Scene, model: BalancerModel) -> No
 
 
 def test_noise_has_the_deviations_asked_for(scene: Scene, model: BalancerModel) -> None:
-    loud = replace(scene.sensor, amplitude_noise=0.2e-6, phase_noise=0.05)
-    still = with_controller(
-        with_rotor(replace(scene, sensor=loud)), minimum_gas_time=1e3, maximum_gas_time=2e3
+    still = with_tables(
+        scene,
+        sensor={"amplitude_noise": 0.2e-6, "phase_noise": 0.05},
+        controller={"minimum_gas_time": 1e3, "maximum_gas_time": 2e3},
     )
     seen = [s.measurement for s in simulate(still, model).samples]
     amplitudes = np.array([m.amplitude for m in seen if m is not None])
@@ -349,23 +348,6 @@ def test_levels_run_back_by_the_law_once_the_valve_is_shut(
     assert waited.ran_back == pytest.approx(0.25 + lost - driven.fill, abs=1e-9)
 
 
-class BothSides:
-    """An own algorithm that asks for gas into both chambers of a pair."""
-
-    rises_tolerated = 2
-
-    def start(self) -> None:
-        """No memory."""
-
-    def step(self, *_: object) -> tuple[None, Command]:
-        return None, Command(valves=tuple(ValveCommand(chamber=i, duration=0.2) for i in (1, 3)))
-
-
-def test_gas_into_both_chambers_of_a_pair_is_refused(scene: Scene, model: BalancerModel) -> None:
-    with pytest.raises(ValueError, match="one pair"):
-        simulate(scene, model, controller=BothSides())
-
-
 def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> None:
     law = paper_law(scene)
     by_law, by_model = simulate(scene, flow_law=law), simulate(scene, model)
@@ -375,6 +357,10 @@ def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> No
         simulate(scene)
     with pytest.raises(ValueError, match="flow_law"):
         simulate(scene, model, flow_law=law)
+
+
+def gas_into(*chambers: int) -> Command:
+    return Command(valves=tuple(ValveCommand(chamber=chamber, duration=0.01) for chamber in chambers))
 
 
 class Answers:
@@ -398,7 +384,8 @@ class Answers:
         (Command(resting=True), r"Answers.step returns the next state and a Command"),
         (None, r"it returned None"),
         ((None, "A"), r"it returned \(None, 'A'\)"),
-        ((None, Command(valves=(ValveCommand(chamber=9, duration=0.01),))), "this disc has chambers 0 to 3"),
+        ((None, gas_into(9)), "this disc has chambers 0 to 3"),
+        ((None, gas_into(1, 3)), "one pair"),
     ],
 )
 def test_an_answer_that_is_none_is_refused(
@@ -408,12 +395,15 @@ def test_an_answer_that_is_none_is_refused(
         simulate(scene, model, controller=Answers(answer))
 
 
-def test_there_is_no_chamber_before_the_first() -> None:
-    with pytest.raises(ValueError, match="chambers are counted from 0"):
-        ValveCommand(chamber=-1, duration=0.01)
-
-
-@pytest.mark.parametrize("duration", [-0.01, 0.0, math.nan, math.inf])
-def test_no_valve_opens_for_less_than_no_time(duration: float) -> None:
-    with pytest.raises(ValueError, match="a valve cannot open for"):
-        ValveCommand(chamber=0, duration=duration)
+@pytest.mark.parametrize(
+    ("chamber", "duration", "message"),
+    [
+        (-1, 0.01, "chambers are counted from 0"),
+        *((0, duration, "a valve cannot open for") for duration in (-0.01, 0.0, math.nan, math.inf)),
+    ],
+)
+def test_no_valve_opens_before_the_first_chamber_or_for_no_time(
+    chamber: int, duration: float, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        ValveCommand(chamber=chamber, duration=duration)

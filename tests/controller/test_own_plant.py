@@ -139,10 +139,10 @@ def test_a_loop_that_goes_on_trying_settles(name: str, values: dict[str, object]
     """Commands too short to move liquid end no run: the integral grows, and noise moves what rests just above
     the limit, so that the devices that judge all settle within seconds, as those of an own plant do."""
     scene = bundled(name, values)
-    found = judged(balancer_of(scene), {}, most=64).outcomes
-    assert set(found.ended) == {"settled"}
-    assert own(scene, 64).agrees(Share.of(found.settled))
-    assert float(np.quantile(found.settling_time, 0.9)) < 8.0
+    result = judged(balancer_of(scene), {}, most=64).outcomes
+    assert set(result.ended) == {"settled"}
+    assert own(scene, 64).agrees(Share.of(result.settled))
+    assert float(np.quantile(result.settling_time, 0.9)) < 8.0
 
 
 @pytest.mark.parametrize("name", [PAPER, SIX, CALIBRATED])

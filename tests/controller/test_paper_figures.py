@@ -39,19 +39,19 @@ def proportional(scene: Scene, model: BalancerModel, *, phase: float, gain: floa
 @pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("gain", [0.04, 0.08, 0.12])
 def test_fig_7_no_overshoot_up_to_0_12(scene: Scene, model: BalancerModel, phase: float, gain: float) -> None:
-    found = proportional(scene, model, phase=phase, gain=gain)
-    assert found.settled
-    assert found.overshoots == 0
-    assert found.misadjustments == 0
+    result = proportional(scene, model, phase=phase, gain=gain)
+    assert result.settled
+    assert result.overshoots == 0
+    assert result.misadjustments == 0
 
 
 @pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("gain", [0.16, 0.20])
 def test_fig_7_overshoot_from_0_16(scene: Scene, model: BalancerModel, phase: float, gain: float) -> None:
-    found = proportional(scene, model, phase=phase, gain=gain)
-    assert found.overshoots >= 1
-    seen = [s.measurement for s in found.samples if s.measurement is not None]
-    turns = np.cos(np.diff([m.phase for m in seen[: found.overshoots + 1]]))
+    result = proportional(scene, model, phase=phase, gain=gain)
+    assert result.overshoots >= 1
+    seen = [s.measurement for s in result.samples if s.measurement is not None]
+    turns = np.cos(np.diff([m.phase for m in seen[: result.overshoots + 1]]))
     # The paper reads 180 degrees off its figure; the two axes flow at different speeds, so it is not exact.
     assert np.all(turns < math.cos(math.radians(135)))
 
@@ -67,11 +67,11 @@ def test_fig_7_a_higher_gain_is_faster_until_it_overshoots(scene: Scene, model: 
 def test_fig_8_below_five_seconds_without_misadjustment(
     scene: Scene, model: BalancerModel, phase: float, amplitude: float
 ) -> None:
-    found = run(scene, model, phase=phase, amplitude=amplitude)
-    assert found.settling_time is not None
-    assert found.settling_time < 5.0
-    assert found.misadjustments == 0
-    assert found.overshoots == 0
+    result = run(scene, model, phase=phase, amplitude=amplitude)
+    assert result.settling_time is not None
+    assert result.settling_time < 5.0
+    assert result.misadjustments == 0
+    assert result.overshoots == 0
 
 
 @pytest.mark.parametrize("phase", PHASES)

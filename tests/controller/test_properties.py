@@ -154,11 +154,11 @@ def test_any_run_under_other_laws(
 def test_the_march_and_closed_form_agree(drive: Drive, fill: float, pressure: float, duration: float) -> None:
     asked = replace(drive, fill=fill, gas_pressure=pressure)
     t = np.linspace(0.0, duration, 4)
-    exact, found = closed_form(asked, t), MARCH(asked, t)
-    assert found.fill == pytest.approx(exact.fill, abs=1e-9)
+    exact, result = closed_form(asked, t), MARCH(asked, t)
+    assert result.fill == pytest.approx(exact.fill, abs=1e-9)
     # The last 1e-9 of fill before a stall take long.
     at_rest = abs(exact.fill[-1] - exact.fill[0]) <= 1e-9
-    assert found.event is exact.event or at_rest or exact.event_time == pytest.approx(duration, rel=1e-3)
+    assert result.event is exact.event or at_rest or exact.event_time == pytest.approx(duration, rel=1e-3)
 
 
 @given(

@@ -130,7 +130,7 @@ class Column:
 
     def with_mass(self, time: FloatArray) -> FloatArray:
         """x_A by scipy's integrator, gas on and gas off."""
-        y, found = np.array([0.25, 0.0]), np.empty(time.size)
+        y, result = np.array([0.25, 0.0]), np.empty(time.size)
         for start, end, gas in (
             (0.0, GAS_TIME, self.scene.gas.pressure),
             (GAS_TIME, float(time[-1]), 0.0),
@@ -139,8 +139,8 @@ class Column:
             solved = solve_ivp(
                 self._rates, (start, end), y, args=(gas,), t_eval=time[here], rtol=1e-10, atol=1e-12
             )
-            found[here], y = solved.y[0], solved.y[:, -1]
-        return found
+            result[here], y = solved.y[0], solved.y[:, -1]
+        return result
 
     def _rates(self, _: float, y: FloatArray, gas: float) -> tuple[float, float]:
         x, u = y
@@ -208,10 +208,10 @@ def test_runs_and_draws_refuse_to_call_it_settled(
     scene_of(tmp_path, crest=crest, time_limit=20.0, more=LOOP.format(kind="target_vector"))
     file = str(tmp_path / "scene.toml")
     assert main(["simulate", file, "--law", law, "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert (found["settled"], found["outcome"], found["settling_time_s"]) == (False, "drifting", None)
-    assert found["gas_line"]["holds"] is False
-    assert all(end["smallest_correction_m"] is None for end in found["gas_line"]["ends"])
+    result = json.loads(capsys.readouterr().out)
+    assert (result["settled"], result["outcome"], result["settling_time_s"]) == (False, "drifting", None)
+    assert result["gas_line"]["holds"] is False
+    assert all(end["smallest_correction_m"] is None for end in result["gas_line"]["ends"])
     drawn = judged(balancer_under(law, load_scene(tmp_path / "scene.toml")), {}, most=16)
     assert drawn.fraction.count == 0
     assert set(drawn.outcomes.ended) == {"drifting"}
@@ -237,11 +237,11 @@ def test_an_untraced_run_is_the_traced_one(tmp_path: Path, crest: str) -> None:
         scene = with_tables(scene, rotor={"initial_amplitude": 4e-6})
     model = calibrated_model(scene)
     run = simulate(scene, model)
-    found = balancer_of(scene).run({}, AS_GIVEN)
-    assert found.settled[0] == run.settled
-    assert (found.ended[0] == "drifting") == (run.outcome is Outcome.DRIFTING)
+    result = balancer_of(scene).run({}, AS_GIVEN)
+    assert result.settled[0] == run.settled
+    assert (result.ended[0] == "drifting") == (run.outcome is Outcome.DRIFTING)
     # An untraced run's injection ends within 1e-6 in fill of a single run's; a fill of 1e-6 is 1e-10 m here.
-    assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-9)
+    assert result.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-9)
 
 
 def test_calibrate_says_what_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -251,14 +251,14 @@ def test_calibrate_says_what_holds(tmp_path: Path, capsys: pytest.CaptureFixture
         scene = scene_of(tmp_path, crest=crest)
         assert main(["calibrate", str(tmp_path / "scene.toml"), "--json"]) == 0
         document = json.loads(capsys.readouterr().out)
-        known, found = by_key(document), document["holding"]
-        assert found["holds"] is holds
+        known, result = by_key(document), document["holding"]
+        assert result["holds"] is holds
         codes = {each["code"] for each in document["findings"]}
         assert bool(codes & {"no_crest_holds", "no_crest", "crest_too_low", "crest_undecided"}) is not holds
         level = 0.0445**2 - known["largest_fill_ratio"]["value"] * (0.0445**2 - 0.0205**2)
         pull = scene.liquid.density * scene.rotor.speed**2 / 2
         spare = (scene.gas.ambient_pressure - scene.liquid.vapour_pressure) / pull
-        assert found["largest_hump_radius_m"] == pytest.approx(math.sqrt(level - spare), rel=1e-9)
+        assert result["largest_hump_radius_m"] == pytest.approx(math.sqrt(level - spare), rel=1e-9)
 
 
 def printed_scene(page: str) -> str:

@@ -84,9 +84,9 @@ def test_the_rate_at_level_chambers_is_kappa_lambda_rho_s_u(scene: Scene, model:
     area = math.pi * 1.5e-3**2 / 4
     expected = 0.0108 * 0.072 * 1000 * area * math.sqrt(2 * 0.7e6 / 51 / 1000)
     assert vibration_rates(level, model) == pytest.approx(np.full((2, 2), expected), rel=2e-2)
-    found = factor(level, model)
-    assert found.value == pytest.approx(scene.controller.proportional * found.rate)
-    assert found.limit == pytest.approx(2.0)
+    result = factor(level, model)
+    assert result.value == pytest.approx(scene.controller.proportional * result.rate)
+    assert result.limit == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("error", [0.0, 0.6])
@@ -110,9 +110,9 @@ def test_noise_leaves_what_a_simulated_linear_loop_shows(
         summed += integral * (seen + before) / 2
         x, before = x - h * (seen + summed + derivative * (seen - before)), seen
         squares += x * x
-    found = _stationary_deviation(loop_factor=h, noise=1.0, integral=integral, derivative=derivative)
+    result = _stationary_deviation(loop_factor=h, noise=1.0, integral=integral, derivative=derivative)
     # Some 1e5 independent squares: 1 % is four standard deviations.
-    assert found == pytest.approx(math.sqrt(squares / STEPS), rel=0.015)
+    assert result == pytest.approx(math.sqrt(squares / STEPS), rel=0.015)
 
 
 @pytest.mark.parametrize("h", [1.3, 1.7, 1.9])
@@ -124,8 +124,8 @@ def test_a_loop_that_turns_round_takes_its_derivative_of_amplitudes(h: float) ->
         seen = y + noise[k]
         y, before = h * (seen + q * (seen - before)) - y, seen
         squares += y * y
-    found = _stationary_deviation(loop_factor=h, noise=1.0, integral=0.3, derivative=q)
-    assert found == pytest.approx(math.sqrt(squares / STEPS), rel=0.03)
+    result = _stationary_deviation(loop_factor=h, noise=1.0, integral=0.3, derivative=q)
+    assert result == pytest.approx(math.sqrt(squares / STEPS), rel=0.03)
 
 
 def test_a_loop_beyond_its_limit_has_no_stationary_deviation() -> None:

@@ -34,8 +34,8 @@ def test_a_run_without_injections_and_one_with_too_many(scene: Scene, model: Bal
     [([1.0, 1e-3, 1e-9], "█▁▁"), ([0.0, 0.0], "▁▁"), ([1.0, 10**-1.5], "█▄"), ([], "")],
 )
 def test_bars_are_logarithmic_over_three_decades(values: list[float], bars: str) -> None:
-    found = _sparkline(np.array(values))
-    assert found == bars or (bars == "█▄" and found in {"█▄", "█▅"})
+    result = _sparkline(np.array(values))
+    assert result == bars or (bars == "█▄" and result in {"█▄", "█▅"})
 
 
 def test_what_the_scene_requires_and_a_settled_run_does_not_show(scene: Scene, model: BalancerModel) -> None:

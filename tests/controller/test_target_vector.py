@@ -65,12 +65,12 @@ def components(
     w[FIRST_CHAMBER + AT_RESIDUAL :: PER_CHAMBER] = at_residual or (False,) * chambers
     split(c, w, math.cos(angle), math.sin(angle), length)
     opened = w[FIRST_CHAMBER + OPEN_TIME :: PER_CHAMBER]
-    found = np.flatnonzero(opened)
-    if found.size < 2 < chambers:
+    result = np.flatnonzero(opened)
+    if result.size < 2 < chambers:
         before = nearest(c, math.cos(angle), math.sin(angle))
-        found = np.array([before, (before + 1) % chambers])
-    found = found[::-1] if chambers > 2 and found[1] - found[0] > chambers / 2 else found
-    return tuple((int(i), float(opened[i])) for i in found)
+        result = np.array([before, (before + 1) % chambers])
+    result = result[::-1] if chambers > 2 and result[1] - result[0] > chambers / 2 else result
+    return tuple((int(i), float(opened[i])) for i in result)
 
 
 def integral(state: Memory) -> float:

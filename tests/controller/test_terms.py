@@ -23,20 +23,20 @@ def test_a_term_with_numbers_is_modelled_however_small(
 ) -> None:
     """Of the 4 ms that Kc gives to the limit of 0.05 um."""
     run = simulate(with_tables(scene, gas={"valve_lag": lag}), model)
-    found = {term.term: term for term in run.models_used}
-    assert found["valve lag"].model == "pure delay, in injections"
-    assert found["valve lag"].estimated_contribution == pytest.approx(lag / 4e-3)
-    assert found["valve lag"].why.endswith(f"in the shortest injection that matters, 4 ms; {share}")
-    assert found["gas filling"].estimated_contribution is None
-    assert found["gas filling"].model == "left out"
-    assert found["loss of the tube"].model == "as in the law “paper”"
+    result = {term.term: term for term in run.models_used}
+    assert result["valve lag"].model == "pure delay, in injections"
+    assert result["valve lag"].estimated_contribution == pytest.approx(lag / 4e-3)
+    assert result["valve lag"].why.endswith(f"in the shortest injection that matters, 4 ms; {share}")
+    assert result["gas filling"].estimated_contribution is None
+    assert result["gas filling"].model == "left out"
+    assert result["loss of the tube"].model == "as in the law “paper”"
 
 
 def test_the_papers_law_has_no_mass_in_the_tube(scene: Scene, model: BalancerModel) -> None:
     trial = with_tables(scene, tolerance=1e-3, controller={"kind": "trial"})
-    found = {used.term: used for used in run_models(scene=trial, model=model)}
-    assert not found["tube inertia"].modelled
-    assert "no mass in the tube" in found["tube inertia"].why
+    result = {used.term: used for used in run_models(scene=trial, model=model)}
+    assert not result["tube inertia"].modelled
+    assert "no mass in the tube" in result["tube inertia"].why
     asked = {used.term: used for used in run_models(scene=trial, model=model, terms=["tube inertia"])}
     assert asked["tube inertia"].modelled
 
@@ -46,9 +46,9 @@ def test_a_law_without_forces_carries_no_terms(
 ) -> None:
     late = with_tables(scene, gas={"valve_lag": 50e-3})
     run = simulate(late, replace(model, name="constant", flow=laws["constant"]))
-    found = {term.term: term for term in run.models_used}
-    assert found["valve lag"].model == "not modelled in this version"
-    assert "no forces" in found["valve lag"].why
+    result = {term.term: term for term in run.models_used}
+    assert result["valve lag"].model == "not modelled in this version"
+    assert "no forces" in result["valve lag"].why
 
 
 @pytest.mark.parametrize("asked", [["gas filling"], ["valve lag"], ["surface tension"]])

@@ -94,10 +94,10 @@ def test_an_importer_in_c_has_the_bits_of_python(
     subprocess.run(command, cwd=tmp_path, check=True)
     asked = queries(law, 4000, outside=True)
     asked = asked[:, np.isfinite(asked).all(axis=0)]
-    found = ran(tmp_path / "host", compact, asked)
+    result = ran(tmp_path / "host", compact, asked)
     right = np.array(list(answers(compact, asked)))
-    assert found[:, 0].tobytes() == np.ascontiguousarray(right[:, 0]).tobytes()
-    assert np.array_equal(found[:, 1:], right[:, 1:])
+    assert result[:, 0].tobytes() == np.ascontiguousarray(right[:, 0]).tobytes()
+    assert np.array_equal(result[:, 1:], right[:, 1:])
 
 
 def ran(host: Path, law: CompactLaw, asked: FloatArray) -> FloatArray:

@@ -62,8 +62,8 @@ def test_c_has_the_bits_of_python_and_no_warning(tmp_path: Path, six: Both, flag
     right = np.array(list(answers(compact, asked)))
     assert set(right[:, 1].astype(int)) == {0, 1, 2, 3}
     assert set(right[:, 2].astype(int)) == {0, 1, 2, 4}
-    found = compiled_answers(tmp_path, compact, asked, *flags)
-    assert found[:, :4].tobytes() == right.tobytes()
+    result = compiled_answers(tmp_path, compact, asked, *flags)
+    assert result[:, :4].tobytes() == right.tobytes()
 
 
 def test_a_module_of_its_own_has_the_same_bits(six: Both) -> None:
@@ -73,8 +73,8 @@ def test_a_module_of_its_own_has_the_same_bits(six: Both) -> None:
     flow = module["flow"]
     assert callable(flow)
     asked = queries(law, 500)
-    found = [flow(x, p, y, primed) for x, y, p, primed in asked.T.tolist()]
-    assert np.array(found).tobytes() == np.array(list(answers(compact, asked))).tobytes()
+    result = [flow(x, p, y, primed) for x, y, p, primed in asked.T.tolist()]
+    assert np.array(result).tobytes() == np.array(list(answers(compact, asked))).tobytes()
 
 
 def test_a_table_says_its_units_and_its_error(six: Both) -> None:

@@ -64,9 +64,9 @@ class Machine:
     """Runs what it has parsed: assignments, IF, WHILE, RETURN and calls of numbers, truths and rows."""
 
     def __init__(self, text: str) -> None:
-        found = re.findall(r"^FUNCTION .*?^END_FUNCTION$", text, re.DOTALL | re.MULTILINE)
+        result = re.findall(r"^FUNCTION .*?^END_FUNCTION$", text, re.DOTALL | re.MULTILINE)
         # Functions of the law are the same in each block but for the lengths of their rows.
-        items = [_parsed(re.sub(r"0\.\.\d+", "0..9", each)) for each in found]
+        items = [_parsed(re.sub(r"0\.\.\d+", "0..9", each)) for each in result]
         self.functions = {str(item.name): item for item in items}
         self.arguments = {name: list(_arguments(item)) for name, item in self.functions.items()}
         self.operations = 0
@@ -126,10 +126,10 @@ class Machine:
             case "SimpleVariable":
                 return names[str(node.name)]
             case "MultiElementVariable":
-                found = names[str(node.name.name)]
+                result = names[str(node.name.name)]
                 for place in self._places(node, names):
-                    found = found[place]
-                return found
+                    result = result[place]
+                return result
             case "ParenthesizedExpression":
                 return self._value(node.expr, names)
             case "UnaryOperation":
@@ -179,8 +179,8 @@ def test_structured_text_has_the_bits_of_python(six: Both) -> None:
         state = "carries" if carries(row) else state
         outside = 0 if is_usual(compact.constants, query) else OUTSIDE
         operations.append((state, machine.operations - before - outside))
-        found = row[point.VELOCITY : point.PRIMED_AFTER + 1]
-        assert np.array(found).tobytes() == expected.tobytes()
+        result = row[point.VELOCITY : point.PRIMED_AFTER + 1]
+        assert np.array(result).tobytes() == expected.tobytes()
     for state, most in OPERATIONS:
         assert most - 25 < max(n for at, n in operations if at == state) <= most
 

@@ -128,8 +128,8 @@ def agree(curves: Sequence[Sequence[ScanLevel]]) -> int:
 
 
 def curve_of(balancer: Any) -> tuple[ScanLevel, ...]:
-    found = search(balancer, balancer.trials(), progress=lambda _: None)
-    curve = scanned(balancer, balancer.trials(), found, progress=lambda _: None)
+    result = search(balancer, balancer.trials(), progress=lambda _: None)
+    curve = scanned(balancer, balancer.trials(), result, progress=lambda _: None)
     assert curve is not None
     return curve.levels
 
@@ -139,18 +139,18 @@ def test_a_curve_is_the_best_whichever_level_it_starts_at(paper_scene: Scene) ->
     curves = [curve_of(Machine(at(paper_scene, each))) for each in (0.3, 0.42, 0.478, 0.7, 0.9)]
     assert agree(curves) >= 6
     for curve in curves:
-        found = {each.level: each.judgement.fraction.value for each in curve}
-        assert max(found, key=lambda level: found[level]) == BEST
-        assert found[0.62e6] == pytest.approx(0.97 - 1.5 * math.log(0.62 / 0.56), abs=0.06)
+        result = {each.level: each.judgement.fraction.value for each in curve}
+        assert max(result, key=lambda level: result[level]) == BEST
+        assert result[0.62e6] == pytest.approx(0.97 - 1.5 * math.log(0.62 / 0.56), abs=0.06)
 
 
 def test_what_is_chosen_is_judged_on_devices_that_chose_nothing(paper_scene: Scene) -> None:
     """A device that runs under many settings at one pressure has chosen between them."""
     machine = Machine(at(paper_scene, 0.7), needs=0.9)
-    found = tuned(cast("Any", machine), remedies=True)
-    assert found.recommended.verdict != "met"
-    assert found.along
-    best, others = found.remedies[0], found.remedies[1:]
+    result = tuned(cast("Any", machine), remedies=True)
+    assert result.recommended.verdict != "met"
+    assert result.along
+    best, others = result.remedies[0], result.remedies[1:]
     assert best.met
     chose = set()
     for number, ran in machine.ran.items():
@@ -160,13 +160,13 @@ def test_what_is_chosen_is_judged_on_devices_that_chose_nothing(paper_scene: Sce
         if max(map(len, settings.values())) > 3:
             chose.add(number)
     assert len(chose) >= 32
-    judged = [found.recommended, *(each.judgement for each in found.along)]
-    judged += [each.judgement for each in found.remedies]
+    judged = [result.recommended, *(each.judgement for each in result.along)]
+    judged += [each.judgement for each in result.remedies]
     for each in judged:
         assert each.outcomes.numbers
         assert not chose & set(each.outcomes.numbers)
     # Remedies that do not meet what is asked have not run on the devices that judge one that does.
-    assert min(found.recommended.outcomes.numbers) >= FIRST_VERDICT_DEVICE
+    assert min(result.recommended.outcomes.numbers) >= FIRST_VERDICT_DEVICE
     assert min(best.judgement.outcomes.numbers) >= FIRST_VERDICT_DEVICE
     beside = {bore for number in best.judgement.outcomes.numbers for bore, *_ in machine.ran[number]}
     missed = {each.changes["tube.bore"] for each in others if not each.met}
@@ -247,16 +247,16 @@ def test_only_a_kind_that_a_scene_gives_is_kept_beside_a_faster_one() -> None:
 
 def test_a_remedy_names_the_pressure_that_goes_with_it(paper_scene: Scene) -> None:
     """In the list, in JSON and in the sentence: settings found at another gas pressure need it."""
-    found = tuned(cast("Any", Machine(at(paper_scene, 0.7), needs=0.9)), remedies=True)
-    changes = found.remedies[0].changes
+    result = tuned(cast("Any", Machine(at(paper_scene, 0.7), needs=0.9)), remedies=True)
+    changes = result.remedies[0].changes
     assert changes == {"tube.bore": pytest.approx(changes["tube.bore"]), PRESSURE: BEST}
     assert changes["tube.bore"] < 1.6e-3
-    document = found.to_dict()["remedies"][0]
+    document = result.to_dict()["remedies"][0]
     assert document["changes"] == changes
     assert set(document["settings"]) == {"controller.gas_time_offset"}
-    (table,) = (each for each in found.rows().tables if "remedies" in each.caption.lower())
+    (table,) = (each for each in result.rows().tables if "remedies" in each.caption.lower())
     assert "gas.pressure 0.56 MPa" in str(table.rows[0][1])
-    (finding,) = (each for each in found.rows().findings if each.code == "remedy_meets")
+    (finding,) = (each for each in result.rows().findings if each.code == "remedy_meets")
     assert finding.changes == changes
 
 

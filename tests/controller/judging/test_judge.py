@@ -45,12 +45,12 @@ def test_the_settling_times_bound_is_covered(fraction: float, never: float) -> N
     """Exponential times of 128 devices, some of which never settle: one bound in 40 lies below the truth."""
     random = np.random.default_rng(7)
     truth = -math.log(1 - fraction / (1 - never))
-    found = []
+    result = []
     for _ in range(400):
         times = np.where(random.random(128) < never, math.inf, random.exponential(size=128))
         printed = judgement(times).settling_time(fraction)
-        found.append(printed is None or printed[1] >= truth)
-    assert 0.95 < np.mean(found) < 0.999
+        result.append(printed is None or printed[1] >= truth)
+    assert 0.95 < np.mean(result) < 0.999
 
 
 @pytest.mark.parametrize("fraction", [0.5, 0.9])

@@ -36,10 +36,10 @@ def test_indices_of_the_ishigami_function() -> None:
     drawn = places(count)
     x = [2 * math.pi * drawn[name] - math.pi for name in NAMES]
     y = np.sin(x[0]) + 7 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
-    found = [first_order_index(y, drawn[name]) for name in NAMES]
+    result = [first_order_index(y, drawn[name]) for name in NAMES]
     first = 0.3139 * (math.sin(math.pi / 8) / (math.pi / 8)) ** 2
     second = 0.4424 * (math.sin(math.pi / 4) / (math.pi / 4)) ** 2
-    assert found == pytest.approx([first, second, 0.0], abs=0.01)
+    assert result == pytest.approx([first, second, 0.0], abs=0.01)
 
 
 @pytest.mark.parametrize("count", [64, 1024])
@@ -55,9 +55,9 @@ def test_a_threshold_on_one_input_has_index_one_and_the_others_none(count: int) 
 def test_the_noise_of_an_index_is_what_chance_gives() -> None:
     drawn = [quantiles(f"x{i}", range(256), seed=1) for i in range(200)]
     y = np.random.default_rng(3).random(256) < 0.8
-    found = [first_order_index(y.astype(float), each) for each in drawn]
-    assert np.mean(found) == pytest.approx(0.0, abs=2e-3)
-    assert np.std(found) == pytest.approx(math.sqrt(14) / 256, rel=0.2)
+    result = [first_order_index(y.astype(float), each) for each in drawn]
+    assert np.mean(result) == pytest.approx(0.0, abs=2e-3)
+    assert np.std(result) == pytest.approx(math.sqrt(14) / 256, rel=0.2)
 
 
 class Named:
@@ -87,10 +87,10 @@ def test_what_decides_is_measured_where_it_can_be() -> None:
     """Met below 0.8 of one input: in its middle half, up to 0.75, by all devices."""
     drawn = places(256)
     balancer: Any = Named()
-    found = ranked(balancer, judgement(drawn["b"] < 0.8, drawn))
-    (best,) = found.worth_measuring
+    result = ranked(balancer, judgement(drawn["b"] < 0.8, drawn))
+    (best,) = result.worth_measuring
     assert (best.name, best.common, best.middle.value) == ("b", True, 1.0)
-    assert [each.code for each in found.findings()] == ["measure_input"]
+    assert [each.code for each in result.findings()] == ["measure_input"]
     alone = ranked(balancer, judgement(drawn["c"] < 0.8, drawn))
     assert alone.inputs[0].name == "c"
     assert alone.inputs[0].decides
@@ -104,9 +104,9 @@ def test_where_all_or_none_meet_time_or_amplitude_is_ranked() -> None:
     drawn = places(256)
     balancer: Any = Named()
     for settled, outcome in ((True, "settling_time"), (False, "final_amplitude")):
-        found = judgement(np.full(256, settled), drawn)
+        result = judgement(np.full(256, settled), drawn)
         ranks: dict[str, Any] = {outcome: drawn["a"]}
-        ranking = ranked(balancer, with_tables(found, outcomes=ranks))
+        ranking = ranked(balancer, with_tables(result, outcomes=ranks))
         best = ranking.inputs[0]
         assert (best.name, best.outcome) == ("a", outcome)
         assert best.index == pytest.approx(1 - 1 / 64, abs=0.01)
@@ -135,9 +135,9 @@ def test_both_parts_of_a_models_error_are_ranked_as_one() -> None:
 
     drawn = places(1024)
     balancer: Any = Paired()
-    found = judgement(np.full(1024, True), drawn)
+    result = judgement(np.full(1024, True), drawn)
     ranks: dict[str, Any] = {"settling_time": drawn["a"] + drawn["b"]}
-    ranking = ranked(balancer, with_tables(found, outcomes=ranks))
+    ranking = ranked(balancer, with_tables(result, outcomes=ranks))
     assert [each.name for each in ranking.inputs] == ["both", "c"]
     assert ranking.inputs[0].index == pytest.approx(1.0, abs=0.05)
 

@@ -86,11 +86,11 @@ def tried(paper_scene: Scene, *offered: Remedy) -> tuple[Remedied, ...]:
 def test_remedies_that_meet_come_first_with_the_smallest_change(paper_scene: Scene) -> None:
     """Of bores 0.7 settles 5/7, 0.5 all, and 0.35 is not tried; a limit of 2.2 times is a larger change."""
     rows = tried(paper_scene, bore(0.7), bore(0.5), bore(0.35), limit(1.2), limit(2.2), limit(4.0))
-    found = [(row.code, row.judgement.fraction.value, row.met) for row in rows]
+    result = [(row.code, row.judgement.fraction.value, row.met) for row in rows]
     assert [row.changes for row in rows[:2]] == [bore(0.5).changes, limit(2.2).changes]
-    assert [met for *_, met in found] == [True, True, False, False, False]
+    assert [met for *_, met in result] == [True, True, False, False, False]
     # Between a limit of 60 nm and 110 nm, 81 nm is tried too.
-    assert [value for *_, value, _ in found[2:]] == pytest.approx([0.81, 5 / 7, 0.6], abs=0.02)
+    assert [value for *_, value, _ in result[2:]] == pytest.approx([0.81, 5 / 7, 0.6], abs=0.02)
     assert len(rows) == 5
 
 
@@ -137,8 +137,8 @@ def test_the_amplitude_that_is_surely_reached() -> None:
         ended=("",) * 64,
     )
     demands = (settles_within(1.0, stated=False),)
-    found = Judgement(settings={}, required_fraction=0.9, demands=demands, outcomes=outcomes)
-    assert found.amplitude_reached == pytest.approx(q[62])
+    result = Judgement(settings={}, required_fraction=0.9, demands=demands, outcomes=outcomes)
+    assert result.amplitude_reached == pytest.approx(q[62])
 
 
 def test_a_device_keeps_its_inputs_under_a_remedy(paper_scene: Scene) -> None:
@@ -176,16 +176,16 @@ def test_remedies_are_offered_where_they_have_a_meaning(paper_scene: Scene) -> N
 
 def test_a_crest_too_low_is_moved_inwards(paper_scene: Scene) -> None:
     low = paper_scene.with_values({"tube.hump_radius": "44 mm"})
-    found = [each.changes for each in remedies_of(low, paper_model(low)) if each.code == "crest"]
-    assert len(found) == 3
-    for changes in found:
+    result = [each.changes for each in remedies_of(low, paper_model(low)) if each.code == "crest"]
+    assert len(result) == 3
+    for changes in result:
         assert low.with_values(changes).tube.hump_radius == changes["tube.hump_radius"] < 0.0375
 
 
 def test_the_bundled_complete_machine_meets_what_it_requires() -> None:
     """With its own valve and settings, on devices that these were not chosen on."""
     balancer = balancer_of(load_scene(bundled_scene("grinding_spindle")))
-    found = judged(balancer, {}, most=64)
-    assert found.verdict == "met"
-    assert found.demands[0].stated
+    result = judged(balancer, {}, most=64)
+    assert result.verdict == "met"
+    assert result.demands[0].stated
     assert balancer.choices() == ()

@@ -124,9 +124,9 @@ def test_what_cannot_settle_is_not_run() -> None:
 
 def test_the_search_finds_the_settings_of_another_balancer() -> None:
     balancer = BallBalancer(scene_as(BallScene, scene_from(content=EXAMPLE, file="balls.toml")))
-    found = search(balancer, balancer.trials(), progress=lambda _: None)
-    assert found[0].count == max(each.count for each in found)
-    assert searched(balancer) == found[0].candidate.settings
+    result = search(balancer, balancer.trials(), progress=lambda _: None)
+    assert result[0].count == max(each.count for each in result)
+    assert searched(balancer) == result[0].candidate.settings
 
 
 def test_six_chambers_work_with_settings_of_their_own_and_with_those_that_the_command_saves(

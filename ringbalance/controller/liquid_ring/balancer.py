@@ -187,6 +187,7 @@ class LiquidRingBalancer(Balancer):
         return trials(self.scene, self.model, limit=self.limit)
 
     def remedies(self) -> tuple[Remedy, ...]:
+        """Changes of the scene that may help, those of one kind with the smallest first."""
         return remedies_of(self.scene, self.model)
 
     def choices(self) -> tuple[Remedy, ...]:
@@ -194,9 +195,11 @@ class LiquidRingBalancer(Balancer):
         return valves_of(self.scene)
 
     def drawn_input(self, name: str) -> DrawnInput:
+        """Kind of a drawn input."""
         return drawn_input(name)
 
     def on_scene(self, scene: SceneFile) -> LiquidRingBalancer:
+        """Balancer of another scene, with these options."""
         return replace(self, scene=liquid_ring_scene(scene))
 
     @property
@@ -254,6 +257,7 @@ class LiquidRingBalancer(Balancer):
         )
 
     def rotor(self, number: int | None = None) -> CommonRotor:
+        """Rotor of the scene, or of a drawn device."""
         scene = self.scene if number is None else self._drawn_runs.device(number).scene
         return CommonRotor(
             source=scene.source,
@@ -293,17 +297,21 @@ class LiquidRingBalancer(Balancer):
         return replace(self, scene=scene, rotors=rotors)
 
     def sampling_time(self) -> float:
+        """Period of the controller, s."""
         return self.scene.controller.period
 
     def lasting(self, span: float) -> LiquidRingBalancer:
+        """Balancer with runs of a duration, s, that continue when they have settled."""
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
     def information(self, scene: SceneFile) -> Information:
+        """Loop factor and margins without a run, and the spread of the devices."""
         loop = loop_information(liquid_ring_scene(scene), self.model)
         return replace(loop, document={**loop.document, "drawn": self._drawn_runs.spread.document()})
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:
+        """Findings on liquid that a machine moves beyond the fills at which runs end."""
         return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended, settings=settings))
 
     def quantities(self) -> tuple[Quantity, ...]:
@@ -311,10 +319,12 @@ class LiquidRingBalancer(Balancer):
         return calibrate(self.scene).rows().quantities
 
     def rows(self, run: Simulation) -> Rows:
+        """Rows of a run, with its ends under both limits of an unknown gas line."""
         rows = run.rows()
         return replace(rows, tables=(line_runs_table(line_runs(run)), *rows.tables))
 
     def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:
+        """Histories of a run by the name of their column."""
         return simulation_history(run)
 
 

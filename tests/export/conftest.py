@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final, cast
 
 import pytest
@@ -28,8 +29,9 @@ FAN: Final = {
 """A slow disc, in which gravity counts, and whose tube is not the same both ways."""
 
 
+@cache
 def both_laws(name: str) -> Both:
-    """Of a bundled scene, or of "fan"."""
+    """Calibrated law of a bundled scene, or of "fan", and its compact form."""
     scene = cast(Scene, rb.load_scene(rb.bundled_scene("six_chamber" if name == "fan" else name)))
     if name == "fan":
         scene = scene.with_values(FAN)

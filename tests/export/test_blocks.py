@@ -6,6 +6,7 @@ import csv
 import shutil
 import subprocess
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import cast
 
@@ -19,6 +20,7 @@ from ringbalance.export import disc
 from ringbalance.export.blocks import Block, controller_block, disc_block
 from ringbalance.export.hosts import c_files, python_files, st_files
 from ringbalance.export.reference import reference_files
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.pieces.point import BLOCK
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
@@ -36,6 +38,12 @@ def exact_scene(name: str, values: Mapping[str, str]) -> Scene:
     """A bundled scene whose sensor is exact, with other values."""
     quiet = {"sensor.amplitude_noise": "0 m", "sensor.phase_noise": "0 deg"}
     return cast(Scene, rb.load_scene(rb.bundled_scene(name)).with_values({**quiet, **values}))
+
+
+@cache
+def law_of(name: str) -> CalibratedLaw:
+    """The law of a bundled scene, which no setting of its controller changes."""
+    return rb.calibrate(exact_scene(name, {})).flow_law
 
 
 def loop_in_c(folder: Path, disc: Block, controller: Block, *, samples: int, longest: float) -> FloatArray:
@@ -92,8 +100,7 @@ def test_in_c_they_run_as_the_programs_own_loop(
     Nobody tells the controller of that: it sees what the vibration does.  The law-based one has to learn
     another influence coefficient, or to bring a pair to its end.
     """
-    scene = exact_scene(name, values)
-    law = rb.calibrate(scene).flow_law
+    scene, law = exact_scene(name, values), law_of(name)
     gas = scene.gas
     line = {"gas filling": gas.conductance, "valve lag": gas.valve_lag}
     own = rb.simulate(
@@ -155,7 +162,7 @@ def test_the_controller_passes_over_what_is_no_number_and_forgets_nothing(blocks
 
 def test_a_gas_line_too_fast_for_a_hosts_steps_is_refused() -> None:
     """A step of 10 ms takes at most 10,000 parts."""
-    law = rb.calibrate(exact_scene("grinding_spindle", {})).flow_law
+    law = law_of("grinding_spindle")
     with pytest.raises(SceneError, match=r"time constant of .* too short for a host's steps"):
         disc_block(exact_scene("grinding_spindle", {"gas.conductance": "1e5 l/(s*bar)"}), law)
     for conductance in ("1 l/(s*bar)", "30 l/(s*bar)"):

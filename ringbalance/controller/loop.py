@@ -70,11 +70,11 @@ def simulate(
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_ring(scene)
-    if (model is None) == (flow_law is None):
+    balancer = model if flow_law is None else BalancerModel.of(flow_law)
+    if balancer is None or (model is not None and flow_law is not None):
         raise ValueError(
             "give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither"
         )
-    balancer = BalancerModel.of(flow_law) if model is None else model
     check_fit(scene, balancer)
     used = run_models(scene=scene, model=balancer, terms=modelled)
     residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill

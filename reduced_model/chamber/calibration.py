@@ -32,7 +32,7 @@ ROUND_OFF: Final = 16 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Curve:
+class FillCurve:
     """One quantity over the fill ratio: values, their half-widths by cause, and a smooth table.
 
     Arrays run along `ChamberCalibration.fill_ratio`, whose first entries are the table's nodes.
@@ -111,11 +111,11 @@ class ChamberCalibration:
     """0, 0.05, ... max_fill_ratio."""
     reported: tuple[int, ...]
     """Indices of `reported_fill_ratio` in `fill_ratio`."""
-    wall_pressure: Curve
+    wall_pressure: FillCurve
     """Liquid part, mean over the outer wall, Pa: a load."""
-    hydrostatic_pressure: Curve
+    hydrostatic_pressure: FillCurve
     """Liquid part at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa: what drives the tube."""
-    moment: Curve
+    moment: FillCurve
     """U, kg m."""
     moment_per_mass: Estimate
     """lambda at equal fills, per transferred mass, m, shape (); half-width without the inputs."""
@@ -184,13 +184,13 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
         )
         return excess, _first(ring.status, contradicted, waves)
 
-    def curve(quantity: str, share: str) -> Curve:
+    def curve(quantity: str, share: str) -> FillCurve:
         estimate: Estimate = getattr(ring, quantity)
         value, (excess, status) = estimate.value, checked_by(quantity)
         at_nodes, level = value[: nodes.size], quantity == "hydrostatic_pressure"
         table, missed = pressure_table(scene, nodes, at_nodes) if level else _even_table(nodes, at_nodes)
         inputs = (getattr(each, quantity) ** 2 for each in effects.values())
-        return Curve(
+        return FillCurve(
             value=value,
             numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
             unmodelled=unmodelled[share] * np.abs(value),

@@ -25,7 +25,7 @@ from ringbalance.design.hunt import Static, hunt
 from ringbalance.design.races import RacedDesign, Races, deal
 from ringbalance.design.racing import DEVICES, devices_row, judged_design
 from ringbalance.design.space import Space
-from ringbalance.design.static import reach_of, static_rows
+from ringbalance.design.static import row_reach, static_rows
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
@@ -173,7 +173,7 @@ def run_design(
             doubt = (share.high - share.low) / 2 / rise if rise > 0 else None
     reach, smaller, ranking = None, None, Ranking()
     if best is not None:
-        reach = reach_of(static_rows(space.scene, [best.point], intervals=False)[0])
+        reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])
         below = [each for each in judged if each.size < best.size]
         if space.sized and below:
             next_smaller = max(below, key=lambda each: each.size)

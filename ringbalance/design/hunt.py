@@ -25,7 +25,7 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.design.axes import Point
 from ringbalance.design.races import Points, RacedDesign, Races, ReportProgress, threshold
 from ringbalance.design.space import Space
-from ringbalance.design.static import reach_of
+from ringbalance.design.static import row_reach
 from ringbalance.design.surface import Surface
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.registry import registered
@@ -165,7 +165,7 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
         chosen = able.some(order[:_FIRST_SMALLEST] + [rest[i] for i in spread])
     races.report_progress(f"{len(chosen.points)} of {len(order)} designs that can work, few devices each")
     races.race(chosen, [None] * len(chosen.points))
-    reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") for row in rows]
+    reach = [(row_reach(row) or 0.0) * (row["status"] == "ok") for row in rows]
     best = int(np.argmax(reach))
     static = Static(
         points=len(points),

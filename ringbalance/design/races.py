@@ -16,7 +16,7 @@ from ringbalance.controller.trials import Trials
 from ringbalance.design.axes import Point
 from ringbalance.design.racing import DEVICES, GridPoint, Race, near, race
 from ringbalance.design.space import Space
-from ringbalance.design.static import Record, reach_of, static_rows
+from ringbalance.design.static import Record, row_reach, static_rows
 from ringbalance.design.surface import Surface
 from ringbalance.results.requirements import MET, Proportion
 from ringbalance.scene.arrays import FloatArray
@@ -115,7 +115,7 @@ class Races:
         """Keep the points that can work. Args: `shares`: in the unit cube. `rows`: answers without a run."""
         points = self.space.points(shares)
         rows = self.answered(points) if rows is None else rows
-        reach = [(reach_of(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
+        reach = [(row_reach(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
         chosen = [i for i, each in enumerate(reach) if each >= self.least]
         return Points(
             shares=shares[chosen], points=[points[i] for i in chosen], reach=np.array(reach)[chosen]

@@ -71,7 +71,7 @@ BREAKDOWNS: Final = (ValueError, ArithmeticError, RuntimeError)
 """Exceptions besides `SceneError` with which a point may break down."""
 
 
-def reach_of(row: Record) -> float | None:
+def row_reach(row: Record) -> float | None:
     """Unbalance that a design cancels in any direction, kg m, of its static row; None: not known."""
     reach: float | None = row["values"].get("reach", (None,))[0]
     return reach

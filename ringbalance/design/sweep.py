@@ -16,7 +16,7 @@ import numpy as np
 
 from ringbalance.design.axes import Plan, Point, SweepAxis, unit_of_path
 from ringbalance.design.sensitivity import first_order, total_order
-from ringbalance.design.static import EMPTY, Record, content_of, reach_of, static_rows
+from ringbalance.design.static import EMPTY, Record, content_of, row_reach, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
 from ringbalance.results.numbers import format_given, percent
@@ -134,7 +134,7 @@ class Sweep(Result):
             ranked = [(each["settling_time"], i) for i, each in enumerate(self.driven)]
         else:
             # The reach decides between rows with a flow; of other balancers nothing is judged without runs.
-            ranked = [(reach_of(row), i) for i, row in enumerate(self.static) if self._flows]
+            ranked = [(row_reach(row), i) for i, row in enumerate(self.static) if self._flows]
             ranked = [(None if value is None else -value, i) for value, i in ranked]
         return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
 

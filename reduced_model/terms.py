@@ -75,13 +75,14 @@ class Term(NamedTuple):
         return f"{self.formula}; {text}"
 
 
-def terms_of(scene: Scene) -> Iterator[Term]:
+def terms_of(scene: Scene, *, injections_only: bool = False) -> Iterator[Term]:
     """Estimate every term of a scene, those of chamber, tube and injection, in the order of `models_used`.
 
     Those of chamber and tube are part of a flow law; those of an injection go beyond it.
     """
-    yield from _chamber_terms(scene)
-    yield from _tube_terms(scene)
+    if not injections_only:
+        yield from _chamber_terms(scene)
+        yield from _tube_terms(scene)
     yield from _injection_terms(scene)
     yield _lifted_liquid(scene)
 
@@ -253,6 +254,7 @@ def models_used(
     law: str = CALIBRATED,
     obstacles: Mapping[str, str] = MappingProxyType({}),
     selected: Collection[str] | None = None,
+    injections_only: bool = False,
 ) -> tuple[ModelUsed, ...]:
     """Model of every term of a scene, with the reason: chamber, tube, injection.
 
@@ -260,9 +262,10 @@ def models_used(
         law: name of the flow law; any but the calibrated one has its own models of chamber and tube.
         obstacles: why the flow law cannot carry a term of an injection, by term.
         selected: the terms of an injection to model; None: all.
+        injections_only: true if the terms of chamber and tube are neither estimated nor listed.
     """
     rows = []
-    for term in terms_of(scene):
+    for term in terms_of(scene, injections_only=injections_only):
         remark, counts = term.remark, term.value is not None and term.value > 0
         if not term.model:
             counts = term.value is not None and term.value > scene.tolerance

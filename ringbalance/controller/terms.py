@@ -41,7 +41,7 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
 
 def run_terms(*, scene: Scene, model: BalancerModel) -> tuple[str, ...]:
     """`terms_modelled` of runs of a scene; estimates nothing of chamber and tube."""
-    used = models_used(scene, law=model.name, obstacles=_obstacles(model), parts=("injection",))
+    used = models_used(scene, law=model.name, obstacles=_obstacles(model), injections_only=True)
     return terms_modelled(used)
 
 

@@ -180,7 +180,7 @@ def _flowing(
     head = scene.liquid.density * velocity**2 / 2
     if cavity is not None and terms is not None:
         return _separated(scene, path, tube, terms, ends, cavity, head, points)
-    at = Places.along(tube=tube, points=points)
+    at = Places.even(tube=tube, points=points)
     lost = 0.0 if terms is None else head * at.loss_before(tube=tube, state=terms)
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share))
     return _Line(
@@ -210,10 +210,10 @@ def _separated(
             top - column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share)) + head * lost
         )
 
-    first = Places.along(tube=tube, points=points)
+    first = Places.even(tube=tube, points=points)
     crest = lowest_place(tube, float(terms.spread_loss) * head / scene.liquid.density, scene.rotor.speed**2)
     again = 1.0 if discharges_openly(path, ends) else _full_again(first, behind, cavity, crest)
-    at = Places.along(tube=tube, points=points, doubled=(crest, again))
+    at = Places.even(tube=tube, points=points, doubled=(crest, again))
     from_top = ends.upstream_pressure() - column_pressure(
         scene=scene, radius=path_radius(tube=tube, share=at.share)
     )
@@ -250,13 +250,13 @@ def _blocked(scene: Scene, law: CalibratedLaw, ends: TubeEnds, primed: bool, poi
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
     is_open = discharges_openly(path, ends)
     if not path.crest:
-        at = Places.along(tube=scene.tube, points=points, doubled=(0.5,))
+        at = Places.even(tube=scene.tube, points=points, doubled=(0.5,))
         first = (at.share < 0.5) | ((at.share == 0.5) & ~at.after)
         pressure = np.where(first, near, far) - path.port_pressure
         return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
     cavity = float(cavity_pressure(path, ends)) if primed and is_covered else None
     first, last, between = _rest(scene, path, ends, cavity)
-    at = Places.along(tube=scene.tube, points=points, doubled=(first, last))
+    at = Places.even(tube=scene.tube, points=points, doubled=(first, last))
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
     in_near = ((at.share < first) | ((at.share == first) & ~at.after)) & is_covered
     in_far = ((at.share > last) | ((at.share == last) & at.after)) & (not is_open)

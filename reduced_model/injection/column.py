@@ -33,7 +33,7 @@ from ringbalance.reduced_model.tube.regime import CLEARING, cleared, crest_margi
 from ringbalance.scene.platform.compiled import in_place, inlined
 
 Four = tuple[float, float, float, float]
-_SLOWEST: Final = 1e-150
+_SLOWEST_M_S: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""
 _SEPARATED: Final = int(Regime.SEPARATED)
 _SLOW_FROUDE: Final = CLEARING[0]
@@ -48,22 +48,22 @@ def tabled(
 ) -> tuple[float, float, bool, bool]:
     """Flow by a law that gives velocities alone.
 
-    Returns: velocity out of chamber 0, m/s, and its slope over x; whether the tube holds a column afterwards;
-    whether the flow is separated at the crest.
+    Returns: velocity out of chamber 0, m/s, and its slope over x; true if the tube holds a column afterwards;
+    true if the flow is separated at the crest.
     """
     # The tables count from the chamber with gas.
     back = q > p
     which = (0 if max(p, q) > 0.0 else 2) + (0 if primed else 1)
     driven = plant.total - x if back else x
-    place = (driven - plant.lowest_fill) * plant.cells_per_fill
-    cell = min(max(math.floor(place), 0), PIECES - 1)
+    position = (driven - plant.lowest_fill) * plant.cells_per_fill
+    cell = min(max(math.floor(position), 0), PIECES - 1)
     c = plant.rows[which * PIECES + cell]
-    t = min(max(place - cell, 0.0), 1.0)
+    t = min(max(position - cell, 0.0), 1.0)
     square = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
     faster = math.exp(log_speed)
     speed = math.copysign(math.sqrt(abs(square)), square) * faster
     slope = (c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])) * plant.cells_per_fill
-    slope *= 0.5 * faster * faster / max(abs(speed), _SLOWEST)
+    slope *= 0.5 * faster * faster / max(abs(speed), _SLOWEST_M_S)
     return -speed if back else speed, slope, c[4] > 0.0, c[5] == _SEPARATED
 
 
@@ -88,7 +88,7 @@ def law_speed(speed: float, log_speed: float) -> float:
 @inlined
 def tube_loss(plant: Record, which: int, speed: float, of_law: float) -> tuple[float, float]:
     """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
-    if abs(speed) < _SLOWEST:
+    if abs(speed) < _SLOWEST_M_S:
         return 0.0, 0.0
     root, growth = root_of_velocity(plant.root_cells[which], plant.roots, plant.rows, which, of_law)
     fourth = root * root * root * root
@@ -120,13 +120,13 @@ def _allowed(plant: Record, at: Four) -> bool:
 
 @in_place
 def can_flow(plant: Record, at: Four, primed: bool) -> bool:
-    """Whether liquid flows, by the law's conditions."""
+    """True if liquid flows, by the law's conditions."""
     return bool(_allowed(plant, at) and regime.can_flow(plant, at, primed))
 
 
 @in_place
 def holds_at_rest(plant: Record, at: Four, primed: bool) -> bool:
-    """Whether a column in which nothing flows is still there; a one-way law has none."""
+    """True if a column in which nothing flows stays; a one-way law has none."""
     return bool(not plant.one_way and regime.holds_at_rest(plant, at, primed))
 
 
@@ -148,8 +148,8 @@ def _crest_margin(
     primed: bool,
     log_speed: float,
 ) -> tuple[float, float, float]:
-    """What drives a separated column, Pa, how far the gas over the crest is carried out, and the derivative
-    of the former by the gas margin beyond 1 - the latter."""
+    """Pressure that drives a separated column, Pa; fraction of the gas over the crest that is carried out;
+    derivative of the former by the gas margin beyond 1 - the latter."""
     primed_margin, gas_margin = crest_margins(plant, at)
     if primed:
         return primed_margin, 1.0, 0.0
@@ -172,7 +172,7 @@ def _directed(
     primed: bool,
     log_speed: float,
 ) -> tuple[float, bool]:
-    """Velocity of flow in one direction, and whether the column is separated."""
+    """Velocity of flow in one direction, and true if the column is separated."""
     if not can_flow(plant, at, primed):
         return 0.0, False
     full = quasi_steady(plant, SIPHON, driving_pressure(plant, at), log_speed)
@@ -187,7 +187,7 @@ def _directed(
 def steady(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
 ) -> tuple[float, bool]:
-    """Velocity without inertia, m/s out of chamber 0, and whether the column is separated."""
+    """Velocity without inertia, m/s out of chamber 0, and true if the column is separated."""
     if plant.tabled:
         flow = tabled(plant, x, p, q, primed, log_speed)
         return flow[0], flow[3]
@@ -202,7 +202,7 @@ def steady(
 def holds(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
 ) -> bool:
-    """Whether the tube holds a column after the flow without inertia, or at rest."""
+    """True if the tube holds a column after the flow without inertia, or at rest."""
     if plant.tabled:
         return tabled(plant, x, p, q, primed, log_speed)[2]
     at = ends(plant, x, opposite, p, q, 1)
@@ -216,10 +216,7 @@ def holds(
 
 @in_place
 def clearance(plant: Record, at: Four, direction: int, log_speed: float) -> float:
-    """What an unprimed tube has beyond the flow that carries the gas over its crest out.
-
-    Returns: Pressure over rho, m^2/s^2.
-    """
+    """Pressure over rho, m^2/s^2, beyond that of the flow that carries the gas over an unprimed crest out."""
     half = _HALF_CLEARED * plant.froude_velocity
     if half == 0.0:
         return math.inf
@@ -240,7 +237,7 @@ def _fills(
     primed: bool,
     log_speed: float,
 ) -> bool:
-    """Whether a column that flows is a continuous one: gas carried out, no cavity open to the port."""
+    """True if a column that flows is continuous: gas carried out, no cavity open to the port."""
     if not plant.crest:
         return True
     which, driving = crest_table(plant, direction), driving_pressure(plant, at)
@@ -262,7 +259,7 @@ def accelerations(
     primed: bool,
     log_speed: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Of the full column and of the separated one, along their own direction, m/s^2.
+    """Accelerations of the full column and of the separated one along their direction, m/s^2.
 
     The speed may be just below zero, within the step that brings the column to rest.
     Returns: the two, then the derivatives of the smaller one by the speed, by the pressure upstream (of gas
@@ -303,7 +300,7 @@ def crest_slopes(plant: Record, at: Four) -> tuple[float, float, float]:
 
 @in_place
 def open_to_gas(plant: Record, at: Four) -> bool:
-    """Whether its liquid leaves the upstream port open, or flow is ruled out without gas."""
+    """True if its liquid leaves the upstream port open, or flow is ruled out without gas."""
     if plant.tabled:
         return False
     return bool(at[2] < plant.port_pressure or not _allowed(plant, at))
@@ -373,6 +370,6 @@ def line_rates(
 
 @in_place
 def near_end(plant: Record, motion: Record, chamber: int) -> bool:
-    """Whether a gas has the pressure that it tends to."""
+    """True if a gas has the pressure that it tends to."""
     end = end_pressure(plant, motion.valve_0 > 0 if chamber == 0 else motion.valve_1 > 0)
     return bool(abs(motion.state[P + chamber] - end) <= _AT_REST * end)

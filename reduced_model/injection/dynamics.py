@@ -1,4 +1,4 @@
-"""What moves the liquid of a pair: a law's column, gas lines and valves, as a record for compiled code."""
+"""Column, gas lines and valves, which move the liquid of a pair, as a record for compiled code."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from ringbalance.scene.models import Scene, Tube
 
 
 class Event(StrEnum):
-    """What ended the flow before its time."""
+    """Event that ended a flow before its time."""
 
     NONE = "none"
     BLOCKED = "blocked"
@@ -55,9 +55,9 @@ Record = Any
 """One element of an array with one of the types below; compiled code changes it in place."""
 
 FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
-"""Whether gas is on and the tube primed, in the tables of a law that gives velocities alone."""
+"""Gas on and tube primed, or not, in the tables of a law that gives velocities alone."""
 PIECES: Final = 4096
-"""Of each of these tables."""
+"""Pieces of each table in `FLOWS`."""
 NUMBERS: Final = 4352
 """Room for the numbers of a law, fixed, so that compiled code serves every law."""
 WAYS: Final = 3
@@ -99,7 +99,7 @@ _PLANT_REAL: Final = (
     "moment_step",  # between the nodes of the moment, in x
 )
 _PLANT_WHOLE: Final = (
-    "crest",  # whether there is one
+    "crest",  # whether the tube has one
     "trapped",
     "one_way",  # whether liquid leaves only a chamber with gas or a high level, as under the paper's Eq. 19
     "inertia",
@@ -191,7 +191,7 @@ class Lift:
 
     @classmethod
     def of(cls, scene: Scene, *, law: FlowLaw) -> Lift | None:
-        """What liquid meets on its way up to the crest; None without one, or under a law that has none."""
+        """Make the tube up to the crest at equal fills; None without a crest, or under a law without one."""
         tube = scene.tube
         if tube.hump_radius is None or not isinstance(law, CalibratedLaw):
             return None
@@ -201,7 +201,7 @@ class Lift:
 
     @classmethod
     def at(cls, scene: Scene, velocity: FloatArray) -> Lift:
-        """The same with the velocity of a full tube at equal fills, m/s, of many designs too."""
+        """Make the tube up to the crest. Args: `velocity`: of a full tube at equal fills, m/s, by design."""
         tube = scene.tube
         crest = 0.0 if tube.hump_radius is None else tube.hump_radius
         straight = 0.0 if tube.hump_shape == "arc" else 2 * crest / (tube.port_radius + crest)
@@ -210,34 +210,56 @@ class Lift:
 
 
 def gives_forces(law: FlowLaw) -> bool:
-    """Whether a law knows the forces on the column, which terms beyond its velocity need."""
+    """True if a law knows the forces on the column, which terms beyond its velocity need."""
     return isinstance(law, CalibratedLaw | PaperLaw)
 
 
 RELATIVE_ERROR: Final = 1e-9
-"""Of each state, allowed to one step of a single run."""
+"""Relative error of each state, allowed to one step of a single run."""
 MOST_STEPS: Final = 200_000
 """Within one interval of time."""
-_FIRST_STEP: Final = 1e-4
+_FIRST_STEP_S: Final = 1e-4
 """s, at the most after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
 _NO_HEADS: Final = np.array([1e-12, 2e-12])
 """Eighth roots of heads, above which a table goes on with one ratio."""
+_OF_PATH: Final = (
+    "density",
+    "port_pressure",
+    "column_pressure",
+    "vapour_pressure",
+    "trapped",
+    "released",
+    "froude_velocity",
+    "crest",
+)
+_OF_DYNAMICS: Final = (
+    "gas_off",
+    "inertia",
+    "valve_lag",
+    "gas_pressure",
+    "ambient_pressure",
+    "dead_volume",
+    "tube_area",
+    "chamber_volume",
+    "max_fill_ratio",
+    "residual",
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dynamics:
-    """What moves the liquid of a pair: its flow law, and the terms that the law does not know."""
+    """Flow law of a pair, and the terms that the law does not know."""
 
     law: FlowLaw
     tube: Tube
     inertia: bool
-    """Whether the liquid in the tube has mass."""
+    """True if the liquid in the tube has mass."""
     line: GasLine | None
     """Valve and line of each chamber; None: gas fills and vents at once."""
     valve_lag: float
     """s."""
     gas_pressure: float
-    """Of the supply, gauge, Pa."""
+    """Gauge pressure of the supply, Pa."""
     ambient_pressure: float
     """Absolute, Pa."""
     dead_volume: float
@@ -255,7 +277,7 @@ class Dynamics:
     gas_off: float = 0.0
     """Gauge, Pa, at or below which a chamber counts as without gas under a one-way law."""
     relative_error: float = RELATIVE_ERROR
-    """Of each state, allowed to one step."""
+    """Relative error of each state, allowed to one step."""
 
     @classmethod
     def of(
@@ -289,7 +311,7 @@ class Dynamics:
 
     @property
     def quasi_steady(self) -> bool:
-        """Whether the flow law alone moves the liquid."""
+        """True if the flow law alone moves the liquid."""
         return not self.inertia and self.line is None and self.valve_lag == 0 and self.lift is None
 
     def plant(self, *, total: float, relative_error: float | None = None) -> npt.NDArray[np.void]:
@@ -299,75 +321,50 @@ class Dynamics:
         return plant
 
     def fill(self, plant: npt.NDArray[np.void], *, total: float, relative_error: float | None = None) -> None:
-        """The same into a record of zeros, shape (1,)."""
-        _fill(plant, self, total, self.relative_error if relative_error is None else relative_error)
+        """Write the plant into a record of zeros, shape (1,)."""
+        error = self.relative_error if relative_error is None else relative_error
+        for name in _OF_DYNAMICS:
+            plant[name] = getattr(self, name)
+        plant["total"], plant["relative_error"], plant["most_steps"] = total, error, MOST_STEPS
+        plant["first_step"] = _FIRST_STEP_S * (error / RELATIVE_ERROR) ** 0.25
+        law, length, line = self.law, self.tube.length, self.line
+        plant["length"], plant["hold_up"] = length, self.tube_area * length / self.chamber_volume
+        plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
+        if line is not None:
+            plant["line"], plant["temperature"] = True, line.temperature
+            warm = math.sqrt(line.temperature / REFERENCE_TEMPERATURE_K)
+            plant["critical_ratio"] = line.critical_ratio
+            plant["passing"] = line.conductance * REFERENCE_PRESSURE_PA * warm
+            plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
+        # Without a path of the law's own: no crest, and the port always covered.
+        plant["density"], plant["gas_factor"], plant["column_pressure"] = 1.0, 1.0, math.inf
+        plant["crest_end"], plant["return_crest_end"] = 1.0, 1.0
+        if isinstance(law, CalibratedLaw):
+            for name in _OF_PATH:
+                plant[name] = getattr(law.path, name)
+            if not law.path.crest:
+                plant["column_pressure"] = math.inf
+            plant["gas_factor"] = law.gas_factor
+            start, end = crest_span(self.tube)
+            plant["crest_end"], plant["return_crest_end"] = end, 1 - start
+            _fill_rows(plant, len(law.heads.tables), *law.constants)
+        elif isinstance(law, PaperLaw):
+            _fill_paper(plant, law)
+        else:
+            _fill_velocities(plant, law)
+        if self.lift is not None and plant["crest"]:
+            plant["lifts"] = True
+            plant["lift_straight"], plant["lift_entrance"] = self.lift.straight, self.lift.entrance
 
     @cached_property
     def _plants(self) -> dict[float, npt.NDArray[np.void]]:
         return {}
 
     def kept_plant(self, *, total: float) -> npt.NDArray[np.void]:
-        """The same, made once."""
+        """`plant`, made once for each sum of fill ratios."""
         if total not in self._plants:
             self._plants[total] = self.plant(total=total)
         return self._plants[total]
-
-
-_OF_PATH: Final = (
-    "density",
-    "port_pressure",
-    "column_pressure",
-    "vapour_pressure",
-    "trapped",
-    "released",
-    "froude_velocity",
-    "crest",
-)
-_OF_DYNAMICS: Final = (
-    "gas_off",
-    "inertia",
-    "valve_lag",
-    "gas_pressure",
-    "ambient_pressure",
-    "dead_volume",
-    "tube_area",
-    "chamber_volume",
-    "max_fill_ratio",
-    "residual",
-)
-
-
-def _fill(plant: npt.NDArray[np.void], dynamics: Dynamics, total: float, relative_error: float) -> None:
-    for name in _OF_DYNAMICS:
-        plant[name] = getattr(dynamics, name)
-    plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
-    plant["first_step"] = _FIRST_STEP * (relative_error / RELATIVE_ERROR) ** 0.25
-    law, length = dynamics.law, dynamics.tube.length
-    plant["length"], plant["hold_up"] = length, dynamics.tube_area * length / dynamics.chamber_volume
-    # Without a path of the law's own: no crest, and the port always covered.
-    plant["density"], plant["gas_factor"], plant["column_pressure"] = 1.0, 1.0, math.inf
-    plant["crest_end"], plant["return_crest_end"] = 1.0, 1.0
-    _fill_line(plant, dynamics.line)
-    if isinstance(law, CalibratedLaw):
-        _fill_calibrated(plant, law, dynamics.tube)
-    elif isinstance(law, PaperLaw):
-        _fill_paper(plant, law)
-    else:
-        _fill_velocities(plant, law)
-    if dynamics.lift is not None and plant["crest"]:
-        plant["lifts"] = True
-        plant["lift_straight"], plant["lift_entrance"] = dynamics.lift.straight, dynamics.lift.entrance
-
-
-def _fill_calibrated(plant: npt.NDArray[np.void], law: CalibratedLaw, tube: Tube) -> None:
-    for name in _OF_PATH:
-        plant[name] = getattr(law.path, name)
-    if not law.path.crest:
-        plant["column_pressure"] = math.inf
-    plant["gas_factor"] = law.gas_factor
-    start, end = crest_span(tube)
-    plant["crest_end"], plant["return_crest_end"] = end, 1 - start
-    _fill_rows(plant, len(law.heads.tables), *law.constants)
 
 
 def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
@@ -416,13 +413,3 @@ def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
         powers[0, ends], powers[1, ends] = square[:-1][ends], np.diff(square)[ends]
         inside = slice(which * PIECES, (which + 1) * PIECES)
         plant["rows"][0, inside, :6] = np.stack([*powers, flow.primed[:-1], flow.regime[:-1]], axis=1)
-
-
-def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:
-    plant["temperature"], plant["heat_capacity_ratio"] = 1.0, 1.0
-    if line is not None:
-        plant["line"], plant["temperature"] = True, line.temperature
-        warm = math.sqrt(line.temperature / REFERENCE_TEMPERATURE_K)
-        plant["critical_ratio"] = line.critical_ratio
-        plant["passing"] = line.conductance * REFERENCE_PRESSURE_PA * warm
-        plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO

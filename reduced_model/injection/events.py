@@ -1,4 +1,4 @@
-"""What ends a step of a pair of chambers, and what its liquid does at rest, in plain numbers.
+"""Events that end a step of a pair of chambers, and rest and start of its liquid, in plain numbers.
 
 A state is x of chamber 0, the velocity out of it and the absolute pressures of both gases.
 """
@@ -68,7 +68,7 @@ def _pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, boo
 
 @in_place
 def holds_column(plant: Record, motion: Record, state: Four) -> bool:
-    """Whether the tube holds a column by the law."""
+    """True if the tube holds a column by the law."""
     x, _, p, q = state
     ambient, primed = plant.ambient_pressure, motion.primed > 0
     return holds(plant, x, plant.total - x, p - ambient, q - ambient, primed, motion.log_speed)
@@ -76,7 +76,7 @@ def holds_column(plant: Record, motion: Record, state: Four) -> bool:
 
 @in_place
 def pass_crest(plant: Record, motion: Record) -> None:
-    """What was lifted is the flow law's column from now on."""
+    """Let lifted liquid become the flow law's column."""
     motion.state[X] = shown(plant, motion, motion.state[X])
     motion.front, motion.lifting = crest_stop(plant, motion.direction), 0
     motion.primed = 1 if holds_column(plant, motion, now(motion)) else 0
@@ -107,7 +107,7 @@ def forget(motion: Record, fill: float) -> None:
 
 @in_place
 def rests(plant: Record, motion: Record) -> bool:
-    """Whether nothing moves, no gas is under pressure, and no valve is open or about to move."""
+    """True if the pair is at rest and vented, and no valve is open or about to move."""
     waiting, y = min(motion.opens, motion.closes) < math.inf, motion.state
     still = motion.direction == 0 and y[P] == plant.ambient_pressure == y[P + 1]
     return bool(still and not (motion.primed or motion.valve_0 or motion.valve_1 or waiting))
@@ -153,13 +153,13 @@ def _push(plant: Record, motion: Record, state: Four, direction: int) -> float:
     if motion.lifting:
         return lift_push(plant, motion, state[0], state[2], state[3])
     at = pair_ends(plant, state, direction)
-    found = accelerations(plant, at, 0.0, direction, motion.primed > 0, motion.log_speed)
-    return min(found[0], found[1])
+    rates = accelerations(plant, at, 0.0, direction, motion.primed > 0, motion.log_speed)
+    return min(rates[0], rates[1])
 
 
 @in_place
 def separates(plant: Record, motion: Record, state: Four) -> bool:
-    """Whether a primed column at rest separates."""
+    """True if a primed column at rest separates."""
     if not motion.primed or would_start(plant, state, True) != 0:
         return False
     if plant.tabled:
@@ -185,7 +185,7 @@ def flow_end(plant: Record, motion: Record, state: Four) -> int:
 
 @in_place
 def changes(plant: Record, motion: Record, state: Four) -> bool:
-    """Whether an event lies between the last step and this state."""
+    """True if an event lies between the last step and a state."""
     if motion.lifting:
         return bool(arrived(plant, motion, state[0]) >= 0.0 or flow_end(plant, motion, state) != NONE)
     if motion.direction != 0:
@@ -196,7 +196,7 @@ def changes(plant: Record, motion: Record, state: Four) -> bool:
 
 @in_place
 def heading(plant: Record, motion: Record, state: Four) -> int:
-    """What `changes` has found in a state, for `beyond`: a start's direction, else one of the above or 0."""
+    """Type of an event, for `beyond`: direction of a start, else a constant of this module or 0."""
     if motion.direction == 0:
         return starts(plant, motion, state)
     if motion.lifting and arrived(plant, motion, state[0]) >= 0.0:
@@ -209,18 +209,18 @@ def heading(plant: Record, motion: Record, state: Four) -> int:
 
 
 @in_place
-def beyond(plant: Record, motion: Record, state: Four, what: int) -> float:
-    """How far a state is past an event, in a measure of the event's own: below zero before it, above after.
+def beyond(plant: Record, motion: Record, state: Four, event: int) -> float:
+    """Event function: below zero before an event, above zero after it, in a unit of that event.
 
     A guide to it and no more: `changes` tells on which side a state is.
     """
     if motion.direction == 0:
-        return _push(plant, motion, state, what) if what != 0 else 0.0
-    if what == ARRIVES:
+        return _push(plant, motion, state, event) if event != 0 else 0.0
+    if event == ARRIVES:
         return arrived(plant, motion, state[0])
-    if what == FILLS:
+    if event == FILLS:
         return clearance(plant, pair_ends(plant, state, motion.direction), motion.direction, motion.log_speed)
-    return -state[1] * motion.direction if what == STOPS else 0.0
+    return -state[1] * motion.direction if event == STOPS else 0.0
 
 
 @in_place
@@ -232,5 +232,5 @@ def regime(plant: Record, motion: Record) -> int:
     if not plant.inertia:
         return _SEPARATED if _pair_steady(plant, motion, state)[1] else _SIPHON
     at, speed = pair_ends(plant, state, direction), max(state[1] * direction, 0.0)
-    found = accelerations(plant, at, speed, direction, motion.primed > 0, motion.log_speed)
-    return _SEPARATED if found[1] < found[0] else _SIPHON
+    rates = accelerations(plant, at, speed, direction, motion.primed > 0, motion.log_speed)
+    return _SEPARATED if rates[1] < rates[0] else _SIPHON

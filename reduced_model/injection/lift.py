@@ -35,7 +35,7 @@ from ringbalance.scene.platform.compiled import in_place, inlined
 
 _BEHIND: Final = 0.54956
 _ARRIVES: Final = 0.62435
-"""Of y'' = y^2 + t with y = -sqrt(-t) long before: -y and y' at t = 0."""
+"""-y and y' at t = 0 of y'' = y^2 + t with y = -sqrt(-t) long before."""
 
 
 @inlined
@@ -67,10 +67,10 @@ def shown(plant: Record, motion: Record, x: float) -> float:
 
 
 @inlined
-def _passed(plant: Record, motion: Record, place: float) -> float:
-    """Fill ratio that has passed with the front at a place, beyond the middle of the crest."""
+def _passed(plant: Record, motion: Record, position: float) -> float:
+    """Fill ratio that has passed the middle of the crest with the front at a fraction of the path."""
     middle = (crest_start(plant, motion.direction) + crest_stop(plant, motion.direction)) / 2.0
-    return float((max(place - middle, 0.0) - max(motion.front - middle, 0.0)) * plant.hold_up)
+    return float((max(position - middle, 0.0) - max(motion.front - middle, 0.0)) * plant.hold_up)
 
 
 @in_place
@@ -80,23 +80,23 @@ def stands(plant: Record, motion: Record) -> tuple[float, float]:
 
 
 @in_place
-def resume(plant: Record, motion: Record, place: float) -> None:
-    """The state of lifted liquid that `stands` at a place, from the fill that is shown."""
-    motion.started = motion.state[X] + motion.direction * _passed(plant, motion, place)
-    motion.state[X] = motion.started - motion.direction * (place - motion.front) * plant.hold_up
+def resume(plant: Record, motion: Record, position: float) -> None:
+    """Set lifted liquid whose front `stands` at a fraction of the path, from the fill that is shown."""
+    motion.started = motion.state[X] + motion.direction * _passed(plant, motion, position)
+    motion.state[X] = motion.started - motion.direction * (position - motion.front) * plant.hold_up
 
 
 @inlined
 def arrived(plant: Record, motion: Record, x: float) -> float:
-    """How far the front is past the crest's end, a fraction of the path."""
+    """Distance of the front past the crest's end, a fraction of the path."""
     return front(plant, motion, x) - crest_stop(plant, motion.direction)
 
 
 @inlined
-def _leg(plant: Record, place: float, direction: int) -> tuple[float, float]:
+def _leg(plant: Record, position: float, direction: int) -> tuple[float, float]:
     """D_m - D(s), Pa, and its slope."""
     start, tall = crest_start(plant, direction), plant.column_pressure - plant.port_pressure
-    outward, straight = 1.0 - place / start, plant.lift_straight
+    outward, straight = 1.0 - position / start, plant.lift_straight
     if outward <= 0.0:
         return 0.0, 0.0
     height = tall * outward * (straight + (1.0 - straight) * outward)
@@ -107,33 +107,33 @@ def _leg(plant: Record, place: float, direction: int) -> tuple[float, float]:
 def lift_rates(
     plant: Record, motion: Record, at: tuple[float, float, float, float], x: float, speed: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Acceleration along the direction, m/s^2; by x through the front, against the direction; then as
+    """Acceleration per_path the direction, m/s^2; by x through the front, against the direction; then as
     `accelerations` by the speed, the pressure upstream, the gas downstream and the liquid there."""
     direction, rho = motion.direction, plant.density
-    place, entrance = front(plant, motion, x), plant.lift_entrance
-    height, slope = _leg(plant, place, direction)
+    position, entrance = front(plant, motion, x), plant.lift_entrance
+    height, slope = _leg(plant, position, direction)
     margin = crest_margins(plant, at)[1] + height
-    along = (1.0 - entrance) / crest_stop(plant, direction)
-    share, length = entrance + along * place, place * plant.length
+    per_path = (1.0 - entrance) / crest_stop(plant, direction)
+    share, length = entrance + per_path * position, position * plant.length
     loss, loss_slope = tube_loss(
         plant, crest_table(plant, direction), speed, law_speed(speed, motion.log_speed)
     )
-    found = (margin / rho - share * loss) / length
-    by_place = (slope / rho - along * loss) / length - found / place
+    rate = (margin / rho - share * loss) / length
+    by_position = (slope / rho - per_path * loss) / length - rate / position
     each = 1.0 / (rho * length)
     _, by_gas, by_far = crest_slopes(plant, at)
-    by_x = -by_place / plant.hold_up
-    return found, by_x, -share * loss_slope / length, each, -each * by_gas, -each * by_far
+    by_x = -by_position / plant.hold_up
+    return rate, by_x, -share * loss_slope / length, each, -each * by_gas, -each * by_far
 
 
 @in_place
 def lift_speed(plant: Record, motion: Record, at: tuple[float, float, float, float], x: float) -> float:
     """Velocity of the front without inertia, m/s."""
-    direction, place = motion.direction, front(plant, motion, x)
-    margin = crest_margins(plant, at)[1] + _leg(plant, place, direction)[0]
+    direction, position = motion.direction, front(plant, motion, x)
+    margin = crest_margins(plant, at)[1] + _leg(plant, position, direction)[0]
     if margin <= 0.0:
         return 0.0
-    share = plant.lift_entrance + (1.0 - plant.lift_entrance) * place / crest_stop(plant, direction)
+    share = plant.lift_entrance + (1.0 - plant.lift_entrance) * position / crest_stop(plant, direction)
     return quasi_steady(plant, crest_table(plant, direction), margin / share, motion.log_speed)
 
 
@@ -147,7 +147,7 @@ def lift_push(plant: Record, motion: Record, x: float, p: float, q: float) -> fl
 
 @in_place
 def set_out(plant: Record, motion: Record) -> None:
-    """Where the front of liquid that begins to move stands, and its velocity; a primed tube has none."""
+    """Set the front of liquid that begins to move, and its velocity; a primed tube has none."""
     direction = motion.direction
     if not plant.lifts or motion.primed:
         motion.lifting, motion.front, motion.side = 0, crest_stop(plant, direction), direction
@@ -169,9 +169,9 @@ def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
     t the time of the line while choked.
     """
     direction, x = motion.direction, motion.state[X]
-    own = x if direction > 0 else plant.total - x
+    fill = x if direction > 0 else plant.total - x
     tall = plant.column_pressure - plant.port_pressure
-    part = (plant.column_pressure - hydrostatic(plant, own)[0]) / tall
+    part = (plant.column_pressure - hydrostatic(plant, fill)[0]) / tall
     part, straight = min(max(part, 0.0), 1.0), plant.lift_straight
     root = straight + math.sqrt(straight * straight + 4.0 * (1.0 - straight) * part)
     start = crest_start(plant, direction)
@@ -181,15 +181,15 @@ def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
         return level, 0.0
     chamber = 0 if direction > 0 else 1
     pressure, content = motion.state[P + chamber], motion.state[P + 2 + chamber]
-    volume = gas_volume(plant, own)
+    volume = gas_volume(plant, fill)
     gauge = pressure - plant.ambient_pressure
     time = gauge * volume / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
-    way = gauge * time * time / (6.0 * plant.density * level * plant.length)
+    path = gauge * time * time / (6.0 * plant.density * level * plant.length)
     rate = line_rates(plant, pressure, content, volume, 0.0, True)[0]
-    place, speed = _risen(plant, start, tall, max(rate, 0.0))
-    if level + way / plant.length < place:
-        return level + way / plant.length, 0.0
-    return max(place, level), speed
+    risen, speed = _risen(plant, start, tall, max(rate, 0.0))
+    if level + path / plant.length < risen:
+        return level + path / plant.length, 0.0
+    return max(risen, level), speed
 
 
 @inlined

@@ -1,6 +1,6 @@
-"""Where injections of runs end: the fill at which the gas stalls, and at which gas enters a port.
+"""Fills at which injections of runs end: where the gas stalls, and where gas enters a port.
 
-For many plants at once what `residual_liquid` finds from one law.
+For many plants at once; `residual_liquid` has the same of one law.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from ringbalance.scene.platform.compiled import in_place
 _PLACES: Final = 256
 """Looked at between equal fills and an empty chamber."""
 _HALVINGS: Final = 24
-"""Of the step in which the flow stops: 2e-10 of a fill is left."""
+"""Halvings of the step in which the flow stops: 2e-10 of a fill is left."""
 
 
 def residual_fills(plants: npt.NDArray[np.void], designs: Designs) -> FloatArray:
     """Fill ratio of each plant at which gas enters the port of a driven chamber, as `residual_fill_ratio`."""
     scene = designs.scene
 
-    def drawn(rows: IntArray, fills: FloatArray) -> FloatArray:
+    def entrainment_fill(rows: IntArray, fills: FloatArray) -> FloatArray:
         velocity, some = np.empty(rows.size), scene
         running_velocities(plants, rows, fills, velocity)
         if rows.size < designs.size:
             some = designs.take(rows).scene
         return drawn_fill(some, flow_rate=some.tube.area * velocity)
 
-    return first_gas(scene, drawn, top=np.full(designs.size, scene.disc.max_fill_ratio))
+    return first_gas(scene, entrainment_fill, top=np.full(designs.size, scene.disc.max_fill_ratio))
 
 
 def hold_liquid(plants: npt.NDArray[np.void], designs: Designs) -> None:

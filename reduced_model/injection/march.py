@@ -48,13 +48,13 @@ from ringbalance.reduced_model.injection.step import (
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place, inlined
 
-_ROUND_OFF: Final = 1e-12
+_ROUND_OFF_S: Final = 1e-12
 """s, of the clock of a valve."""
 _BISECTIONS: Final = 40
 _SECANTS: Final = 12
-"""Of these, that may be guided: a smooth event takes five."""
+"""Bisections at most that a secant guides: a smooth event takes five."""
 _REST_EVENT: Final = 1e-11
-"""Of a step at rest, which may be long: the instant of an event in it."""
+"""Error of the instant of an event over a step at rest, which may be long."""
 _NOTHING_MOVED: Final = 1e-13
 """Fill ratio below which a start has come to nothing but round-off."""
 _LITTLE_MOVED: Final = 1e-9
@@ -78,7 +78,7 @@ def advance(
     """
     left, motion.now, motion.noted = duration, 0.0, 0
     # What is due at the end counts, whatever the clock has rounded off.
-    while min(motion.opens, motion.closes) <= left + _ROUND_OFF:
+    while min(motion.opens, motion.closes) <= left + _ROUND_OFF_S:
         until = min(motion.opens, motion.closes, left)
         _march(plant, motion, until, notes, row, count, w, True)
         left -= until
@@ -171,22 +171,22 @@ def opening_within(
         # Its tail is much the same for a somewhat shorter time.
         before = after - pace * high
     for step in range(_OPENINGS):
-        middle = _look_at(low, high, before + spared / 2.0, after + spared / 2.0, step, near)
+        middle = _illinois_step(low, high, before + spared / 2.0, after + spared / 2.0, step, near)
         motions[way] = motions[opened]
-        found = residual - _least_after(plant, motions, spare, middle, w)
-        if found > 0.0:
-            high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1
+        short_of_residual = residual - _least_after(plant, motions, spare, middle, w)
+        if short_of_residual > 0.0:
+            high, after, before, stays = middle, short_of_residual, before * (0.5 if stays < 0 else 1.0), -1
         else:
-            low, before, after, stays = middle, found, after * (0.5 if stays > 0 else 1.0), 1
+            low, before, after, stays = middle, short_of_residual, after * (0.5 if stays > 0 else 1.0), 1
             motions[opened] = motions[way]
-        if high - low <= near or -spared <= found <= 0.0:
+        if high - low <= near or -spared <= short_of_residual <= 0.0:
             break
     return low
 
 
 @inlined
-def _look_at(low: float, high: float, before: float, after: float, step: int, near: float) -> float:
-    """Where to look next for a root between two ends with these values, at most `near` exact.
+def _illinois_step(low: float, high: float, before: float, after: float, step: int, near: float) -> float:
+    """Next guess of a root between two ends with values of opposite sign, at most `near` exact.
 
     By the secant through both, and by halves where that has no sign change or takes long. The caller halves
     the value of an end that stays (the Illinois rule).
@@ -247,7 +247,7 @@ def _march(
 ) -> None:
     """Steps and their events, with the valves as they are.
 
-    Args: `to_end`: whether the last step is shortened to what is left, or not taken; then a chamber that
+    Args: `to_end`: true if the last step is shortened to what is left, or not taken; then a chamber that
         passes its residual fill ends them too.
     """
     left, goes_on = duration, False
@@ -273,7 +273,7 @@ def _march(
 
 @in_place
 def _goes_no_further(plant: Record, motion: Record, left: float) -> bool:
-    """Whether the next step would be shortened, or the driven chamber is below its residual fill."""
+    """True if the next step would be shortened, or the driven chamber is below its residual fill."""
     shortened = motion.length >= left and not in_closed_form(plant, motion)
     return bool(shortened or motion.least_fill < motion.residual)
 
@@ -349,19 +349,19 @@ def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
 def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatArray) -> float:
     """Part of the step just taken after which the first event lies, at most `near` late.
 
-    Looked for by how far both ends are `beyond` it, see `_look_at`.
+    Looked for by how far both ends are `beyond` it, see `_illinois_step`.
     """
-    low, high, what, stays = 0.0, 1.0, heading(plant, motion, _at(w, END)), 0
-    before = beyond(plant, motion, now(motion), what)
-    after = beyond(plant, motion, _at(w, END), what)
+    low, high, event, stays = 0.0, 1.0, heading(plant, motion, _at(w, END)), 0
+    before = beyond(plant, motion, now(motion), event)
+    after = beyond(plant, motion, _at(w, END), event)
     for step in range(_BISECTIONS):
-        middle = _look_at(low, high, before, after, step, near)
+        middle = _illinois_step(low, high, before, after, step, near)
         between(plant, motion, h, middle, w)
-        found = beyond(plant, motion, _at(w, BETWEEN), what)
+        value = beyond(plant, motion, _at(w, BETWEEN), event)
         if changes(plant, motion, _at(w, BETWEEN)):
-            high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1
+            high, after, before, stays = middle, value, before * (0.5 if stays < 0 else 1.0), -1
         else:
-            low, before, after, stays = middle, found, after * (0.5 if stays > 0 else 1.0), 1
+            low, before, after, stays = middle, value, after * (0.5 if stays > 0 else 1.0), 1
         if high - low <= near:
             break
     return high
@@ -411,9 +411,9 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
     y, direction = motion.state, motion.direction
     if motion.lifting:
         # The liquid comes to rest in the tube, and the chambers are as they were.
-        place, event = front(plant, motion, y[X]), STALLED
+        position, event = front(plant, motion, y[X]), STALLED
         y[X] = shown(plant, motion, y[X])
-        motion.front, motion.lifting = place, 0
+        motion.front, motion.lifting = position, 0
     _note(plant, motion, event, direction)
     little = _NOTHING_MOVED if motion.stopped != -direction else _LITTLE_MOVED
     # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
@@ -453,7 +453,7 @@ def _flip(plant: Record, motion: Record) -> None:
 
 @in_place
 def _quiet(plant: Record, motion: Record) -> bool:
-    """Whether nothing changes any more until a valve moves."""
+    """True if nothing changes any more until a valve moves."""
     if motion.direction != 0:
         return False
     return bool(not plant.line or (near_end(plant, motion, 0) and near_end(plant, motion, 1)))

@@ -13,7 +13,7 @@ from ringbalance.scene.platform.compiled import in_place
 MOMENT_NODES: Final = 513
 """Equally spaced; cubic between them."""
 END_STEP: Final = 1e-3
-"""Share of the range of x over which a slope at its end is taken."""
+"""Fraction of the range of x over which a slope at its end is taken."""
 _HALVINGS: Final = 60
 
 
@@ -36,17 +36,22 @@ def tabulate_moment(plant: Record, model: BalancerModel, *, total: float) -> Non
 
 @in_place
 def pair_moment(plant: Record, fill: float) -> complex:
-    """Of one pair along its axis and across it, kg m."""
+    """Moment of one pair along its axis and across it, kg m."""
     nodes, last = plant.moment, MOMENT_NODES - 1
-    place = min(max((fill - plant.lowest_fill) / plant.moment_step, 0.0), float(last))
-    cell = min(int(place), last - 1)
-    part, rise, d0, d1 = place - cell, nodes[cell + 1, 0] - nodes[cell, 0], nodes[cell, 1], nodes[cell + 1, 1]
+    position = min(max((fill - plant.lowest_fill) / plant.moment_step, 0.0), float(last))
+    cell = min(int(position), last - 1)
+    part, rise, d0, d1 = (
+        position - cell,
+        nodes[cell + 1, 0] - nodes[cell, 0],
+        nodes[cell, 1],
+        nodes[cell + 1, 1],
+    )
     change = part * (d0 + part * (3.0 * rise - 2.0 * d0 - d1 + part * (d0 + d1 - 2.0 * rise)))
     return complex(nodes[cell, 0] + change)
 
 
 @in_place
-def fill_for_moment(plant: Record, wanted: float, lowest: float, highest: float) -> float:
+def fill_for_moment(plant: Record, moment: float, lowest: float, highest: float) -> float:
     """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
 
     Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
@@ -55,15 +60,15 @@ def fill_for_moment(plant: Record, wanted: float, lowest: float, highest: float)
         return lowest
     short = END_STEP * (highest - lowest)
     low, high = pair_moment(plant, lowest).real, pair_moment(plant, highest).real
-    if wanted <= low:
+    if moment <= low:
         rise = pair_moment(plant, lowest + short).real - low
-        return lowest + (wanted - low) / rise * short
-    if wanted >= high:
+        return lowest + (moment - low) / rise * short
+    if moment >= high:
         rise = high - pair_moment(plant, highest - short).real
-        return highest + (wanted - high) / rise * short
+        return highest + (moment - high) / rise * short
     for _ in range(_HALVINGS):
         middle = (lowest + highest) / 2.0
-        if pair_moment(plant, middle).real >= wanted:
+        if pair_moment(plant, middle).real >= moment:
             highest = middle
         else:
             lowest = middle

@@ -40,15 +40,16 @@ def at_rest(plant: npt.NDArray[np.void], *, fill: float) -> npt.NDArray[np.void]
 
     Args: `fill`: x of chamber 0.
     """
-    known, state = plant[0], np.zeros(1, dtype=MOTION)
-    ambient, total = known["ambient_pressure"], known["total"]
+    constants, state = plant[0], np.zeros(1, dtype=MOTION)
+    ambient, total = constants["ambient_pressure"], constants["total"]
     volumes = [
-        max(1 - x, 1e-3) * known["chamber_volume"] + known["dead_volume"] for x in (fill, total - fill)
+        max(1 - x, 1e-3) * constants["chamber_volume"] + constants["dead_volume"]
+        for x in (fill, total - fill)
     ]
-    contents = [ambient * volume / known["temperature"] for volume in volumes]
+    contents = [ambient * volume / constants["temperature"] for volume in volumes]
     state["state"][0, :6] = fill, 0.0, ambient, ambient, *contents
     state["opens"], state["closes"] = math.inf, math.inf
-    state["length"], state["residual"] = known["first_step"], known["residual"]
+    state["length"], state["residual"] = constants["first_step"], constants["residual"]
     state["started"], state["least_fill"] = fill, fill
     state["filled"], state["event"] = -1.0, EVENTS.index(Event.BLOCKED)
     return state
@@ -70,10 +71,10 @@ _RELATIVE_ERROR: Final = 1e-7
 """Allowed to one step: an amount is then right to 1e-5 of it."""
 _TAIL: Final = 10.0
 """s after a valve has closed: the gas has vented and the liquid rests."""
-_TIME_ERROR: Final = 1e-6
+_TIME_ERROR_S: Final = 1e-6
 """s, of a valve-open time."""
 _DOUBLINGS: Final = 12
-"""Of the time by which an opening may be longer than the steady velocity has it."""
+"""Doublings of the time by which an opening may be longer than the steady velocity has it."""
 _RUN_BACK: Final = 0.01
 """Part of what an injection has moved that may run back as its column swings out."""
 
@@ -86,7 +87,7 @@ class Injections:
     fill: float
     """x of the driven chamber."""
     total: float
-    """Of both fill ratios."""
+    """Sum of both fill ratios."""
     chamber: int
     """0 or 1: the driven one."""
     steady: float
@@ -96,7 +97,7 @@ class Injections:
     def of(
         cls, dynamics: Dynamics, model: BalancerModel, *, fill: float, total: float, chamber: int = 0
     ) -> Injections:
-        """Into the chamber of a pair that has a fill ratio."""
+        """Make injections into one chamber of a pair, from its fill ratio."""
         flow = model.flow.evaluate(
             fill_ratio=fill,
             opposite_fill_ratio=total - fill,
@@ -120,8 +121,8 @@ class Injections:
         state = at_rest(plant, fill=before)
         command(plant[0], state[0], self.chamber, opening)
         fills_at(plant, state, np.array([until]))
-        place, fill = stands(plant[0], state[0])
-        return state[0], place, fill - before if self.chamber else before - fill
+        front, fill = stands(plant[0], state[0])
+        return state[0], front, fill - before if self.chamber else before - fill
 
     @cached_property
     def shortest(self) -> float | None:
@@ -134,27 +135,27 @@ class Injections:
             return None
         if end["filled"] >= 0:
             # Shut at the very instant, round-off would decide whether the tube is primed.
-            return float(end["filled"]) + _TIME_ERROR
+            return float(end["filled"]) + _TIME_ERROR_S
         return max(self._filling_time, self._arrival)
 
     @property
     def _filling_time(self) -> float:
-        """Of the driven chamber without flow, s."""
+        """Filling time of the driven chamber without flow, s."""
         line, supply = self.dynamics.line, self.dynamics.gas_pressure + self.dynamics.ambient_pressure
         volume = (1 - self.fill) * self.dynamics.chamber_volume + self.dynamics.dead_volume
         return 0.0 if line is None else float(line.filling_time(supply, volume=volume))
 
     @property
     def _arrival(self) -> float:
-        """When lifted liquid reaches the end of the crest under a valve that stays open, s."""
+        """Time at which lifted liquid reaches the end of the crest under a valve that stays open, s."""
         if self.dynamics.lift is None:
             return 0.0
         plant, early, late = self.dynamics.kept_plant(total=self.total)[0], 0.0, _TAIL
         crest_end = plant["return_crest_end" if self.chamber else "crest_end"]
-        while late - early > _TIME_ERROR:
+        while late - early > _TIME_ERROR_S:
             middle = (early + late) / 2
-            end, place, _ = self._passed(2 * _TAIL, middle)
-            if end["side"] != 0 and place >= crest_end:
+            end, front, _ = self._passed(2 * _TAIL, middle)
+            if end["side"] != 0 and front >= crest_end:
                 late = middle
             else:
                 early = middle
@@ -175,10 +176,12 @@ class Injections:
             more *= 2.0
         else:
             return np.inf
-        return float(brentq(lambda time: self.moved(time) - amount, least, longest + more, xtol=_TIME_ERROR))
+        return float(
+            brentq(lambda time: self.moved(time) - amount, least, longest + more, xtol=_TIME_ERROR_S)
+        )
 
     def dead_time(self, amount: float) -> float | None:
-        """Of the injection that moves a fill ratio, or of the shortest sure one that moves more, s.
+        """Dead time of the injection that moves a fill ratio, or of the shortest sure one that moves more, s.
 
         Zero where the gas cannot move so much; None where what it has moved runs back with the valves shut.
         """

@@ -46,11 +46,11 @@ _B: Final = np.array([2.255570073418735, 0.2870493262186792, 0.4353179431840180,
 """Weights of the stages in the state at the end."""
 _E: Final = np.array([0.2815431932141155, 0.07276199124934920, 0.1082196201495311, 1.093502252409163])
 """Weights of the stages in what the method of order 3 would change there."""
-_SHORTEST_STEP: Final = 1e-15
+_SHORTEST_STEP_S: Final = 1e-15
 """s, below which no error is looked at."""
 _REST_STEP: Final = 0.25
 """In units of a gas's time constant, while both gases change."""
-_SLOW: Final = 30.0
+_SLOW_M_S: Final = 30.0
 """m/s, below which a velocity's error is not relative: a column keeps it for some 10 ms, in which a
 ten-thousandth of that moves less than 1e-6 of a chamber's liquid."""
 _SAFETY: Final = 0.85
@@ -72,7 +72,7 @@ _GAS: Final = 11
 
 
 @inlined
-def _column(
+def _column_rates(
     plant: Record, motion: Record, x: float, u: float, p: float, q: float
 ) -> tuple[float, float, float, float, float, float]:
     """Velocity and acceleration of the liquid; derivatives of the latter by u, x, p and q.
@@ -86,26 +86,30 @@ def _column(
     if plant.tabled:
         flow = tabled(plant, x, p, q, primed, motion.log_speed)
         return (flow[0] if flow[0] * direction > 0.0 else 0.0), 0.0, 0.0, flow[1], 0.0, 0.0
-    own, other = hydrostatic(plant, x), hydrostatic(plant, plant.total - x)
+    level, opposite_level = hydrostatic(plant, x), hydrostatic(plant, plant.total - x)
     f = plant.gas_factor
-    at = (f * p, f * q, own[0], other[0]) if direction > 0 else (f * q, f * p, other[0], own[0])
+    at = (
+        (f * p, f * q, level[0], opposite_level[0])
+        if direction > 0
+        else (f * q, f * p, opposite_level[0], level[0])
+    )
     speed, lifting = u * direction, motion.lifting > 0
     if not plant.inertia and lifting:
         speed = lift_speed(plant, motion, at, x)
     elif not plant.inertia:
         speed = max(steady(plant, x, plant.total - x, p, q, primed, motion.log_speed)[0] * direction, 0.0)
     if lifting:
-        found = lift_rates(plant, motion, at, x, speed)
+        rates = lift_rates(plant, motion, at, x, speed)
     else:
-        found = accelerations(plant, at, speed, direction, primed, motion.log_speed)
-    by_u, by_up, by_down, by_far = found[2], found[3] * direction, found[4] * direction, found[5] * direction
+        rates = accelerations(plant, at, speed, direction, primed, motion.log_speed)
+    by_u, by_up, by_down, by_far = rates[2], rates[3] * direction, rates[4] * direction, rates[5] * direction
     if direction > 0:
-        by_x, by_p, by_q = by_up * own[1] - by_far * other[1], f * by_up, f * by_down
+        by_x, by_p, by_q = by_up * level[1] - by_far * opposite_level[1], f * by_up, f * by_down
     else:
-        by_x, by_p, by_q = by_far * own[1] - by_up * other[1], f * by_down, f * by_up
-    by_x += found[1] if lifting else 0.0
+        by_x, by_p, by_q = by_far * level[1] - by_up * opposite_level[1], f * by_down, f * by_up
+    by_x += rates[1] if lifting else 0.0
     if plant.inertia:
-        least = found[0] if lifting else min(found[0], found[1])
+        least = rates[0] if lifting else min(rates[0], rates[1])
         return speed * direction, least * direction, by_u, by_x, by_p, by_q
     part = -1.0 / by_u if by_u < 0.0 else 0.0
     return speed * direction, 0.0, 0.0, part * by_x, part * by_p, part * by_q
@@ -115,16 +119,16 @@ def _column(
 def _rates(plant: Record, motion: Record, w: FloatArray, row: int, out: int) -> None:
     """Rates of all states with the liquid at rest, or moving in one direction."""
     x, p, q = w[row, X], w[row, P], w[row, P + 1]
-    velocity, acceleration = _column(plant, motion, x, w[row, U], p, q)[:2]
+    velocity, acceleration = _column_rates(plant, motion, x, w[row, U], p, q)[:2]
     flow, ambient = plant.tube_area * velocity, plant.ambient_pressure
     w[out, X], w[out, U] = -flow / plant.chamber_volume, acceleration
     w[out, WORK], w[out, WORK + 1] = (p - ambient) * flow, -(q - ambient) * flow
     for chamber in range(2):
         w[out, P + chamber], w[out, P + 2 + chamber] = 0.0, 0.0
         if plant.line:
-            found = _gas(plant, motion, w, row, chamber, flow)
-            w[out, P + chamber] = found[0]
-            w[out, P + 2 + chamber] = found[1] if plant.heat_capacity_ratio > 1.0 else 0.0
+            gas_rates = _gas(plant, motion, w, row, chamber, flow)
+            w[out, P + chamber] = gas_rates[0]
+            w[out, P + 2 + chamber] = gas_rates[1] if plant.heat_capacity_ratio > 1.0 else 0.0
 
 
 @inlined
@@ -145,7 +149,7 @@ def _linearize(plant: Record, motion: Record, w: FloatArray) -> None:
     for i in range(8):
         w[_TRIAL, i] = y[i]
     x, p, q = y[X], y[P], y[P + 1]
-    velocity, acceleration, by_u, by_x, by_p, by_q = _column(plant, motion, x, y[U], p, q)
+    velocity, acceleration, by_u, by_x, by_p, by_q = _column_rates(plant, motion, x, y[U], p, q)
     w[_COLUMN, 0], w[_COLUMN, 1], w[_COLUMN, 2], w[_COLUMN, 3] = by_u, by_x, by_p, by_q
     flow, ambient, kappa = plant.tube_area * velocity, plant.ambient_pressure, plant.heat_capacity_ratio
     start[X], start[U] = -flow / plant.chamber_volume, acceleration
@@ -156,29 +160,34 @@ def _linearize(plant: Record, motion: Record, w: FloatArray) -> None:
         for i in range(8):
             w[row, i] = 0.0
         if plant.line:
-            found = _gas(plant, motion, w, _TRIAL, chamber, flow)
+            gas_rates = _gas(plant, motion, w, _TRIAL, chamber, flow)
             grows = -sign * plant.chamber_volume
             volume = gas_volume(plant, x if chamber == 0 else plant.total - x)
-            start[P + chamber] = found[0]
-            w[row, 0], w[row, 1] = found[2], grows * found[3]
+            start[P + chamber] = gas_rates[0]
+            w[row, 0], w[row, 1] = gas_rates[2], grows * gas_rates[3]
             w[row, 2] = -sign * kappa * y[P + chamber] * plant.tube_area / volume
             if kappa > 1.0:
-                start[P + 2 + chamber] = found[1]
-                w[row, 3], w[row, 4], w[row, 5], w[row, 6] = found[4], found[5], grows * found[6], found[7]
+                start[P + 2 + chamber] = gas_rates[1]
+                w[row, 3], w[row, 4], w[row, 5], w[row, 6] = (
+                    gas_rates[4],
+                    gas_rates[5],
+                    grows * gas_rates[6],
+                    gas_rates[7],
+                )
 
 
 @inlined
-def _factor(w: FloatArray, row: int, d: float, moves: float) -> float:
+def _eliminate_gas(w: FloatArray, row: int, d: float, moves: float) -> float:
     """Prepare a gas's two equations; (d - J) k = r. Returns: change of its pressure with the velocity's."""
-    free, own = d - w[row, 6], w[row, 2] - w[row, 1] * moves / d
+    free, by_velocity = d - w[row, 6], w[row, 2] - w[row, 1] * moves / d
     w[row, 7] = 1.0 / ((d - w[row, 0]) * free - w[row, 3] * w[row, 4])
-    return float((own * free - w[row, 3] * w[row, 5] * moves / d) * w[row, 7])
+    return float((by_velocity * free - w[row, 3] * w[row, 5] * moves / d) * w[row, 7])
 
 
 @inlined
-def _part(w: FloatArray, row: int, stage: int, place: int, d: float, x: float) -> float:
+def _gas_increment(w: FloatArray, row: int, stage: int, column: int, d: float, x: float) -> float:
     """Change of a gas pressure with the velocity's change left out."""
-    pressure, content = w[stage, place] + w[row, 1] * x, w[stage, place + 2] + w[row, 5] * x
+    pressure, content = w[stage, column] + w[row, 1] * x, w[stage, column + 2] + w[row, 5] * x
     return float((pressure * (d - w[row, 6]) + w[row, 3] * content) * w[row, 7])
 
 
@@ -196,11 +205,11 @@ def _solve(
     """Solve (d - J) k = k in the row of a stage.
 
     Given the change of the velocity, the fill and both gases follow from their own rows, which leaves one
-    equation; `first` and `second` are what `_factor` gives for the gases.
+    equation; `first` and `second` are what `_eliminate_gas` gives for the gases.
     """
     y, moves, per = motion.state, _moves(plant, motion), 1.0 / d
     x = w[stage, X] * per
-    p, q = _part(w, _GAS, stage, P, d, x), _part(w, _GAS + 1, stage, P + 1, d, x)
+    p, q = _gas_increment(w, _GAS, stage, P, d, x), _gas_increment(w, _GAS + 1, stage, P + 1, d, x)
     change = w[stage, U] + w[_COLUMN, 1] * x + w[_COLUMN, 2] * p + w[_COLUMN, 3] * q
     change *= per_pivot
     x, p, q = x - moves * change * per, p + first * change, q + second * change
@@ -230,8 +239,8 @@ def _copy(w: FloatArray, row: int, to: int) -> None:
 
 
 @inlined
-def _look(w: FloatArray, stage: int, y: FloatArray) -> None:
-    """States of a stage."""
+def _stage_states(w: FloatArray, stage: int, y: FloatArray) -> None:
+    """Set the states of a stage."""
     for i in range(8):
         w[_TRIAL, i] = y[i]
     for j in range(stage):
@@ -240,8 +249,8 @@ def _look(w: FloatArray, stage: int, y: FloatArray) -> None:
 
 
 @inlined
-def _carry(w: FloatArray, stage: int, per: float) -> None:
-    """What earlier stages add to the right-hand side of a stage; `per`: over the length of the step."""
+def _add_earlier_stages(w: FloatArray, stage: int, per: float) -> None:
+    """Add earlier stages to the right-hand side of a stage; `per`: one over the length of the step."""
     for j in range(stage):
         for i in range(8):
             w[stage, i] += _C[stage, j] * per * w[j, i]
@@ -252,17 +261,17 @@ def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float
     """One step of length h into row `END`. Returns: error over the allowed one."""
     y, d = motion.state, 1.0 / (h * _GAMMA)
     moves = _moves(plant, motion)
-    first, second = _factor(w, _GAS, d, moves), _factor(w, _GAS + 1, d, moves)
+    first, second = _eliminate_gas(w, _GAS, d, moves), _eliminate_gas(w, _GAS + 1, d, moves)
     pivot = (d - w[_COLUMN, 0] if plant.inertia else 1.0) + w[_COLUMN, 1] * moves / d
     per_pivot = 1.0 / (pivot - w[_COLUMN, 2] * first - w[_COLUMN, 3] * second)
     for stage in range(_STAGES):
         if stage == 0:
             _copy(w, _FIRST_RATE, 0)
         elif stage < _STAGES - 1:
-            _look(w, stage, y)
+            _stage_states(w, stage, y)
             _rates(plant, motion, w, _TRIAL, stage)
             _copy(w, stage, _STAGES - 1)
-        _carry(w, stage, 1.0 / h)
+        _add_earlier_stages(w, stage, 1.0 / h)
         if not plant.inertia:
             w[stage, U] = 0.0
         _solve(plant, motion, w, stage, d, per_pivot, first, second)
@@ -282,7 +291,7 @@ def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
     """Largest error of a state over the allowed one; the works are integrals and allow any."""
     worst, supply = 0.0, plant.gas_pressure + plant.ambient_pressure
     for i in range(WORK):
-        scale = 0.1 if i == X else _SLOW if i == U else 0.1 * (supply if i < P + 2 else y[i])
+        scale = 0.1 if i == X else _SLOW_M_S if i == U else 0.1 * (supply if i < P + 2 else y[i])
         error = abs(w[_ERROR, i]) / (plant.relative_error * (scale + abs(y[i])))
         worst = error if error > worst or math.isnan(error) else worst
     return worst
@@ -290,7 +299,7 @@ def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
 
 @inlined
 def in_closed_form(plant: Record, motion: Record) -> bool:
-    """Whether isothermal gases alone change, while the liquid rests."""
+    """True if isothermal gases alone change, while the liquid rests."""
     return bool(motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0)
 
 
@@ -306,7 +315,7 @@ def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
         error = _rosenbrock(plant, motion, h, w)
         if not math.isfinite(error):
             error = 1e6
-        done = error <= 1.0 or motion.steps >= plant.most_steps or h < _SHORTEST_STEP
+        done = error <= 1.0 or motion.steps >= plant.most_steps or h < _SHORTEST_STEP_S
         if not done or h < left or error > 0.1:
             factor = _GROW if error == 0.0 else _SAFETY / math.sqrt(math.sqrt(error))
             motion.length = h * min(max(factor, _SHRINK), _GROW)
@@ -429,7 +438,7 @@ def _moebius_part(time: float, square: float) -> float:
 
 @in_place
 def _moebius_time(part: float, square: float) -> float:
-    """s of the above."""
+    """Time s at which `_moebius_part` has a value."""
     root = math.sqrt(abs(square))
     if root * part < _STRAIGHT:
         return 2.0 * part

@@ -35,9 +35,9 @@ from ringbalance.scene.registry import registered
 
 WIDTH: Final = 3
 """Column of a moment's half-width over the fill ratio."""
-_Asked = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
+_Conditions = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
 _Answers = tuple[FloatArray, IntArray, BoolArray, FloatArray]
-_FEW: Final = 500
+_FEW_POINTS: Final = 500
 """Points up to which compiled code would take longer to load than they take without."""
 
 
@@ -63,11 +63,11 @@ class CalibratedMoment:
         return np.asarray(self.chamber_moment(fill_ratio) - self.chamber_moment(opposite_fill_ratio))
 
     def pair_vector(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> ComplexArray:
-        along = self.pair_moment(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
+        axial = self.pair_moment(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
         if self.across is None:
-            return np.asarray(along, dtype=np.complex128)
-        across = self.across.quintic(fill_ratio) - self.across.quintic(opposite_fill_ratio)
-        return np.asarray(along + 1j * across)
+            return np.asarray(axial, dtype=np.complex128)
+        transverse = self.across.quintic(fill_ratio) - self.across.quintic(opposite_fill_ratio)
+        return np.asarray(axial + 1j * transverse)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -135,7 +135,7 @@ class CalibratedLaw:
         return _carrying_pressures(table, self.density, self.path.froude_velocity)
 
     def scalars(self) -> dict[int, float]:
-        """What is no table, at the places of `point`."""
+        """Scalars of the law by their index in the numbers of `point`."""
         path, heads = self.path, self.heads
         slowest, fastest = velocities_of(heads.siphon)[[0, -1]]
         carry, carry_from = _carried_by(path)
@@ -161,7 +161,7 @@ class CalibratedLaw:
     def _lists(self) -> tuple[list[float], FloatArray, Any]:
         """Numbers, cells and pieces."""
         numbers, pieces = self.constants
-        return numbers[: point.PLACES].tolist(), numbers[point.PLACES :], _Rows(pieces)
+        return numbers[: point.PLACES].tolist(), numbers[point.PLACES :], _LazyRows(pieces)
 
     def evaluate(
         self,
@@ -171,10 +171,18 @@ class CalibratedLaw:
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
-        y = self._opposite(fill_ratio) if opposite_fill_ratio is None else opposite_fill_ratio
-        if self._is_plain(fill_ratio, y, gas_pressure, primed):
-            return _one_flow(self._answer(fill_ratio, y, gas_pressure, primed))
-        asked = Conditions.checked(
+        opposite = opposite_fill_ratio
+        if opposite is None and isinstance(fill_ratio, _NUMBER):
+            opposite = self.max_fill_ratio - fill_ratio
+        if self._is_plain(fill_ratio, opposite, gas_pressure, primed):
+            query = self._answer(fill_ratio, opposite, gas_pressure, primed)
+            return Flow(
+                velocity=np.asarray(query[point.VELOCITY]),
+                regime=np.asarray(int(query[point.REGIME])),
+                uncertainty=np.zeros(()),
+                primed=np.asarray(query[point.PRIMED_AFTER] != 0.0),
+            )
+        conditions = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
             fill_ratio=fill_ratio,
@@ -182,13 +190,13 @@ class CalibratedLaw:
             gas_pressure=gas_pressure,
             primed=primed,
         )
-        shape = asked.fill_ratio.shape
+        shape = conditions.fill_ratio.shape
         # Copies: arrays that may not be written are another type to compile for.
         flat = (
-            np.array(asked.fill_ratio).ravel(),
-            np.array(asked.opposite_fill_ratio).ravel(),
-            np.array(asked.gas_pressure).ravel(),
-            np.array(asked.primed).ravel(),
+            np.array(conditions.fill_ratio).ravel(),
+            np.array(conditions.opposite_fill_ratio).ravel(),
+            np.array(conditions.gas_pressure).ravel(),
+            np.array(conditions.primed).ravel(),
         )
         velocity, regime, after, margin = self._answers(flat)
         width = np.zeros_like(velocity)
@@ -202,7 +210,7 @@ class CalibratedLaw:
         )
 
     def _is_plain(self, x: Any, y: Any, p: Any, primed: Any) -> bool:
-        """Whether these are four numbers that need no other check, of a law without half-widths."""
+        """True for four plain numbers within range, and a law without half-widths."""
         most = self.max_fill_ratio + FILL_SLACK
         return (
             isinstance(x, _NUMBER)
@@ -215,9 +223,6 @@ class CalibratedLaw:
             and self.half_widths is None
         )
 
-    def _opposite(self, fill_ratio: Any) -> Any:
-        return self.max_fill_ratio - fill_ratio if isinstance(fill_ratio, _NUMBER) else None
-
     def _answer(self, x: Any, y: Any, p: Any, primed: Any) -> list[float]:
         """A query of `point` with its answer."""
         query = [float(x), float(y), float(p), float(primed), *_REST_OF_QUERY]
@@ -225,21 +230,23 @@ class CalibratedLaw:
         answer(numbers, cells, pieces, pieces, query)
         return query
 
-    def _answers(self, asked: _Asked) -> _Answers:
+    def _answers(self, conditions: _Conditions) -> _Answers:
         """Velocity, regime, primed afterwards and margin over the crest of n queries."""
-        n = asked[0].size
+        n = conditions[0].size
         answers = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_), np.empty(n)
-        if n > _FEW:
+        if n > _FEW_POINTS:
             answer_each = registered("function", "answer_each")
-            answer_each(*self.constants, asked, np.zeros(point.PLACES_OF_QUERY), answers)
+            answer_each(*self.constants, conditions, np.zeros(point.PLACES_OF_QUERY), answers)
             return answers
-        each = [self._answer(*query) for query in zip(*(values.tolist() for values in asked), strict=True)]
-        for column, place in zip(answers, _ANSWER, strict=True):
-            column[...] = [query[place] for query in each]
+        queries = [
+            self._answer(*query) for query in zip(*(values.tolist() for values in conditions), strict=True)
+        ]
+        for column, index in zip(answers, _ANSWER, strict=True):
+            column[...] = [query[index] for query in queries]
         return answers
 
     def _widened(
-        self, asked: _Asked, velocity: FloatArray, regime: IntArray, margin: FloatArray
+        self, conditions: _Conditions, velocity: FloatArray, regime: IntArray, margin: FloatArray
     ) -> tuple[FloatArray, IntArray]:
         """Half-widths of velocities, m/s, and regimes, undecided where the margin lies within its half-width.
 
@@ -247,9 +254,11 @@ class CalibratedLaw:
         pressure that drives it alike with that.
         """
         assert self.half_widths is not None
-        fill, opposite, pressure, primed = asked
-        wall, rest, there = map(self.hydrostatic_pressure, (fill, self.max_fill_ratio - fill, opposite))
-        back = np.maximum(rest, self.path.port_pressure) - np.maximum(there, self.path.port_pressure)
+        fill, opposite, pressure, primed = conditions
+        wall, rest, opposite_wall = map(
+            self.hydrostatic_pressure, (fill, self.max_fill_ratio - fill, opposite)
+        )
+        back = np.maximum(rest, self.path.port_pressure) - np.maximum(opposite_wall, self.path.port_pressure)
         wall = self.gas_factor * pressure + wall + np.where(regime == Regime.SEPARATED, 0.0, back)
         width, of_margin = self.half_widths.at(fill, wall, primed)
         width = np.where(velocity == 0, 0.0, np.hypot(width, self.heads.interpolation_error * velocity))
@@ -257,7 +266,7 @@ class CalibratedLaw:
         return width, np.where(opened, int(Regime.UNDECIDED), regime)
 
     def hydrostatic_pressure(self, fill_ratio: npt.ArrayLike) -> FloatArray:
-        """Of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa."""
+        """Pressure of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa."""
         return self.levels.quintic(fill_ratio)
 
     def ends(
@@ -270,7 +279,7 @@ class CalibratedLaw:
         """Pressures at the tube's ends for flow out of the driven chamber; not checked."""
         x = np.asarray(fill_ratio, dtype=np.float64)
         y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
-        gas, own, other = np.broadcast_arrays(
+        gas, upstream, downstream = np.broadcast_arrays(
             self.gas_factor * np.asarray(gas_pressure, dtype=np.float64),
             np.maximum(self.hydrostatic_pressure(x), 0.0),
             np.maximum(self.hydrostatic_pressure(y), 0.0),
@@ -278,8 +287,8 @@ class CalibratedLaw:
         return TubeEnds(
             upstream_gas=gas,
             downstream_gas=np.zeros_like(gas),
-            upstream_hydrostatic=own,
-            downstream_hydrostatic=other,
+            upstream_hydrostatic=upstream,
+            downstream_hydrostatic=downstream,
         )
 
     def priming_pressure(
@@ -303,7 +312,7 @@ class CalibratedLaw:
         return np.asarray(priming_pressure(path, ends)) / self.gas_factor
 
     def holds(self, fill_ratio: float) -> bool | None:
-        """Whether a chamber of that fill keeps it against a lower one with the gas off.
+        """True if a chamber of that fill keeps its liquid against a lower one with the gas off.
 
         None: as `TubePath.holds`.
         """
@@ -341,12 +350,12 @@ def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]
     froude = np.array([law.path.froude_velocity for law in laws])
     rows = LawRows.of(1 + len(ways), stack=(len(laws),))
     rows.add_levels(Table.stacked([law.levels for law in laws]))
-    for at, way in enumerate((siphon, *ways)):
-        rows.add_way(at, way, density, more=_carrying_pressures(way, density, froude).T)
-        if ways and at == point.SIPHON:
+    for row, way in enumerate((siphon, *ways)):
+        rows.add_way(row, way, density, more=_carrying_pressures(way, density, froude).T)
+        if ways and row == point.SIPHON:
             rows.add_shares(siphon, density)
     scalars = [law.scalars() for law in laws]
-    return rows.arrays({place: [each[place] for each in scalars] for place in scalars[0]})
+    return rows.arrays({index: [values[index] for values in scalars] for index in scalars[0]})
 
 
 def cleared_laws(laws: Sequence[CalibratedLaw], froude_velocities: Sequence[float]) -> list[CalibratedLaw]:
@@ -377,7 +386,7 @@ def _carrying_pressures(table: Table, density: npt.ArrayLike, froude: npt.ArrayL
     return np.asarray(np.asarray(density)[..., None] * roots_of(table, velocities) ** 8)
 
 
-class _Rows(dict[int, list[float]]):
+class _LazyRows(dict[int, list[float]]):
     """Rows of an array as lists, each made when it is first looked at: few queries look at few."""
 
     def __init__(self, pieces: FloatArray) -> None:
@@ -400,13 +409,3 @@ _NUMBER: Final = (float, int)
 _TRUTH: Final = (bool, np.bool_)
 _REST_OF_QUERY: Final = [0.0] * (point.PLACES_OF_QUERY - 4)
 _ANSWER: Final = (point.VELOCITY, point.REGIME, point.PRIMED_AFTER, point.MARGIN)
-
-
-def _one_flow(query: list[float]) -> Flow:
-    velocity, regime, _, primed = query[point.VELOCITY : point.PRIMED_AFTER + 1]
-    return Flow(
-        velocity=np.asarray(velocity),
-        regime=np.asarray(int(regime)),
-        uncertainty=np.zeros(()),
-        primed=np.asarray(primed != 0.0),
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -52,7 +52,7 @@ _POSITIVE: Final = frozenset(
 _NOT_NEGATIVE: Final = frozenset(
     {"ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"}
 )
-_LONGEST: Final = 40
+_LONGEST_VALUE: Final = 40
 
 
 class _Reader:
@@ -64,7 +64,7 @@ class _Reader:
 
     def fault(self, where: str, value: str, problem: str, allowed: str) -> None:
         table, _, key = where.rpartition(".")
-        short = value if len(value) <= _LONGEST else value[: _LONGEST - 3] + "..."
+        short = value if len(value) <= _LONGEST_VALUE else value[: _LONGEST_VALUE - 3] + "..."
         self.faults.append(
             Fault(file=self.file, table=table, key=key, value=short, problem=problem, allowed=allowed)
         )
@@ -73,14 +73,14 @@ class _Reader:
         """Build a record, or note why it cannot be built and return None."""
         names = ", ".join(t.__name__ for t in expected)
         if not isinstance(data, dict) or data.get("type") not in {t.__name__ for t in expected}:
-            found = data.get("type") if isinstance(data, dict) else data
-            self.fault(f"{where}.type", _shown(found), "this is no such record", names)
+            type_name = data.get("type") if isinstance(data, dict) else data
+            self.fault(f"{where}.type", _shown(type_name), "this is no such record", names)
             return None
         kind, before = _RECORDS[data["type"]], len(self.faults)
-        known = {f.name: f for f in fields(kind)}
-        for key in sorted(set(data) - set(known) - {"type"}):
-            self.fault(f"{where}.{key}", _shown(data[key]), "unknown key", ", ".join(known))
-        values = {name: self.field(data, f, f"{where}.{name}") for name, f in known.items()}
+        fields_by_name = {f.name: f for f in fields(kind)}
+        for key in sorted(set(data) - set(fields_by_name) - {"type"}):
+            self.fault(f"{where}.{key}", _shown(data[key]), "unknown key", ", ".join(fields_by_name))
+        values = {name: self.field(data, f, f"{where}.{name}") for name, f in fields_by_name.items()}
         if len(self.faults) > before:
             return None
         try:
@@ -179,17 +179,7 @@ def load_law(path: Path | str) -> CompleteLaw:
         True
     """
     file = Path(path)
-    reader = _Reader(str(file))
-    law = None
-    for content in _content(reader, file):
-        law = reader.law(content)
-    if reader.faults:
-        raise SceneError(reader.faults)
-    return cast(CompleteLaw, law)
-
-
-def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
-    """The file's top level, or nothing and an error."""
+    reader, law = _Reader(str(file)), None
     wanted = f'a file written by "ringbalance calibrate SCENE --save {file.name}"'
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -199,8 +189,10 @@ def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
         reader.fault("", "", f"the file is not JSON: {error}", wanted)
     else:
         if not isinstance(content, dict) or content.get("format") != FORMAT:
-            found = content.get("format") if isinstance(content, dict) else None
-            reader.fault("format", _shown(found), "the file is not a saved law", f'"{FORMAT}", {wanted}')
+            file_format = content.get("format") if isinstance(content, dict) else None
+            reader.fault(
+                "format", _shown(file_format), "the file is not a saved law", f'"{FORMAT}", {wanted}'
+            )
         elif content.get("version") not in (VERSION, 4):
             reader.fault(
                 "version",
@@ -209,4 +201,7 @@ def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
                 f"{VERSION}, or 4",
             )
         else:
-            yield content
+            law = reader.law(content)
+    if reader.faults:
+        raise SceneError(reader.faults)
+    return cast(CompleteLaw, law)

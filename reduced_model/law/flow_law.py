@@ -24,13 +24,13 @@ from ringbalance.scene.units import plain_number
 CALIBRATED: Final = "calibrated"
 """Name of the law that `calibrate` makes, which is used where no other is asked for."""
 UNCHECKED: Final = "calibrated, unchecked"
-"""The same without finite elements beside it and effects of uncertain inputs, for runs of many designs."""
+"""Name of a calibrated law without finite elements and uncertain inputs, for runs of many designs."""
 FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
 
 
 class Regime(IntEnum):
-    """How the connecting tube flows.
+    """Regime of the flow in the connecting tube.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
@@ -70,7 +70,7 @@ class Flow:
     uncertainty: FloatArray
     """Expanded uncertainty (95 %) of the velocity, m/s."""
     primed: BoolArray
-    """Whether the tube holds a continuous column afterwards."""
+    """True if the tube holds a continuous column afterwards."""
 
 
 class FlowLaw(Protocol):
@@ -117,7 +117,7 @@ class FlowLaw(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """What a flow law is asked for; arrays of one shape."""
+    """Arguments of a flow law, checked; arrays of one shape."""
 
     fill_ratio: FloatArray
     """x of the driven chamber, within [0, max_fill_ratio]."""
@@ -126,7 +126,7 @@ class Conditions:
     gas_pressure: FloatArray
     """Gauge, in the driven chamber, Pa."""
     primed: BoolArray
-    """Whether the tube holds a continuous column beforehand."""
+    """True if the tube holds a continuous column beforehand."""
 
     @classmethod
     def checked(
@@ -165,7 +165,7 @@ def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
 
 
 def law_text(law: Any) -> str:
-    """What a complete law is made for, in a few lines."""
+    """Summary of the disc, tube and liquid of a complete law, in a few lines."""
     bore = 1e3 * math.sqrt(4 * law.tube_area / math.pi)
     return summary_text(
         (
@@ -316,9 +316,9 @@ class _Velocities:
         if not all(hasattr(flow, name) for name in names):
             raise TypeError(f"evaluate of the law {self.name} returns a Flow, not {flow!r}")
         for name in names:
-            if (found := np.shape(getattr(flow, name))) != shape:
+            if (returned := np.shape(getattr(flow, name))) != shape:
                 raise TypeError(
-                    f"evaluate of the law {self.name} returns {name} of shape {found} for conditions of "
+                    f"evaluate of the law {self.name} returns {name} of shape {returned} for conditions of "
                     f"shape {shape}: all arrays of its Flow have the shape of the conditions"
                 )
         return flow
@@ -338,8 +338,8 @@ def completed_model(law: object, *, by: CompleteLaw) -> BalancerModel:
     """
     if not callable(getattr(law, "evaluate", None)):
         raise TypeError("a flow law has evaluate(*, fill_ratio, opposite_fill_ratio, gas_pressure, primed)")
-    given = {name: getattr(law, name, getattr(by, name)) for name in _OF_BALANCER}
-    largest, name = given.pop("max_fill_ratio"), getattr(law, "name", "")
+    values = {name: getattr(law, name, getattr(by, name)) for name in _OF_BALANCER}
+    largest, name = values.pop("max_fill_ratio"), getattr(law, "name", "")
     if name in ("", by.name, "paper"):
         name = type(law).__name__
-    return BalancerModel(name=name, flow=_Velocities(law=law, name=name, max_fill_ratio=largest), **given)
+    return BalancerModel(name=name, flow=_Velocities(law=law, name=name, max_fill_ratio=largest), **values)

@@ -19,7 +19,7 @@ class HalfWidths:
     """
 
     fill_ratio: FloatArray
-    """Of the driven chamber, shape (n,), growing."""
+    """Fill ratios of the driven chamber, shape (n,), growing."""
     wall_pressure: FloatArray
     """Gauge pressure of gas and liquid at the outer wall of the driven chamber, Pa, shape (m,), growing."""
     velocity: FloatArray

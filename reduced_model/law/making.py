@@ -35,7 +35,7 @@ from ringbalance.scene.errors import of_flow, with_places
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 
-_NEXT_TO_NOTHING: Final = 1e-4
+_SYMMETRIC_ANGLE_RAD: Final = 1e-4
 """Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
 
 
@@ -48,14 +48,16 @@ def calibrated_law(
 
     Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
     """
-    along = chamber.moment
-    law = _put_together(
+    moment = chamber.moment
+    law = _assembled_law(
         scene,
         heads=heads,
         levels=chamber.hydrostatic_pressure.table,
         moment=CalibratedMoment(
-            along=along.table.with_column(WIDTH, along.half_widths(inputs=np.zeros_like(chamber.fill_ratio))),
-            across=_across_table(scene, along.table.knots),
+            along=moment.table.with_column(
+                WIDTH, moment.half_widths(inputs=np.zeros_like(chamber.fill_ratio))
+            ),
+            across=_across_table(scene, moment.table.knots),
         ),
     )
     if not varied:
@@ -102,34 +104,47 @@ def nominal_laws(
     waves: Sequence[float] | None = None,
     rings: Rings | None = None,
 ) -> tuple[CalibratedLaw, ...]:
-    """The same of many scenes; those that differ in numbers alone, and not in their fills, at once.
+    """`nominal_law` of many scenes; those that differ in numbers alone, and not in their fills, at once.
 
     Args: `waves`: error of each one's levels by what no model holds, in standard deviations. `rings`: of
         laws made before, to which those that are lacking are added.
     """
     rings = {} if rings is None else rings
     laws: dict[int, CalibratedLaw] = {}
-    for places in alike(scenes):
-        some = [scenes[place] for place in places]
-        moved = None if waves is None else [waves[place] for place in places]
-        laws |= zip(places, _nominal(some, rings, gravity=gravity, waves=moved), strict=True)
-    return tuple(laws[place] for place in range(len(scenes)))
+    for rows in alike(scenes):
+        group = [scenes[row] for row in rows]
+        moved = None if waves is None else [waves[row] for row in rows]
+        laws |= zip(rows, _nominal(group, rings, gravity=gravity, waves=moved), strict=True)
+    return tuple(laws[row] for row in range(len(scenes)))
 
 
 def _nominal(
-    scenes: Sequence[Scene], kept: Rings, *, gravity: bool, waves: Sequence[float] | None
+    scenes: Sequence[Scene], rings: Rings, *, gravity: bool, waves: Sequence[float] | None
 ) -> list[CalibratedLaw]:
     """Laws of scenes that are alike, with their constants, which are found faster together."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
     heads = TubeHeads.nominal(designs)
-    pressures, moments = _chambers(designs, scenes, fills, kept, gravity=gravity)
+    if gravity:
+        chambers = []
+        for scene in scenes:
+            key = scene.disc, scene.liquid.density, scene.rotor.speed, scene.environment
+            if key not in rings:
+                rings[key] = RingValues.of(scene, fill_ratio=fills, gravity=True)
+            chambers.append(rings[key])
+        pressures = [ring.hydrostatic_pressure.value for ring in chambers]
+        moments = np.stack([ring.moment.value for ring in chambers], axis=1)
+    else:
+        shape, column = (fills.size, designs.size), fills[:, None]
+        pressure = chamber_pressure(scene=designs.scene, fill_ratio=column)
+        pressures = list(np.broadcast_to(pressure, shape).T)
+        moments = np.broadcast_to(chamber_closed_forms(scene=designs.scene, fill_ratio=column)[1], shape)
     if waves is not None:
         share = unmodelled_fractions(scenes[0], fills)["heads"] / NORMAL_95
         pressures = [level * (1 + each * share) for level, each in zip(pressures, waves, strict=True)]
     levels = pressure_tables(scenes, fills, pressures)
     curves = smooth_tables(fills, designs.scene.disc.moment_factor * moments)
     laws = [
-        _put_together(
+        _assembled_law(
             scene,
             heads=head,
             levels=level,
@@ -142,26 +157,7 @@ def _nominal(
     return laws
 
 
-def _chambers(
-    designs: Designs, scenes: Sequence[Scene], fills: FloatArray, kept: Rings, *, gravity: bool
-) -> tuple[list[FloatArray], FloatArray]:
-    """Hydrostatic pressures, Pa, shape (fills,) each, and moments, kg m, shape (fills, designs)."""
-    if gravity:
-        rings = []
-        for scene in scenes:
-            key = scene.disc, scene.liquid.density, scene.rotor.speed, scene.environment
-            if key not in kept:
-                kept[key] = RingValues.of(scene, fill_ratio=fills, gravity=True)
-            rings.append(kept[key])
-        moments = np.stack([ring.moment.value for ring in rings], axis=1)
-        return [ring.hydrostatic_pressure.value for ring in rings], moments
-    scene, shape = designs.scene, (fills.size, designs.size)
-    pressure = chamber_pressure(scene=scene, fill_ratio=fills[:, None])
-    _, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=fills[:, None])
-    return list(np.broadcast_to(pressure, shape).T), np.broadcast_to(moment, shape)
-
-
-def _put_together(
+def _assembled_law(
     scene: Scene,
     *,
     heads: TubeHeads,
@@ -190,7 +186,7 @@ def _across_table(scene: Scene, fills: FloatArray) -> Table | None:
     Source: rho int y dV over the liquid, times the scene's factor on moments.
     """
     disc = scene.disc
-    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING:
+    if np.max(np.abs(share_across(disc, fills))) <= _SYMMETRIC_ANGLE_RAD:
         return None
     a = surface_radius(disc=disc, fill_ratio=fills)
     value = scene.liquid.density * disc.axial_width * moment_across(disc=disc, surface_radius=a)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from ringbalance.reduced_model.law.flow_law import (
     save_record,
 )
 from ringbalance.reduced_model.tube.flow import tube_path
-from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
@@ -45,8 +46,8 @@ class PaperMoment:
         return np.asarray(self.moment_per_transferred_mass * transferred, dtype=np.float64)
 
     def pair_vector(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> ComplexArray:
-        along = self.pair_moment(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
-        return np.asarray(along, dtype=np.complex128)
+        moment = self.pair_moment(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
+        return np.asarray(moment, dtype=np.complex128)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +114,7 @@ class PaperLaw:
         primed: npt.ArrayLike = False,
     ) -> Flow:
         """Flow by Eq. 19; at and below the stall pressure and with the gas off blocked, or reverse."""
-        asked = Conditions.checked(
+        conditions = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
             fill_ratio=fill_ratio,
@@ -121,10 +122,13 @@ class PaperLaw:
             gas_pressure=gas_pressure,
             primed=primed,
         )
-        level = self.pressure_per_fill_difference * (asked.fill_ratio - asked.opposite_fill_ratio)
-        squared = self.velocity_squared_per_pressure * (asked.gas_pressure + level)
-        flows = (squared > 0) & (asked.gas_pressure > 0)
-        returns = (squared < 0) & self._returns(asked)
+        level = self.pressure_per_fill_difference * (conditions.fill_ratio - conditions.opposite_fill_ratio)
+        squared = self.velocity_squared_per_pressure * (conditions.gas_pressure + level)
+        flows = (squared > 0) & (conditions.gas_pressure > 0)
+        # The opposite chamber's liquid passes the crest against the driven one's gas.
+        crest = math.inf if self.return_pressure is None else self.return_pressure
+        opposite = self.pressure_per_fill_difference * conditions.opposite_fill_ratio
+        returns = (squared < 0) & (opposite - crest > conditions.gas_pressure)
         velocity = np.where(flows | returns, np.sign(squared) * np.sqrt(np.abs(squared)), 0.0)
         regime = np.where(flows, Regime.SIPHON, np.where(returns, Regime.REVERSE, Regime.BLOCKED))
         return Flow(
@@ -135,16 +139,9 @@ class PaperLaw:
         )
 
     def holds(self, fill_ratio: float) -> bool:
-        """Whether a chamber of that fill keeps it against a lower one with the gas off."""
+        """True if a chamber of that fill keeps its liquid against a lower one with the gas off."""
         level = self.pressure_per_fill_difference * fill_ratio
         return self.return_pressure is None or level <= self.return_pressure
-
-    def _returns(self, asked: Conditions) -> BoolArray:
-        """Whether the opposite chamber's liquid passes the crest against the driven one's gas."""
-        if self.return_pressure is None:
-            return np.zeros_like(asked.primed)
-        level = self.pressure_per_fill_difference * asked.opposite_fill_ratio
-        return np.asarray(level - self.return_pressure > asked.gas_pressure)
 
     def table(self) -> Mapping[str, FloatArray]:
         names = ("velocity_squared_per_pressure", "pressure_per_fill_difference")

@@ -19,14 +19,15 @@ _FILLS: Final = 25
 _PRESSURES: Final = 41
 """Evenly up to `_HIGHEST`, then `_DOUBLINGS` more, each twice the one before."""
 _HIGHEST: Final = 2.0
-"""Of the largest of the scene's gas pressure, the crest's column and a full chamber's level."""
+"""Highest even pressure over the largest of gas pressure, the crest's column and a full chamber's level."""
 _DOUBLINGS: Final = 4
 _NEAR: Final = np.concatenate(
     [-np.geomspace(0.1, 3e-4, 6), [0.0, 3e-4, 1e-3, 2e-3], np.linspace(4e-3, 0.08, 24)]
 )
-"""Of the highest even pressure: how far from the crest's column more stand, most where gas is carried out."""
+"""Distances of further nodes from the crest's column, over the highest even pressure; most where gas is
+carried out."""
 _DIGITS: Final = 4
-"""Of a half-width in the table."""
+"""Significant digits of a half-width in the table."""
 
 
 def half_width_table(laws: Sequence[CalibratedLaw], *, gas_pressure: float) -> HalfWidths:

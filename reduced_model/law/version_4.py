@@ -16,8 +16,8 @@ from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, TubePath
 from ringbalance.scene.arrays import FloatArray
 
 _HEADS: Final = ("siphon", "hump", "return_hump")
-_LEAST: Final = 0.1
-"""Of a head, that an error leaves of it at least."""
+_LEAST_HEAD_FACTOR: Final = 0.1
+"""Least factor on a head by an error."""
 
 
 def split(document: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -85,7 +85,7 @@ def _paths(path: TubePath, held: Mapping[str, Any]) -> Iterator[TubePath]:
 
 def _lost(way: Table, factor: FloatArray) -> Table:
     """A table of heads times a factor at each knot."""
-    root = np.maximum(factor, _LEAST) ** 0.125
+    root = np.maximum(factor, _LEAST_HEAD_FACTOR) ** 0.125
     powers = [4, 5, 6, *(number % 2 for number in range(way.count - 3))]
     columns = [way.column(number) / root**power for number, power in enumerate(powers)]
     return Table(knots=way.knots * root, columns=np.concatenate(columns))

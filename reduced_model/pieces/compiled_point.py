@@ -30,7 +30,7 @@ def set_all_roots(c: FloatArray, p: FloatArray, ways: int, cells: FloatArray, ro
 def answer_each(
     c: FloatArray,
     p: FloatArray,
-    asked: tuple[FloatArray, FloatArray, FloatArray, BoolArray],
+    conditions: tuple[FloatArray, FloatArray, FloatArray, BoolArray],
     w: FloatArray,
     answers: tuple[FloatArray, IntArray, BoolArray, FloatArray],
 ) -> None:
@@ -38,7 +38,7 @@ def answer_each(
 
     Args: `answers`: velocity, regime, primed afterwards, and margin over the crest.
     """
-    fill, opposite, pressure, primed = asked
+    fill, opposite, pressure, primed = conditions
     k = c[PLACES:]
     velocity, regime, after, margin = answers
     for i in range(fill.size):

@@ -1,4 +1,4 @@
-"""What a column that is accelerated asks of the law beyond a query: pressure from velocity, and slopes.
+"""Pressure from velocity, and slopes, which an accelerated column needs of the law beyond a query.
 
 Plain numbers, interpreted and compiled from one source, of the numbers `c` and pieces `p` of `point`.
 """
@@ -36,10 +36,10 @@ from ringbalance.scene.platform.both_ways import both_ways
 _NEWTON_STEPS: Final = 60
 """At the most; each that leaves the interval known to hold the root is replaced by half of that."""
 _CONVERGED: Final = 1e-6
-"""Of a piece: Newton's next change would be next to round-off."""
+"""Change over the length of a piece after which Newton's next one would be next to round-off."""
 ROOT_CELLS: Final = 512
 ROOT_HEAD: Final = 4
-"""What stands before the cells."""
+"""Numbers that stand before the cells."""
 ROOT_PLACES: Final = ROOT_HEAD + ROOT_CELLS + 1
 _EDGE: Final = 1e-12
 R0, R1, R2, R3, START = 1, 2, 3, 4, 5
@@ -69,7 +69,7 @@ def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
 
 @both_ways
 def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
-    """As `point.velocity`, m/s; a pressure above zero, Pa."""
+    """Velocity, m/s, that a pressure above zero, Pa, drives; as `point.velocity`."""
     if pressure < p[way][SLOWEST]:
         return pressure * p[way][CREEP]
     root = sqrt(sqrt(pressure))
@@ -118,7 +118,7 @@ def set_roots(c: Law, p: Pieces, way: int, cells: Filled, roots: Sequence[Filled
 
 @both_ways
 def _root_slope(s: float, fourth: float, ratio: float, rise: float) -> float:
-    """Of the eighth root over the fourth root of the velocity, with the ratio of the piece and its slope."""
+    """Slope of the pressure's eighth root over the velocity's fourth one, by the ratio and its slope."""
     return s / fourth / (1.0 + 0.25 * s * rise / ratio)
 
 
@@ -144,7 +144,7 @@ def root_of_velocity(cells: Row, roots: Pieces, p: Pieces, way: int, velocity: f
 
 @both_ways
 def _within(p: Pieces, row: int, velocity: float, t: float, start: float) -> tuple[float, float]:
-    """The same on one piece, from a first place on it; places count from its end."""
+    """`root_of_velocity` on one piece, from a first guess; distances count from the end of the piece."""
     end = p[row][END]
     low, high = start, 0.0
     tiny, s, slope = -_CONVERGED * start, end, 1.0

@@ -69,7 +69,7 @@ FILL_SLACK, SURELY, PERHAPS = 1e-9, 0.997, 1.003
 
 @both_ways
 def larger(a: float, b: float) -> float:
-    """Of two numbers."""
+    """The larger of two numbers."""
     if a > b:
         return a
     return b
@@ -77,7 +77,7 @@ def larger(a: float, b: float) -> float:
 
 @both_ways
 def smaller(a: float, b: float) -> float:
-    """Of two numbers."""
+    """The smaller of two numbers."""
     if a < b:
         return a
     return b
@@ -156,7 +156,7 @@ def velocity(k: Cells, p: Pieces, w: Query, way: int, pressure: float) -> float:
 
 @both_ways
 def set_drive(c: Law, w: Query) -> None:
-    """What drives the tube: gas, and the fall of the liquid."""
+    """Pressures that drive the tube: gas, and the fall of the liquid."""
     w[BLOWN] = w[UP_GAS] - w[DOWN_GAS]
     w[FALL] = w[UP_LEVEL] - larger(w[DOWN_LEVEL], c[PORT])
     w[DRIVING] = w[BLOWN] + w[FALL]
@@ -164,9 +164,9 @@ def set_drive(c: Law, w: Query) -> None:
 
 @both_ways
 def set_crest(c: Law, w: Query, covered: bool) -> None:
-    """The crest's pressure at rest, and what it stands against.
+    """The crest's pressure at rest, and those of cavity and gas over it.
 
-    Args: `covered`: whether the downstream liquid covers the port.
+    Args: `covered`: true if the downstream liquid covers the port.
     """
     w[ABOVE] = w[UP_LEVEL] - c[COLUMN]
     w[RESTING] = w[UP_GAS] + w[ABOVE]
@@ -182,7 +182,7 @@ def set_crest(c: Law, w: Query, covered: bool) -> None:
 
 @both_ways
 def set_status(c: Law, w: Query) -> None:
-    """Whether a velocity is one of those that the law is made for."""
+    """Mark a velocity beyond those of the law as extrapolated."""
     if w[VELOCITY] < c[LOWEST]:
         w[STATUS] = EXTRAPOLATED
     elif w[VELOCITY] > c[HIGHEST]:
@@ -229,7 +229,7 @@ def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
 
 @both_ways
 def set_lost(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
-    """What of the driving pressure a full siphon loses up to the crest."""
+    """The part of the driving pressure that a full siphon loses up to the crest."""
     find(k, p, w, SIPHON, w[DRIVING])
     w[FULL_ROOT] = w[ROOT]
     w[FULL_ROW] = w[ROW]
@@ -242,7 +242,7 @@ def set_lost(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
 def set_slower(k: Cells, p: Pieces, w: Query, way: int, covered: bool) -> None:
     """The slower of the whole tube, which has been looked up, and the column up to the crest.
 
-    Args: `covered`: whether the downstream liquid covers the port; else a column that separates runs out.
+    Args: `covered`: true if the downstream liquid covers the port; else a column that separates runs out.
     """
     w[PRIMED_AFTER] = w[SWEPT]
     if w[HOLDS] < w[LOST]:

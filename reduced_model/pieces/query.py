@@ -1,4 +1,4 @@
-"""One query of the compact law: which way its tube flows, and what the answer is worth; as `point`."""
+"""One query of the compact law: direction of the flow, and status of the answer; as `point`."""
 
 from ringbalance.reduced_model.pieces.point import (
     BLOCKED,
@@ -52,12 +52,12 @@ from ringbalance.scene.platform.both_ways import both_ways
 @both_ways
 def turn(w: Query) -> None:
     """Look from the other chamber."""
-    kept = w[UP_LEVEL]
+    swapped = w[UP_LEVEL]
     w[UP_LEVEL] = w[DOWN_LEVEL]
-    w[DOWN_LEVEL] = kept
-    kept = w[UP_GAS]
+    w[DOWN_LEVEL] = swapped
+    swapped = w[UP_GAS]
     w[UP_GAS] = w[DOWN_GAS]
-    w[DOWN_GAS] = kept
+    w[DOWN_GAS] = swapped
 
 
 @both_ways
@@ -72,7 +72,7 @@ def set_flow(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
 
 @both_ways
 def stays_full(c: Law, w: Query) -> bool:
-    """Whether a primed column that nothing drives is still there: below a level, or in exact balance."""
+    """True if a primed column that nothing drives stays: below a level, or in exact balance."""
     if w[PRIMED] == 0.0:
         return False
     if w[UP_LEVEL] < c[PORT]:
@@ -89,7 +89,7 @@ def stays_full(c: Law, w: Query) -> bool:
 def set_answer(c: Law, k: Cells, p: Pieces, w: Query) -> bool:
     """Velocity, regime and primed afterwards; at most one direction flows: what drives one holds the other.
 
-    Returns: whether it is the reverse one, of which the velocity is positive too.
+    Returns: true if it is the reverse one, of which the velocity is positive, too.
     """
     w[VELOCITY] = 0.0
     w[REGIME] = BLOCKED
@@ -112,7 +112,7 @@ def set_answer(c: Law, k: Cells, p: Pieces, w: Query) -> bool:
 
 @both_ways
 def fill_status(c: Law, fill: float) -> float:
-    """What a fill is worth for which the nearest within the range is taken."""
+    """Status of a fill for which the nearest within the range is taken."""
     if fill != fill:
         return INVALID
     if fill < -FILL_SLACK or fill > c[LARGEST_FILL] + FILL_SLACK:
@@ -122,7 +122,7 @@ def fill_status(c: Law, fill: float) -> float:
 
 @both_ways
 def is_usual(c: Law, w: Query) -> bool:
-    """Whether fills and pressure of a query are those that the law is made for."""
+    """True if fills and pressure of a query are within the range of the law."""
     # Not joined by `and`: structured text evaluates both sides.
     if w[FILL] >= 0.0:
         if w[FILL] <= c[LARGEST_FILL]:
@@ -134,8 +134,8 @@ def is_usual(c: Law, w: Query) -> bool:
 
 
 @both_ways
-def worth_of(c: Law, w: Query) -> float:
-    """What an unusual query is worth."""
+def range_status(c: Law, w: Query) -> float:
+    """Status of a query outside the range of the law."""
     if w[PRESSURE] >= c[LEAST_PRESSURE] and w[PRESSURE] <= GREATEST_PRESSURE:
         return larger(fill_status(c, w[FILL]), fill_status(c, w[OPPOSITE_FILL]))
     return INVALID
@@ -147,10 +147,10 @@ def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     w[MARGIN] = 0.0
     up = w[FILL]
     down = w[OPPOSITE_FILL]
-    worth = OK
+    status = OK
     if not is_usual(c, w):
-        worth = worth_of(c, w)
-        if worth == INVALID:
+        status = range_status(c, w)
+        if status == INVALID:
             w[VELOCITY] = 0.0
             w[REGIME] = BLOCKED
             w[PRIMED_AFTER] = 0.0
@@ -164,5 +164,5 @@ def answer(c: Law, k: Cells, p: Pieces, q: Levels, w: Query) -> None:
     w[STATUS] = STANDS
     if set_answer(c, k, p, w):
         w[VELOCITY] = -w[VELOCITY]
-    if worth == EXTRAPOLATED:
+    if status == EXTRAPOLATED:
         w[STATUS] = EXTRAPOLATED

@@ -18,7 +18,7 @@ _EDGE: Final = 1e-9
 
 
 CELLS: Final = 1024
-"""Of a law inside the program."""
+"""Cells of a way in a law inside the program."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +28,7 @@ class LawRows:
     ways: FloatArray
     """Rows that say where velocities are found, shape (..., ways, `WIDTH_OF_ROW`)."""
     edge: float = _EDGE
-    """Of a cell, by which what lies next to the edge of a cell is taken to be in the next one."""
+    """Distance from the edge of a cell, over its length, below which the next cell counts."""
     numbers: list[FloatArray]
     """Shape (..., n) each."""
     pieces: list[FloatArray] = field(default_factory=list)
@@ -36,7 +36,7 @@ class LawRows:
 
     @classmethod
     def of(cls, ways: int, edge: float = _EDGE, *, stack: tuple[int, ...] = ()) -> LawRows:
-        """With nothing but room for the whole tube and the ways to a crest; `stack`: (laws,) of many."""
+        """Make rows for the whole tube and the ways to a crest, without pieces; `stack`: (laws,) of many."""
         return cls(
             ways=np.zeros((*stack, ways, WIDTH_OF_ROW)),
             edge=edge,
@@ -45,24 +45,24 @@ class LawRows:
 
     def add(self, *columns: FloatArray) -> None:
         """Pieces by what stands in their rows, each of shape (..., powers, pieces)."""
-        whole = np.swapaxes(np.concatenate(columns, axis=-2), -1, -2)
-        rows = np.zeros((*whole.shape[:-1], WIDTH_OF_ROW))
-        rows[..., : whole.shape[-1]] = whole
+        table = np.swapaxes(np.concatenate(columns, axis=-2), -1, -2)
+        rows = np.zeros((*table.shape[:-1], WIDTH_OF_ROW))
+        rows[..., : table.shape[-1]] = table
         self.pieces.append(rows)
 
     def add_cells(self, knots: FloatArray, *, cells: int) -> tuple[FloatArray, FloatArray]:
         """Cells for the pieces that are added next, equally long, that say at which piece to begin looking.
 
-        Returns: Cells for one of x, and the place of x = 0, counted from the first of all cells.
+        Returns: Cells for one of x, and the offset of x = 0, counted from the first of all cells.
         """
         start, end = knots[..., 0], knots[..., -1]
-        place = sum(each.shape[-1] for each in self.numbers[1:])
+        offset = sum(each.shape[-1] for each in self.numbers[1:])
         first = sum(each.shape[-2] for each in (self.ways, *self.pieces))
         scale = np.asarray(cells / (end - start))
         # What is next to an edge counts as beyond it.
         beyond = np.linspace(start, end, cells + 1, axis=-1) + (2.0 * self.edge / scale)[..., None]
         self.numbers.append(first + pieces_of(knots, beyond).astype(np.float64))
-        return scale, place - start * scale + self.edge
+        return scale, offset - start * scale + self.edge
 
     def add_ratios(
         self,
@@ -85,8 +85,8 @@ class LawRows:
             slowest = float(ratio @ (first - second) ** np.arange(6))
             ends.append((first**8, slowest / first**4))
         row = [*np.reshape(ends, (*knots.shape[:-1], 2)).T, knots[..., -1]]
-        for place, value in enumerate([*row, *self.add_cells(knots, cells=cells), *more]):
-            self.ways[..., way, place] = value
+        for column, value in enumerate([*row, *self.add_cells(knots, cells=cells), *more]):
+            self.ways[..., way, column] = value
         if way == point.SIPHON:
             self.numbers[0][..., point.SHARES] = knots.shape[-1] - 1
         self.add(knots[..., None, 1:], ratios)
@@ -120,8 +120,8 @@ class LawRows:
     def arrays(self, scalars: Mapping[int, npt.ArrayLike]) -> tuple[FloatArray, FloatArray]:
         """Numbers, with those of the law or laws at their places, and pieces, (..., rows, `WIDTH_OF_ROW`)."""
         numbers = np.concatenate(self.numbers, axis=-1)
-        for place, value in scalars.items():
-            numbers[..., place] = value
+        for index, value in scalars.items():
+            numbers[..., index] = value
         return numbers, np.concatenate([self.ways, *self.pieces], axis=-2)
 
 

@@ -79,7 +79,7 @@ class Table:
         powers = np.stack(_polynomial(h, *ends), axis=-2)
         return np.asarray(powers / h[..., None, :] ** np.arange(powers.shape[-2])[:, None])
 
-    def place(self, x: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
+    def locate(self, x: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
         """The piece of any x, or the nearest one, and the distance from its end."""
         inside = clipped(x, self.knots[0], self.knots[-1])
         piece = pieces_of(self.knots, inside)
@@ -87,19 +87,19 @@ class Table:
 
     def quintic(self, x: npt.ArrayLike) -> FloatArray:
         """The first column at any x, level beyond the ends."""
-        piece, t = self.place(x)
+        piece, t = self.locate(x)
         c = self.quintics[:, piece]
         return np.asarray(c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5])))))
 
     def quintic_slope(self, x: npt.ArrayLike) -> FloatArray:
-        """Its slope; beyond the ends that at the ends."""
-        piece, t = self.place(x)
+        """Slope of the first column at any x; beyond the ends that at the ends."""
+        piece, t = self.locate(x)
         c = self.quintics[:, piece]
         return np.asarray(c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5])))))
 
     def cubic(self, x: npt.ArrayLike, number: int) -> FloatArray:
         """A column with slopes behind it at any x, level beyond the ends."""
-        piece, t = self.place(x)
+        piece, t = self.locate(x)
         c = self.cubics(number)[:, piece]
         return np.asarray(c[0] + t * (c[1] + t * (c[2] + t * c[3])))
 
@@ -116,7 +116,7 @@ def pieces_of(knots: FloatArray, x: npt.ArrayLike) -> IntArray:
 
 
 def _polynomial(h: Any, value: tuple[Any, Any], *derivatives: tuple[Any, Any]) -> list[Any]:
-    """Of a piece of length h from values, slopes and curvatures at both ends, in powers of (x - end)/h."""
+    """Powers of (x - end)/h of a piece of length h, from values, slopes and curvatures at both ends."""
     if not derivatives:
         return [value[1], value[1] - value[0]]
     rise, (first, last) = value[0] - value[1], (h * each for each in derivatives[0])
@@ -139,7 +139,7 @@ def smooth_table(x: FloatArray, y: npt.ArrayLike) -> Table:
 
 
 def smooth_tables(x: FloatArray, y: FloatArray) -> list[Table]:
-    """The same of many quantities at once. Args: `y`: shape (samples, quantities)."""
+    """`smooth_table` of many quantities at once. Args: `y`: shape (samples, quantities)."""
     # A large common value would cost digits.
     curve = spline(x, y - y[0])
     columns = np.concatenate([y, curve(x, nu=1), curve(x, nu=2)])
@@ -147,7 +147,7 @@ def smooth_tables(x: FloatArray, y: FloatArray) -> list[Table]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class TableColumn:
     """A quantity over samples, with derivatives by the table's x as far as its pieces need them."""
 
     value: FloatArray
@@ -159,11 +159,11 @@ class Column:
 
     @property
     def stored(self) -> tuple[FloatArray, ...]:
-        """What a table holds of it."""
+        """Values and derivatives as a table stores them."""
         return self.value, *self.derivatives
 
     def misses(self, x: FloatArray, inside: IntArray) -> BoolArray:
-        """Whether pieces miss more than is allowed, shape (pieces,); `inside`: their samples, (pieces, n)."""
+        """True where a piece errs by more than is allowed. Args: `inside`: samples of each, (pieces, n)."""
         first, last = inside[:, :1], inside[:, -1:]
         h = x[last] - x[first]
         powers = _polynomial(h, *((each[first], each[last]) for each in self.stored))
@@ -173,16 +173,16 @@ class Column:
         return np.asarray(np.any(np.abs(value - self.value[inside]) > self.allowed[inside], axis=1))
 
 
-_LONGEST: Final = 128
-"""Of the lengths of pieces, in that of the shortest."""
+_LONGEST_PIECE: Final = 128
+"""Length of the longest piece over that of the shortest."""
 
 
-def knots_of(x: FloatArray, columns: Sequence[Column], *, shortest: int = 1) -> IntArray:
+def knots_of(x: FloatArray, columns: Sequence[TableColumn], *, shortest: int = 1) -> IntArray:
     """Samples at which pieces meet, each halved until its errors are allowed or it is as short as can be.
 
     Args: `x`: a power of two samples and one more, at least. `shortest`: samples from end to end of a piece.
     """
-    length = min(_LONGEST * shortest, x.size - 1)
+    length = min(_LONGEST_PIECE * shortest, x.size - 1)
     starts, knots = np.arange(0, x.size - 1, length), [np.array([x.size - 1])]
     while starts.size:
         halved = np.zeros(starts.size, dtype=np.bool_)
@@ -195,7 +195,7 @@ def knots_of(x: FloatArray, columns: Sequence[Column], *, shortest: int = 1) -> 
     return np.sort(np.concatenate(knots))
 
 
-def table_at(x: FloatArray, knots: IntArray, columns: Sequence[Column]) -> Table:
+def table_at(x: FloatArray, knots: IntArray, columns: Sequence[TableColumn]) -> Table:
     """The columns at the knots."""
     stored = [values[knots] for column in columns for values in column.stored]
     return Table(knots=x[knots], columns=np.concatenate(stored))

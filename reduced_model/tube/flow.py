@@ -34,14 +34,14 @@ _LEAST, _MOST = np.log(1e-9), np.log(1e6)
 _NODES: Final = np.linspace(-8.0, 0.2, 22)
 """ln u of the nodes from which roots start, from that of a loss of all the pressure in one velocity head."""
 _COMMON: Final = 18
-"""Of the node about which most velocities lie."""
+"""Number of the node about which most velocities lie."""
 _SLOPES: Final = (0.3, 5.0)
 """d ln(head)/d ln u, between which steps are taken."""
-_STEEPEST: Final = 50.0
-"""The same within a transition, of a step of the search."""
-_ENOUGH: Final = 1e-6
+_STEEPEST_SLOPE: Final = 50.0
+"""Largest d ln(head)/d ln u within a transition, of a step of the search."""
+_HEAD_ERROR: Final = 1e-6
 """Relative error of a head that belongs to a velocity, of which the last step leaves a thousandth."""
-_TINY: Final = 1e-14
+_LEAST_STEP: Final = 1e-14
 _STEPS: Final = 80
 
 
@@ -137,7 +137,7 @@ def _log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """What no model holds of the chambers' liquid, as a factor on its levels."""
+    """Effects on the chambers' liquid that no model holds, as a factor on its levels."""
 
     fill_ratio: FloatArray
     """Nodes."""
@@ -147,7 +147,7 @@ class Waves:
     """In standard deviations, of n designs."""
 
     def take(self, rows: IntArray) -> Waves:
-        """Those of some of the designs."""
+        """Select the waves of some of the designs."""
         return replace(self, deviation=self.deviation[rows])
 
     def factor(self, fill_ratio: FloatArray) -> FloatArray:
@@ -164,13 +164,13 @@ class TubeFlow:
     path: TubePath
     gas_factor: FloatArray | float
     between: _Inverse
-    """Of the head between the chambers."""
+    """Velocity over the head between the chambers."""
     to_crest: _Inverse | None = None
-    """Of that from the driven chamber to the lowest pressure at the crest; None without one."""
+    """Velocity over the head from the driven chamber to the lowest pressure at a crest; None without one."""
     waves: Waves | None = field(default=None, kw_only=True)
     """Error of the chambers' levels; None: none is supposed."""
     curve: Callable[[FloatArray], FloatArray] | None = field(default=None, kw_only=True)
-    """Of one scene the level over the fill ratio with gravity, Pa; None: the closed form."""
+    """Level over the fill ratio with gravity, Pa, of a single scene; None: the closed form."""
 
     @classmethod
     def of(
@@ -180,7 +180,7 @@ class TubeFlow:
         waves: Waves | None = None,
         curve: Callable[[FloatArray], FloatArray] | None = None,
     ) -> TubeFlow:
-        """Those of designs, with the nodes that roots start from."""
+        """Make the tubes of designs, with the nodes that roots start from."""
         scene, path, factor = designs.scene, tube_path(designs.scene), pressure_factor(designs.scene)
         highest = factor * np.abs(scene.gas.pressure) + chamber_pressure(
             scene=scene, fill_ratio=scene.disc.max_fill_ratio
@@ -191,7 +191,7 @@ class TubeFlow:
         return cls(designs, path, factor, *heads, waves=waves, curve=curve)
 
     def of_neighbours(self, designs: Designs, rows: IntArray) -> TubeFlow:
-        """Those of designs that differ little from some of these: roots start from tables of these."""
+        """Make the tubes of designs that differ little from some of these, whose tables roots start from."""
         log_velocity = self.between.log_velocity[_COMMON, rows]
         tables = (self.between, self.to_crest) if self.to_crest else (self.between,)
         pairs = zip(tables, _log_heads(designs.scene, log_velocity), strict=True)
@@ -199,7 +199,7 @@ class TubeFlow:
         return TubeFlow(designs, tube_path(designs.scene), pressure_factor(designs.scene), *heads)
 
     def take(self, rows: IntArray) -> TubeFlow:
-        """Those of some of the designs."""
+        """Select the tubes of some of the designs."""
         if rows.size == self.designs.size:
             return self
         part = self.designs.take(rows)
@@ -216,14 +216,14 @@ class TubeFlow:
         level = chamber_pressure(scene=self.designs.scene, fill_ratio=fill_ratio)
         return level if self.waves is None else level * self.waves.factor(fill_ratio)
 
-    def ends(self, own: FloatArray, other: FloatArray, *, driven: bool = True) -> TubeEnds:
-        """For levels of the two chambers, Pa. Args: `driven`: with the gas on."""
+    def ends(self, level: FloatArray, opposite: FloatArray, *, driven: bool = True) -> TubeEnds:
+        """Pressures at the tube's ends, Pa, for levels of both chambers. Args: `driven`: with the gas on."""
         gas = self.gas_factor * self.designs.scene.gas.pressure if driven else 0.0
         return TubeEnds(
-            upstream_gas=gas + 0 * own,
-            downstream_gas=0 * own,
-            upstream_hydrostatic=own,
-            downstream_hydrostatic=other,
+            upstream_gas=gas + 0 * level,
+            downstream_gas=0 * level,
+            upstream_hydrostatic=level,
+            downstream_hydrostatic=opposite,
         )
 
     def flow(
@@ -245,11 +245,12 @@ class TubeFlow:
         head, inverse = pressure / self.path.density, self.to_crest if to_crest else self.between
         assert inverse is not None
         flows = where & (head > 0)
-        wanted = np.log(np.where(flows, head, 1.0))
-        found, slope = inverse(wanted)
+        target = np.log(np.where(flows, head, 1.0))
+        log_velocity, slope = inverse(target)
         if exactly:
-            found = growing_root(partial(self.log_head, to_crest=to_crest), wanted, found, slope, flows)
-        return np.where(flows, np.exp(found), 0.0)
+            log_head = partial(self.log_head, to_crest=to_crest)
+            log_velocity = growing_root(log_head, target, log_velocity, slope, flows)
+        return np.where(flows, np.exp(log_velocity), 0.0)
 
     def log_head(
         self, rows: IntArray, *, to_crest: bool, lowest: bool = True
@@ -276,12 +277,12 @@ class TubeFlow:
 
 def growing_root(
     function_of: Callable[[IntArray], Callable[[FloatArray], FloatArray]],
-    wanted: FloatArray,
+    target: FloatArray,
     start: FloatArray,
     slope: FloatArray,
     where: BoolArray,
 ) -> FloatArray:
-    """Where growing functions reach values, by safeguarded secant steps.
+    """Arguments at which growing functions reach values, by safeguarded secant steps.
 
     Args: `function_of`: y(x) of some rows, by number. `slope`: dy/dx about `start`. `where`: rows that count.
     Returns: x after the step that follows a miss of y below 1e-6, which leaves about a thousandth of it;
@@ -295,19 +296,19 @@ def growing_root(
     for _ in range(_STEPS):
         if rows.size == 0:
             break
-        here = x[rows]
-        miss = function(here) - wanted[rows]
-        low[rows], high[rows] = np.where(miss < 0, here, low[rows]), np.where(miss > 0, here, high[rows])
-        step = here - before[rows]
-        chord = (miss - missed[rows]) / np.where(np.abs(step) > _TINY, step, np.nan)
-        slope[rows] = np.where(np.isfinite(chord), np.clip(chord, _SLOPES[0], _STEEPEST), slope[rows])
-        then = here - miss / slope[rows]
-        inside = (then > low[rows]) & (then < high[rows])
-        left = (np.abs(miss) > _ENOUGH) & (high[rows] - low[rows] > _TINY)
-        before[rows], missed[rows] = here, miss
-        then = np.where(inside, then, np.where(left, (low[rows] + high[rows]) / 2, here))
+        point = x[rows]
+        miss = function(point) - target[rows]
+        low[rows], high[rows] = np.where(miss < 0, point, low[rows]), np.where(miss > 0, point, high[rows])
+        step = point - before[rows]
+        chord = (miss - missed[rows]) / np.where(np.abs(step) > _LEAST_STEP, step, np.nan)
+        slope[rows] = np.where(np.isfinite(chord), np.clip(chord, _SLOPES[0], _STEEPEST_SLOPE), slope[rows])
+        following = point - miss / slope[rows]
+        inside = (following > low[rows]) & (following < high[rows])
+        left = (np.abs(miss) > _HEAD_ERROR) & (high[rows] - low[rows] > _LEAST_STEP)
+        before[rows], missed[rows] = point, miss
+        following = np.where(inside, following, np.where(left, (low[rows] + high[rows]) / 2, point))
         # A row that has arrived stays, whatever others still do.
-        x[rows] = np.where(done[rows], here, then)
+        x[rows] = np.where(done[rows], point, following)
         done[rows] |= ~left
         left = ~done[rows]
         if np.count_nonzero(left) <= rows.size / 2:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import corrected_state
-from ringbalance.reduced_model.pieces.table import Column, Table, knots_of, pieces_of, spline, table_at
+from ringbalance.reduced_model.pieces.table import Table, TableColumn, knots_of, pieces_of, spline, table_at
 from ringbalance.reduced_model.tube.path import crest_head, reversed_tube
 from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.describe import scene_fault
@@ -29,7 +29,7 @@ SHARE, BACK_SHARE = 3, 5
 same of the way back."""
 _OF_TOLERANCE: Final = 1e-7
 """Largest relative error of a velocity between knots, of the scene's tolerance."""
-_FINEST: Final = 1e-5
+_FINEST_TOLERANCE: Final = 1e-5
 """Tolerance below which knots do not become more."""
 _OF_SHARES: Final = 1000.0
 """Times that of a share, which decides on nothing but the regime."""
@@ -38,9 +38,9 @@ _OF_HEAD: Final = 2.0
 _NEWTON_STEPS: Final = 30
 _ROUND_OFF: Final = 1e-15
 _LEVELLED: Final = 0.05
-"""Of ln of a head: a few percent, a fraction of what such errors change it by."""
+"""Largest fall of ln(head) that is levelled: a few percent, a fraction of what such errors change it by."""
 _RISE: Final = 1e-9
-"""Of ln of a head over ln u, below what tables resolve."""
+"""Slope d ln(head)/d ln u of a levelled head, below what tables resolve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,13 +48,13 @@ class TubeHeads:
     """Heads of the full tube in tables of `point`, along the eighth root of a head, (m/s)^(1/4)."""
 
     siphon: Table
-    """Of (k + 1) u^2/2, between the chambers: u/sqrt(head), and with a crest the share (alpha + k_up)/(k + 1)
-    of the head that is lost up to it; where the way back differs, its share too."""
+    """Table of (k + 1) u^2/2, between the chambers: u/sqrt(head), and with a crest the share
+    (alpha + k_up)/(k + 1) of the head that is lost up to it; where the way back differs, its share too."""
     hump: Table | None
-    """Of (alpha + k_up) u^2/2, from the driven chamber to the lowest pressure on the path, at the end of the
-    crest's arc or just behind it: u/sqrt(head); None without a crest."""
+    """Table of (alpha + k_up) u^2/2, from the driven chamber to the lowest pressure on the path, at the end
+    of the crest's arc or just behind it: u/sqrt(head); None without a crest."""
     return_hump: Table | None
-    """The same from the opposite chamber, for reverse flow; None: it is the same, or there is no crest."""
+    """Table as `hump` from the opposite chamber, for reverse flow; None: an equal one, or no crest."""
     interpolation_error: float = 0.0
     """Largest relative error of a head found between knots; zero where none was looked for."""
 
@@ -87,7 +87,7 @@ class TubeHeads:
         """
         log_u = _places(2 * _SAMPLES - 1)
         lost = [_Lost.of(log_u, value[:, 0]) for value in _sampled(scene, log_u)]
-        columns = _columns(lost, _OF_TOLERANCE * max(scene.tolerance, _FINEST))
+        columns = _columns(lost, _OF_TOLERANCE * max(scene.tolerance, _FINEST_TOLERANCE))
         heads = cls._of_tables(
             [table_at(way.root, knots_of(way.root, each, shortest=2), each) for way, each in columns]
         )
@@ -104,7 +104,7 @@ class TubeHeads:
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        """Of the whole tube, and of the ways to a crest, in the order of `point`."""
+        """Tables of the whole tube, and of the ways to a crest, in the order of `point`."""
         return tuple(each for each in (self.siphon, self.hump, self.return_hump) if each is not None)
 
     def to_crest(self, *, reverse: bool) -> Table | None:
@@ -112,7 +112,7 @@ class TubeHeads:
         return self.return_hump or self.hump if reverse else self.hump
 
     def velocity(self, head: npt.ArrayLike, table: Table | None = None) -> FloatArray:
-        """Of a full tube under heads of at least zero, m/s. Args: `table`: default the whole tube's."""
+        """Velocity of a full tube under heads of at least zero, m/s. Args: `table`: default `siphon`."""
         root, table = np.sqrt(np.sqrt(np.sqrt(np.asarray(head, dtype=np.float64)))), table or self.siphon
         slower = np.minimum(root / table.knots[0], 1.0) ** 4
         return np.asarray(root**4 * table.quintic(root) * slower)
@@ -150,27 +150,27 @@ class _Lost:
             curvature=np.where(falls, 0.0, curvature),
         )
 
-    def ratio(self, allowed: float) -> Column:
+    def ratio(self, allowed: float) -> TableColumn:
         """u/s^4 over s, by the derivatives of ln u over ln s."""
         ratio, rise = self.over_root, 8 / self.slope - 4
         turn = -64 * self.curvature / self.slope**3
         slope, curvature = ratio * rise / self.root, ratio * (rise * (rise - 1) + turn) / self.root**2
-        return Column(value=ratio, allowed=allowed * ratio, derivatives=(slope, curvature))
+        return TableColumn(value=ratio, allowed=allowed * ratio, derivatives=(slope, curvature))
 
-    def share(self, way: _Lost, allowed: float) -> Column:
-        """Of this head, that is lost on the way to the crest, over s."""
+    def share(self, way: _Lost, allowed: float) -> TableColumn:
+        """Share of this head that is lost on the way to the crest, over s."""
         share = np.exp(way.log_head - self.log_head)
         slope = share * (way.slope / self.slope - 1) * 8 / self.root
-        return Column(value=share, allowed=_OF_SHARES * allowed * share, derivatives=(slope,))
+        return TableColumn(value=share, allowed=_OF_SHARES * allowed * share, derivatives=(slope,))
 
 
-def _columns(lost: list[_Lost], allowed: float) -> list[tuple[_Lost, list[Column]]]:
-    """What the table of each way holds; there and back where they differ."""
-    whole, *ways = lost
+def _columns(lost: list[_Lost], allowed: float) -> list[tuple[_Lost, list[TableColumn]]]:
+    """Columns of the table of each way; both ways to the crest where they differ."""
+    siphon, *ways = lost
     alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
     ways = ways[:1] if alike else ways
-    columns = [whole.ratio(allowed), *(whole.share(way, allowed) for way in ways)]
-    return [(whole, columns), *((way, [way.ratio(allowed)]) for way in ways)]
+    columns = [siphon.ratio(allowed), *(siphon.share(way, allowed) for way in ways)]
+    return [(siphon, columns), *((way, [way.ratio(allowed)]) for way in ways)]
 
 
 def _places(count: int) -> FloatArray:
@@ -218,7 +218,7 @@ def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
 
 
 def _inconsistent(scene: Scene) -> SceneError:
-    """That the head falls where the velocity grows, by what the scene says of its models or by them alone.
+    """Error of a head that falls where the velocity grows, by the scene's model errors or without any.
 
     A bend's friction at rest belongs to its leg, and what rotation adds is spread along the path: where bends
     are nearly the whole tube, rotation's share of a leg falls at the transition faster than its head grows.
@@ -277,7 +277,8 @@ def log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
         return [between]
     back = reversed_tube(tube), replace(state, bends=state.bends[::-1])
     to_crest = (
-        crest_head(scene=scene, tube=seen, state=there, velocity=u) for seen, there in ((tube, state), back)
+        crest_head(scene=scene, tube=side, state=side_state, velocity=u)
+        for side, side_state in ((tube, state), back)
     )
     return [between, *map(np.log, to_crest)]
 

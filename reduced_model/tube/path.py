@@ -34,17 +34,17 @@ class Places:
     """At a doubled share: whether this entry lies behind what is lumped there."""
 
     @classmethod
-    def along(cls, *, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
+    def even(cls, *, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
         """Even places along the path, with its crest, and doubled at both ends, at the bends and where asked.
 
         Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
         """
         twice = np.unique(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
         crest = () if tube.hump_radius is None else crest_span(tube)
-        kept = np.append(twice, crest)
+        exact = np.append(twice, crest)
         even = np.linspace(0.0, 1.0, points)
         # An even place that differs from another by rounding only would stand for nothing.
-        even = even[np.min(np.abs(even[:, None] - kept), axis=1) > _SAME]
+        even = even[np.min(np.abs(even[:, None] - exact), axis=1) > _SAME]
         once = np.concatenate([even, np.unique([share for share in crest if share not in twice])])
         share = np.concatenate([once, twice, twice])
         after = np.concatenate([np.zeros(once.size + twice.size), np.ones(twice.size)]).astype(np.bool_)
@@ -87,11 +87,16 @@ def crest_span(tube: Tube) -> tuple[float, float]:
     the tube is longer than its shortest path may lie anywhere, at the most all of it before the crest or
     behind: the error of `CREST_ERROR`, from -1.96 to 1.96.
     """
-    arc, error = _arc_fraction(tube), tube.model_error(CREST_ERROR) / NORMAL_95
+    if tube.hump_radius is None or tube.hump_shape == "point":
+        return tube.hump_position, tube.hump_position
+    port, crest = tube.port_radius, tube.hump_radius
+    shortest = shortest_path(port_radius=port, hump_radius=crest, separation=math.pi)
+    arc = plain(crest * (math.pi - 2 * np.arccos(np.minimum(crest / port, 1.0))) / shortest)
+    error = tube.model_error(CREST_ERROR) / NORMAL_95
     span = tube.hump_position * (1 - arc), tube.hump_position + (1 - tube.hump_position) * arc
     if np.all(error == 0) or np.all(arc == 0):
         return span
-    slack, error = np.maximum(1 - _shortest(tube) / tube.length, 0.0), np.clip(error, -1.0, 1.0)
+    slack, error = np.maximum(1 - shortest / tube.length, 0.0), np.clip(error, -1.0, 1.0)
     # A parabola through both ends and what the stretched path has, smooth where no error is supposed.
     start, end = (
         plain(
@@ -111,18 +116,6 @@ def crest_middle(tube: Tube) -> float:
     return sum(crest_span(tube)) / 2
 
 
-def _arc_fraction(tube: Tube) -> float:
-    if tube.hump_radius is None or tube.hump_shape == "point":
-        return 0.0
-    touch = np.arccos(np.minimum(tube.hump_radius / tube.port_radius, 1.0))
-    share: float = plain(tube.hump_radius * (math.pi - 2 * touch) / _shortest(tube))
-    return share
-
-
-def _shortest(tube: Tube) -> float:
-    return shortest_path(port_radius=tube.port_radius, hump_radius=tube.hump_radius, separation=math.pi)
-
-
 def crest_head(
     *, scene: Scene, tube: Tube, state: TubeState, velocity: FloatArray, lowest: bool = True
 ) -> FloatArray:
@@ -131,39 +124,39 @@ def crest_head(
     fall = (state.kinetic_factor + state.upstream_loss(crest_span(tube)[1])) * kinetic
     if not lowest:
         return np.asarray(fall)
-    behind = head_behind_crest(tube=tube, along=state.spread_loss * kinetic, square=scene.rotor.speed**2)
+    behind = head_behind_crest(tube=tube, loss=state.spread_loss * kinetic, square=scene.rotor.speed**2)
     return np.asarray(fall + behind)
 
 
-def head_behind_crest(*, tube: Tube, along: FloatArray, square: float | FloatArray) -> FloatArray:
+def head_behind_crest(*, tube: Tube, loss: FloatArray, square: float | FloatArray) -> FloatArray:
     """Head by which the pressure still falls behind the arc's end, where the leg rises slowest, m^2/s^2.
 
     The far leg loses A o and gains B o^2/2, o from 0 on the circle to 1 at the port, so the fall is
-    A o - B o^2/2 at o = min(A/B, 1); A = `along` (1 - s), B = omega^2 (r_p^2 - r_m^2).
-    Args: `along`: head lost along the whole path. `square`: omega^2; both may be over the same u^2/2.
+    A o - B o^2/2 at o = min(A/B, 1); A = `loss` (1 - s), B = omega^2 (r_p^2 - r_m^2).
+    Args: `loss`: head lost along the whole path. `square`: omega^2; both may be over the same u^2/2.
     """
-    loss, rise = _far_leg(tube, along, square)
-    place = np.minimum(loss / rise, 1.0)
-    return np.asarray(loss * place - rise * place**2 / 2)
+    loss, rise = _far_leg(tube, loss, square)
+    outward = np.minimum(loss / rise, 1.0)
+    return np.asarray(loss * outward - rise * outward**2 / 2)
 
 
-def lowest_place(tube: Tube, along: float, square: float) -> float:
+def lowest_place(tube: Tube, loss: float, square: float) -> float:
     """Fraction s/L of the path at which the pressure of a full tube is lowest; as `head_behind_crest`."""
-    end, (loss, rise) = crest_span(tube)[1], _far_leg(tube, np.asarray(along), square)
-    return end + (1 - end) * min(float(loss / rise), 1.0)
+    end, (leg_loss, rise) = crest_span(tube)[1], _far_leg(tube, np.asarray(loss), square)
+    return end + (1 - end) * min(float(leg_loss / rise), 1.0)
 
 
 def _far_leg(
-    tube: Tube, along: FloatArray, square: float | FloatArray
+    tube: Tube, loss: FloatArray, square: float | FloatArray
 ) -> tuple[FloatArray, float | FloatArray]:
     """A and B; a leg that runs straight in r rises at once."""
     if tube.hump_radius is None or tube.hump_shape == "point":
-        return np.zeros_like(along), 1.0
-    return along * (1 - crest_span(tube)[1]), square * (tube.port_radius**2 - tube.hump_radius**2)
+        return np.zeros_like(loss), 1.0
+    return loss * (1 - crest_span(tube)[1]), square * (tube.port_radius**2 - tube.hump_radius**2)
 
 
 def _bend_shares(tube: Tube) -> tuple[FloatArray, FloatArray]:
-    """Where both halves of every bend sit, s/L: (i + 1/2)/n of the legs put together, or of a plain tube.
+    """Places of both halves of every bend, s/L: (i + 1/2)/n of the legs put together, or of a plain tube.
 
     The halves of a bend in the middle sit at both ends of the crest.
     """

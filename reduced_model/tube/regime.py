@@ -31,7 +31,7 @@ thesis, Delft (2011), ISBN 978-90-8957-018-5.
 CLEARING_UNCERTAINTY: Final = (CLEARING[1] - CLEARING[0]) / (CLEARING[1] + CLEARING[0])
 """Relative, of the Froude number in the middle: that span (95 %)."""
 RELEASED: Final = 0.5
-"""Where between vapour pressure and the downstream gas the cavity is taken to lie with dissolved gas: the
+"""Position of the cavity's pressure from vapour, 0, to the downstream gas, 1, with dissolved gas: the
 middle, with both ends in the uncertainty.
 
 A siphon of untreated water (1.5 m high, a height recalled) choked with bubbles at 37.6 kPa, where vapour
@@ -44,7 +44,7 @@ Pressure = TypeVar("Pressure", float, FloatArray)
 
 
 class TubeEnds(NamedTuple):
-    """What acts on the two ends of the tube, Pa; numbers or arrays."""
+    """Pressures on the two ends of the tube, Pa; numbers or arrays."""
 
     upstream_gas: Any
     """p_A."""
@@ -56,7 +56,7 @@ class TubeEnds(NamedTuple):
     """P_C."""
 
     def reversed(self) -> TubeEnds:
-        """The same ends for flow in the other direction."""
+        """Ends for flow in the other direction."""
         return TubeEnds(self[1], self[0], self[3], self[2])
 
     def upstream_pressure(self) -> Any:
@@ -80,18 +80,18 @@ class TubePath:
     """D_m = rho omega^2 (R2^2 - r_m^2)/2, Pa; None: no crest, the tube stays at the port's radius, under the
     levels of both chambers, and is full whether the gas is on or off."""
     trapped: bool
-    """Whether the gas over the siphon crest must be displaced through the downstream port."""
+    """True if the gas over the siphon crest must be displaced through the downstream port."""
     vapour_pressure: float
     """Gauge, Pa."""
     released: float
-    """Where between the vapour pressure, 0, and the downstream gas, 1, the cavity's pressure is taken;
+    """Position of the cavity's pressure from the vapour pressure, 0, to the downstream gas, 1;
     `RELEASED` with dissolved gas."""
     froude_velocity: float
     """sqrt(g_c d) = sqrt(omega^2 r_m d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
 
     @property
     def crest(self) -> bool:
-        """Whether there is a siphon crest."""
+        """True if the tube has a siphon crest."""
         return self.hump_pressure is not None
 
     @property
@@ -112,7 +112,7 @@ class TubePath:
         return highest
 
     def holds(self, level: float) -> bool | None:
-        """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off.
+        """True if a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off.
 
         None: likely, under the pressure of a cavity over the crest that runs take, and not under every one.
         """
@@ -148,13 +148,13 @@ def stall_pressure(path: Any, ends: Any) -> Any:
 
 @both_ways
 def covered(path: Any, ends: Any) -> Any:
-    """Whether the upstream liquid covers the port; otherwise only gas can leave."""
+    """True where the upstream liquid covers the port; otherwise only gas can leave."""
     return ends[2] >= path.port_pressure
 
 
 @both_ways
 def discharges_openly(path: Any, ends: Any) -> Any:
-    """Whether the downstream liquid leaves the port open to the gas."""
+    """True where the downstream liquid leaves the port open to the gas."""
     return ends[3] < path.port_pressure
 
 
@@ -210,7 +210,7 @@ def cleared(path: Any, velocity: Any) -> Any:
 
 @both_ways
 def can_flow(path: Any, ends: Any, primed: Any) -> Any:
-    """Whether liquid flows: port covered, driving pressure positive, crest passed."""
+    """True where liquid flows: port covered, driving pressure positive, crest passed."""
     flows = covered(path, ends) & (driving_pressure(path, ends) > 0.0)
     if not path.crest:
         return flows
@@ -220,7 +220,7 @@ def can_flow(path: Any, ends: Any, primed: Any) -> Any:
 
 @both_ways
 def holds_at_rest(path: Any, ends: Any, primed: Any) -> Any:
-    """Whether a column in which nothing flows is still there: below a level, or in exact balance."""
+    """True where a column in which nothing flows stays: below a level, or in exact balance."""
     held = primed & covered(path, ends)
     if not path.crest:
         return held
@@ -242,17 +242,17 @@ class ColumnFlow(Generic[Pressure]):
     velocity: Pressure
     """m/s, the smaller of the two below; zero where nothing flows."""
     siphon_velocity: Pressure
-    """Of a full siphon, m/s."""
+    """Velocity of a full siphon, m/s."""
     separation_velocity: Pressure
-    """Of a column that is separated at the crest, m/s; without a crest that of the siphon."""
+    """Velocity of a column that is separated at the crest, m/s; without a crest that of the siphon."""
     spill_velocity: Pressure
-    """Of a column separated by what lay over the crest beforehand: gas in an unprimed tube, m/s."""
+    """Velocity of a column separated by what lay over the crest before: gas in an unprimed tube, m/s."""
     holding: Pressure
     """Pressure that drives the column up to the crest, Pa; without a crest that of the siphon."""
     separated: Truth
-    """Whether the column is separated."""
+    """True where the column is separated."""
     primed: Truth
-    """Whether the tube holds a continuous column afterwards."""
+    """True where the tube holds a continuous column afterwards."""
 
 
 def column_flow(

@@ -19,8 +19,8 @@ from ringbalance.reduced_model.pieces.inverse import (
 from ringbalance.reduced_model.pieces.point import SIPHON
 from ringbalance.reduced_model.pieces.rows import LawRows
 from ringbalance.reduced_model.pieces.table import (
-    Column,
     Table,
+    TableColumn,
     knots_of,
     smooth_table,
     table_at,
@@ -60,8 +60,8 @@ def test_knots_stand_where_the_tolerance_asks_for_them(
     allowed: float, derivatives: int, constant: int
 ) -> None:
     """A Hermite piece of length h and degree n - 1 misses h^n/`constant` of an exponential."""
-    column = Column(value=np.exp(X), allowed=allowed * np.exp(X), derivatives=(np.exp(X),) * derivatives)
-    level = Column(value=np.ones_like(X), allowed=np.zeros_like(X))
+    column = TableColumn(value=np.exp(X), allowed=allowed * np.exp(X), derivatives=(np.exp(X),) * derivatives)
+    level = TableColumn(value=np.ones_like(X), allowed=np.zeros_like(X))
     knots = knots_of(X, [level, column], shortest=2)
     assert np.all(knots % 2 == 0)
     assert (knots[0], knots[-1]) == (0, X.size - 1)

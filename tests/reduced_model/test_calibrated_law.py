@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,32 +31,22 @@ def law(point_calibration: Calibration) -> CalibratedLaw:
     return point_calibration.flow_law
 
 
-def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> CalibratedLaw:
-    """Law of the paper's disc with another tube or speed."""
-    rotor = dataclasses.replace(scene.rotor, speed=speed or scene.rotor.speed)
-    changed = with_tables(scene, tube=tube, rotor=rotor)
-    return chamber_and_law(changed)[1]
+def law_fixture(speed: float | None = None, **tube: object) -> Any:
+    """Fixture with the law of the paper's disc with another tube or speed, rad/s."""
+
+    def variant(point_scene: Scene) -> CalibratedLaw:
+        rotor = {} if speed is None else {"speed": speed}
+        return chamber_and_law(with_tables(point_scene, tube=tube, rotor=rotor))[1]
+
+    return pytest.fixture(scope="module")(variant)
 
 
-@pytest.fixture(scope="module")
-def slow(point_scene: Scene) -> CalibratedLaw:
-    """At 3000 rpm a column holds over the crest without gas."""
-    return variant(point_scene, speed=314.0)
-
-
-@pytest.fixture(scope="module")
-def trapped(point_scene: Scene) -> CalibratedLaw:
-    return variant(point_scene, hump_gas="trapped")
-
-
-@pytest.fixture(scope="module")
-def straight(point_scene: Scene) -> CalibratedLaw:
-    return variant(point_scene, hump_radius=None)
-
-
-@pytest.fixture(scope="module")
-def inner_port(point_scene: Scene) -> CalibratedLaw:
-    return variant(point_scene, port_radius=43.5e-3)
+slow = law_fixture(speed=314.0)  # a column holds over the crest without gas
+slow_near = law_fixture(speed=314.0, hump_position=0.2)
+slow_far = law_fixture(speed=314.0, hump_position=0.8)
+trapped = law_fixture(hump_gas="trapped")
+straight = law_fixture(hump_radius=None)
+inner_port = law_fixture(port_radius=43.5e-3)
 
 
 def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, point_scene: Scene) -> None:
@@ -149,22 +139,17 @@ def test_gas_off_a_fast_rotors_column_separates(law: CalibratedLaw) -> None:
     assert not np.any(flow.primed)
 
 
-def test_reverse_flow_is_judged_from_the_opposite_side(point_scene: Scene) -> None:
-    near, far = (variant(point_scene, speed=314.0, hump_position=s) for s in (0.2, 0.8))
-    forward = near.evaluate(fill_ratio=0.4, opposite_fill_ratio=0.05, gas_pressure=0.0, primed=True)
-    backward = far.evaluate(fill_ratio=0.05, opposite_fill_ratio=0.4, gas_pressure=0.0, primed=True)
+def test_reverse_flow_is_judged_from_the_opposite_side(
+    slow_near: CalibratedLaw, slow_far: CalibratedLaw
+) -> None:
+    forward = slow_near.evaluate(fill_ratio=0.4, opposite_fill_ratio=0.05, gas_pressure=0.0, primed=True)
+    backward = slow_far.evaluate(fill_ratio=0.05, opposite_fill_ratio=0.4, gas_pressure=0.0, primed=True)
     assert float(backward.velocity) == pytest.approx(-float(forward.velocity), rel=1e-12)
 
 
 def test_levels_that_leave_the_port(inner_port: CalibratedLaw) -> None:
-    law = inner_port
-    covered = float(
-        np.interp(
-            law.path.port_pressure,
-            law.hydrostatic_pressure(np.linspace(0, 0.5, 5001)),
-            np.linspace(0, 0.5, 5001),
-        )
-    )
+    law, fills = inner_port, np.linspace(0, 0.5, 5001)
+    covered = float(np.interp(law.path.port_pressure, law.hydrostatic_pressure(fills), fills))
     blown = law.evaluate(fill_ratio=[covered * 0.99, covered * 1.01], gas_pressure=1e6, primed=True)
     assert list(blown.velocity > 0) == [False, True]
     assert list(blown.primed) == [False, True]
@@ -214,16 +199,10 @@ def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
 ) -> None:
     """Supply and surroundings alike: the same disc with both pressures as they are on the liquid flows alike,
     separated over vapour as well, and holds alike at rest."""
-    tube = dataclasses.replace(point_scene.tube, hump_gas=crest_gas)
-    scene = dataclasses.replace(point_scene, tube=tube)
-    on_shaft = with_tables(scene, gas={"measured_at": "shaft"})
-    ratio = pressure_factor(on_shaft)
-    gas = dataclasses.replace(
-        scene.gas,
-        pressure=ratio * scene.gas.pressure,
-        ambient_pressure=ratio * scene.gas.ambient_pressure,
-    )
-    on_liquid = dataclasses.replace(scene, gas=gas)
+    on_shaft = with_tables(point_scene, tube={"hump_gas": crest_gas}, gas={"measured_at": "shaft"})
+    ratio, gas = pressure_factor(on_shaft), point_scene.gas
+    pressures = {"pressure": ratio * gas.pressure, "ambient_pressure": ratio * gas.ambient_pressure}
+    on_liquid = with_tables(point_scene, tube={"hump_gas": crest_gas}, gas=pressures)
     laws = [nominal_law(each, gravity=False) for each in (on_shaft, on_liquid)]
     for p in (0.0, 0.56e6, 0.7e6, 1.5e6):
         one, other = (
@@ -248,8 +227,7 @@ def test_laws_of_many_scenes_are_those_of_each(
 ) -> None:
     """Whether everything that the tube's head depends on differs between them, a part of it, or nothing."""
     scene = with_tables(point_scene, tube=tube)
-    rotors = [dataclasses.replace(scene.rotor, speed=each * scene.rotor.speed) for each in speeds]
-    scenes = [dataclasses.replace(scene, rotor=each) for each in rotors]
+    scenes = [with_tables(scene, rotor={"speed": each * scene.rotor.speed}) for each in speeds]
     many, single = nominal_laws(scenes, gravity=False), [nominal_law(each, gravity=False) for each in scenes]
     for p in (0.7e6, 1.5e6):
         at_once, alone = (

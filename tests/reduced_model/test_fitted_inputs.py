@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ from quantities import inputs_of
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.making import nominal_law, side_laws
 from ringbalance.reduced_model.law.sides import half_widths_of
 from ringbalance.reduced_model.tube.heads import velocities_of
@@ -102,17 +99,6 @@ def test_budget_and_law_follow_the_correlations(paper_scene: Scene) -> None:
         assert inputs["fitted"] == pytest.approx(expected, rel=0.05)
         assert by_law == pytest.approx(expected, rel=0.05)
         assert expected != pytest.approx(alone, rel=0.15)
-
-
-def test_a_law_with_fitted_inputs_is_read_back_as_it_was(paper_scene: Scene, tmp_path: Path) -> None:
-    law = calibrate(fitted(paper_scene, 0.9)).flow_law
-    again = load_law(law.save(tmp_path / "law.json"))
-    assert isinstance(again, CalibratedLaw)
-    stored, read = (
-        each.evaluate(fill_ratio=np.array([0.1, 0.25, 0.4]), gas_pressure=5e5).uncertainty
-        for each in (law, again)
-    )
-    assert np.array_equal(stored, read)
 
 
 def test_a_correction_of_a_model_changes_the_law(paper_scene: Scene) -> None:

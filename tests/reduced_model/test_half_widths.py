@@ -37,13 +37,11 @@ class Compared(NamedTuple):
 
 def regimes(laws: tuple[CalibratedLaw, ...], x: FloatArray, p: FloatArray, primed: BoolArray) -> FloatArray:
     """Regime of each law, and whether liquid covers either port; a number for each, shape (laws, n)."""
-    asked = {"fill_ratio": x, "opposite_fill_ratio": laws[0].max_fill_ratio - x}
-    found = []
-    for each in laws:
-        regime, ends = each.evaluate(**asked, gas_pressure=p, primed=primed).regime, each.ends(**asked)
-        ports = covered(each.path, ends) + 2.0 * discharges_openly(each.path, ends)
-        found.append(regime + 10.0 * ports)
-    return np.array(found)
+    fills, numbers = {"fill_ratio": x, "opposite_fill_ratio": laws[0].max_fill_ratio - x}, []
+    for law in laws:
+        regime, ends = law.evaluate(**fills, gas_pressure=p, primed=primed).regime, law.ends(**fills)
+        numbers.append(regime + 10.0 * covered(law.path, ends) + 20.0 * discharges_openly(law.path, ends))
+    return np.array(numbers)
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -107,11 +105,10 @@ def test_whether_a_regime_is_undecided_hangs_on_the_batch(compared: Compared) ->
 
 def test_at_the_operating_point_it_is_that_of_the_quantities(table_1_calibration: Calibration) -> None:
     """The law is on 257 knots and without gravity, and between nodes a half-width is off by a hundredth."""
-    found = table_1_calibration
-    law, parts = found.flow_law, found.quantities["velocity"].parts
+    law, parts = table_1_calibration.flow_law, table_1_calibration.quantities["velocity"].parts
     assert parts is not None
-    half = law.max_fill_ratio / 2
-    flow = law.evaluate(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=found.scene.gas.pressure)
+    pressure = table_1_calibration.scene.gas.pressure
+    flow = law.evaluate(fill_ratio=law.max_fill_ratio / 2, gas_pressure=pressure)
     expected = math.hypot(parts.numerical, parts.input, parts.model)
     assert float(flow.uncertainty) == pytest.approx(expected, rel=0.02)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 from law_queries import queries
@@ -90,9 +87,3 @@ def test_the_error_of_tables_is_part_of_the_uncertainty(law: CalibratedLaw) -> N
     sharp, wide = law.evaluate(**at), coarse.evaluate(**at)
     added = np.sqrt(wide.uncertainty**2 - sharp.uncertainty**2) / sharp.velocity
     assert float(added) == pytest.approx(0.02, rel=1e-4)
-
-
-def test_its_file_is_small(law: CalibratedLaw, tmp_path: Path) -> None:
-    path = law.save(tmp_path / "law.json")
-    assert path.stat().st_size < 150_000
-    assert json.loads(path.read_text())["version"] == 5

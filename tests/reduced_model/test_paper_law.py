@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.models import Scene
+from scenes import with_tables
 
 
 def test_law_is_eq_19(table_1_scene: Scene) -> None:
@@ -54,8 +53,7 @@ def test_table_reproduces_the_law(table_1_scene: Scene) -> None:
 
 
 def test_scene_fixes_prescribed_k(table_1_scene: Scene) -> None:
-    tube = dataclasses.replace(table_1_scene.tube, drag_coefficient=20.0)
-    assert paper_law(dataclasses.replace(table_1_scene, tube=tube)).drag_coefficient == 20.0
+    assert paper_law(with_tables(table_1_scene, tube={"drag_coefficient": 20.0})).drag_coefficient == 20.0
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ CEILINGS = {
     "results": {"names": 0, "texts": 0, "constants": 0},
     "mesh": {"names": 0, "texts": 0, "constants": 0},
     "physics": {"names": 0, "texts": 0, "constants": 0},
-    "reduced_model": {"names": 122, "texts": 220, "constants": 20},
+    "reduced_model": {"names": 1, "texts": 0, "constants": 0},
     "controller": {"names": 4, "texts": 0, "constants": 0},
     "identification": {"names": 1, "texts": 11, "constants": 17},
     "export": {"names": 0, "texts": 0, "constants": 0},

@@ -1,4 +1,4 @@
-"""What all tests share: one thread, no display, Hypothesis examples that are the same on every run."""
+"""Shared by all tests: one thread, no display, Hypothesis examples that are the same on every run."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _FIRST: Final = (
 def _place(item: pytest.Item) -> int:
     path = item.path.relative_to(_FOLDER)
     names = {path.as_posix(), path.parts[0]}
-    return next((place for place, name in enumerate(_FIRST) if name in names), len(_FIRST))
+    return next((index for index, name in enumerate(_FIRST) if name in names), len(_FIRST))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -59,7 +59,7 @@ def run(*words: str | Path) -> Finished:
 
 
 @pytest.fixture
-def here(capsys: pytest.CaptureFixture[str]) -> Run:
+def run_in_process(capsys: pytest.CaptureFixture[str]) -> Run:
     """One command line in this process, which has loaded everything already."""
 
     def run_here(*words: str | Path) -> Finished:
@@ -70,13 +70,13 @@ def here(capsys: pytest.CaptureFixture[str]) -> Run:
     return run_here
 
 
-def assert_bad_input(found: Finished, *told: str) -> None:
+def assert_bad_input(finished: Finished, *messages: str) -> None:
     """Exit code 2, nothing on standard output, no traceback, and the words that tell what is wrong."""
-    assert found.returncode == 2
-    assert found.stdout == ""
-    assert "Traceback" not in found.stderr
-    for word in told:
-        assert word in found.stderr
+    assert finished.returncode == 2
+    assert finished.stdout == ""
+    assert "Traceback" not in finished.stderr
+    for word in messages:
+        assert word in finished.stderr
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def broken_scene(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "messages"),
     [
         (["reprt"], ["reprt", '"report"']),
         (["calibrate", PAPER, "--jsn"], ["--jsn", "--json"]),
@@ -111,41 +111,43 @@ def broken_scene(tmp_path: Path) -> Path:
         (["sweep", PAPER, "--vary", "tube.bore=1mm,2mm", "--out", "o", "--write"], ["--write", "at least 1"]),
     ],
 )
-def test_wrong_usage(words: list[str], told: list[str], here: Run) -> None:
-    assert_bad_input(here(*words), *told)
+def test_wrong_usage(words: list[str], messages: list[str], run_in_process: Run) -> None:
+    assert_bad_input(run_in_process(*words), *messages)
 
 
 @pytest.mark.parametrize("command", ["calibrate", "simulate", "report", "plot"])
 def test_a_broken_scene_is_reported_in_one_message(
-    command: str, broken_scene: Path, tmp_path: Path, here: Run
+    command: str, broken_scene: Path, tmp_path: Path, run_in_process: Run
 ) -> None:
     more: list[str | Path] = ["--out", tmp_path / "out"] if command in {"report", "plot"} else []
-    found = here(command, broken_scene, *more)
-    assert_bad_input(found, "broken.toml", "outer_radiuss", "outer_radius", "furlongs", "chambers = 3")
+    finished = run_in_process(command, broken_scene, *more)
+    assert_bad_input(finished, "broken.toml", "outer_radiuss", "outer_radius", "furlongs", "chambers = 3")
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("words", [["reprt"], ["calibrate"], ["verify", "no_such_case"], ["calibrate", None]])
-def test_a_process_ends_as_its_command_does(words: list[Any], broken_scene: Path, here: Run) -> None:
-    given = [word or broken_scene for word in words]
-    found, expected = run(*given), here(*given)
-    assert (found.returncode, found.stdout, found.stderr) == (2, "", expected.stderr)
+def test_a_process_ends_as_its_command_does(
+    words: list[Any], broken_scene: Path, run_in_process: Run
+) -> None:
+    command_line = [word or broken_scene for word in words]
+    finished, expected = run(*command_line), run_in_process(*command_line)
+    assert (finished.returncode, finished.stdout, finished.stderr) == (2, "", expected.stderr)
     assert expected.returncode == 2
 
 
-def test_the_list_of_cases_is_clean_json(here: Run) -> None:
-    found = here("verify", "--list", "--json")
-    assert found.returncode == 0
-    assert {"id", "kind"} <= set(json.loads(found.stdout)[0])
+def test_the_list_of_cases_is_clean_json(run_in_process: Run) -> None:
+    finished = run_in_process("verify", "--list", "--json")
+    assert finished.returncode == 0
+    assert {"id", "kind"} <= set(json.loads(finished.stdout)[0])
 
 
 @pytest.mark.parametrize("words", [["calibrate", PAPER, "--save"], ["plot", PAPER, "--out"]])
-def test_a_file_where_a_folder_should_be(words: list[str], tmp_path: Path, here: Run) -> None:
+def test_a_file_where_a_folder_should_be(words: list[str], tmp_path: Path, run_in_process: Run) -> None:
     (tmp_path / "in_the_way").touch()
-    found = here(*words, tmp_path / "in_the_way" / "law.json")
-    assert found.returncode == 2
-    assert "Traceback" not in found.stderr
-    assert "in_the_way" in found.stderr
+    finished = run_in_process(*words, tmp_path / "in_the_way" / "law.json")
+    assert finished.returncode == 2
+    assert "Traceback" not in finished.stderr
+    assert "in_the_way" in finished.stderr
 
 
 @pytest.mark.parametrize(("program", "delay"), [(READY, 0.2), (AT_WORK, 1.0)], ids=["loading", "at work"])
@@ -160,9 +162,9 @@ def test_an_interrupted_report_leaves_nothing_half_written(
         time.sleep(delay)
         assert child.poll() is None
         child.send_signal(signal.SIGINT)
-        _, told = child.communicate(timeout=60)
+        _, messages = child.communicate(timeout=60)
     assert child.returncode == 130
-    assert "Traceback" not in told
+    assert "Traceback" not in messages
     assert not (tmp_path / "out" / "report.html").exists()
     assert [path for path in tmp_path.rglob(".*") if path.is_file()] == []
 
@@ -212,13 +214,13 @@ def test_every_fault_stands_on_its_line(
     command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert command(SceneError((fault("bore"), fault("length")))) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert len(told.err.strip().splitlines()) == 2
+    messages = capsys.readouterr()
+    assert messages.out == ""
+    assert len(messages.err.strip().splitlines()) == 2
 
 
 @pytest.mark.parametrize(
-    ("outcome", "code", "told"),
+    ("outcome", "code", "messages"),
     [
         (KeyboardInterrupt(), 130, "interrupted"),
         (PermissionError(13, "Permission denied", "law.json"), 2, "law.json"),
@@ -229,11 +231,11 @@ def test_what_ends_a_command_is_said(
     command: Callable[[BaseException | int], int],
     outcome: BaseException,
     code: int,
-    told: str,
+    messages: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert command(outcome) == code
-    assert told in capsys.readouterr().err
+    assert messages in capsys.readouterr().err
 
 
 def test_a_fault_of_the_program_is_not_hidden(command: Callable[[BaseException | int], int]) -> None:
@@ -280,26 +282,28 @@ runpy.run_module("ringbalance", run_name="__main__")
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
-def test_brief_prints_a_title_main_numbers_and_the_verdict(here: Run) -> None:
-    whole, brief = here("calibrate", PAPER), here("calibrate", "--brief", PAPER)
+def test_brief_prints_a_title_main_numbers_and_the_verdict(run_in_process: Run) -> None:
+    full, brief = run_in_process("calibrate", PAPER), run_in_process("calibrate", "--brief", PAPER)
     assert brief.returncode == 0
-    assert brief.stdout.splitlines()[0] == whole.stdout.splitlines()[0]
-    assert len(brief.stdout.splitlines()) <= 7 < len(whole.stdout.splitlines())
+    assert brief.stdout.splitlines()[0] == full.stdout.splitlines()[0]
+    assert len(brief.stdout.splitlines()) <= 7 < len(full.stdout.splitlines())
     assert "lambda per transferred mass" in brief.stdout
     assert "usable moment in any direction" in brief.stdout
 
 
-def test_quiet_silences_messages_and_not_errors(here: Run, tmp_path: Path) -> None:
+def test_quiet_silences_messages_and_not_errors(run_in_process: Run, tmp_path: Path) -> None:
     law = tmp_path / "law.json"
-    assert str(law) in here("calibrate", PAPER, "--save", law).stderr
-    assert here("calibrate", PAPER, "--save", law, "--quiet").stderr == ""
-    assert_bad_input(here("--quiet", "calibrate", "absent.toml"), "absent.toml")
+    assert str(law) in run_in_process("calibrate", PAPER, "--save", law).stderr
+    assert run_in_process("calibrate", PAPER, "--save", law, "--quiet").stderr == ""
+    assert_bad_input(run_in_process("--quiet", "calibrate", "absent.toml"), "absent.toml")
 
 
-def test_a_log_has_command_lines_messages_and_errors_with_their_times(here: Run, tmp_path: Path) -> None:
+def test_a_log_has_command_lines_messages_and_errors_with_their_times(
+    run_in_process: Run, tmp_path: Path
+) -> None:
     log, law = tmp_path / "log.txt", tmp_path / "law.json"
-    here("calibrate", PAPER, "--save", law, "--log", log, "--quiet")
-    here("calibrate", "absent.toml", "--log", log)
+    run_in_process("calibrate", PAPER, "--save", law, "--log", log, "--quiet")
+    run_in_process("calibrate", "absent.toml", "--log", log)
     lines = log.read_text(encoding="utf-8").splitlines()
     assert all(re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} (INFO|ERROR) ", line) for line in lines)
     assert [line for line in lines if f"law written to {law}" in line]
@@ -307,25 +311,25 @@ def test_a_log_has_command_lines_messages_and_errors_with_their_times(here: Run,
     assert len([line for line in lines if re.search(r"INFO ringbalance [\d.]+ calibrate ", line)]) == 2
 
 
-def test_a_log_that_cannot_be_written_is_refused(here: Run, tmp_path: Path) -> None:
-    assert_bad_input(here("calibrate", PAPER, "--log", tmp_path / "absent" / "log.txt"), "log.txt")
+def test_a_log_that_cannot_be_written_is_refused(run_in_process: Run, tmp_path: Path) -> None:
+    assert_bad_input(run_in_process("calibrate", PAPER, "--log", tmp_path / "absent" / "log.txt"), "log.txt")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_has_an_example_and_the_exit_codes_of_its_command(here: Run, name: str) -> None:
-    shown = " ".join(here(name, "--help").stdout.split())
+def test_help_has_an_example_and_the_exit_codes_of_its_command(run_in_process: Run, name: str) -> None:
+    shown = " ".join(run_in_process(name, "--help").stdout.split())
     assert f"Example: ringbalance {name}" in shown
     assert ("0 done; 1 " in shown) == bool(COMMANDS[name].failure)
     assert "docs/commands.md" in shown
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_documented_option_is_accepted(here: Run, name: str) -> None:
+def test_every_documented_option_is_accepted(run_in_process: Run, name: str) -> None:
     """By the page of commands and by `--help`; a value that lacks is another error."""
     page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     row = re.search(rf"^\| `ringbalance {name}\b[^`]*`", page, re.MULTILINE)
     assert row is not None
-    listed = re.findall(r"^│[ *]+((?:--[a-z-]+ )+)", here(name, "--help").stdout, re.MULTILINE)
+    listed = re.findall(r"^│[ *]+((?:--[a-z-]+ )+)", run_in_process(name, "--help").stdout, re.MULTILINE)
     assert listed
     elsewhere = {"--help", "--version", "--install-completion", "--brief", "--quiet", "--log"}
     options = {*re.findall(r"--[a-z][a-z-]*", f"{row[0]} {listed}")} - elsewhere
@@ -342,10 +346,10 @@ def test_every_documented_option_is_accepted(here: Run, name: str) -> None:
 
 
 def test_the_shell_s_completion_is_written(
-    here: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_in_process: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("SHELL", "/bin/bash")
-    assert here("--install-completion").returncode == 0
+    assert run_in_process("--install-completion").returncode == 0
     (script,) = tmp_path.rglob("completions/ringbalance")
     assert {"calibrate", "--tolerance"} <= set(script.read_text().replace("'", " ").split())

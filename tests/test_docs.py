@@ -55,16 +55,16 @@ def test_links_into_a_page_lead_to_a_heading(page: str) -> None:
 
 @pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
 def test_the_commands_are_those_registered(page: str) -> None:
-    told = re.findall(r"^\| `ringbalance (\w+)", text(page), re.MULTILINE)
-    assert sorted(told) == sorted(COMMANDS)
+    listed = re.findall(r"^\| `ringbalance (\w+)", text(page), re.MULTILINE)
+    assert sorted(listed) == sorted(COMMANDS)
 
 
 def test_the_readme_opens_with_two_small_pictures_that_pages_draw() -> None:
     pictures = re.findall(r"^!\[[^\]]+\]\(([^)]+)\)$", text("README.md"), re.MULTILINE)
     assert len(pictures) == 2
     assert sum((ROOT / each).stat().st_size for each in pictures) < 300_000
-    drawn = text("docs/gallery.md") + text("docs/tutorials/first-report.md")
-    assert all(Path(each).name in drawn for each in pictures)
+    pages_text = text("docs/gallery.md") + text("docs/tutorials/first-report.md")
+    assert all(Path(each).name in pages_text for each in pictures)
 
 
 def test_the_readme_s_scene_is_one(tmp_path: Path) -> None:
@@ -85,11 +85,11 @@ def test_names_that_pages_mention_exist() -> None:
     for page in PAGES:
         for path in re.findall(r"(?<![\w.-])ringbalance((?:\.[a-zA-Z_]\w*)+)", text(page)):
             parts = path.lstrip(".").split(".")
-            found: Any = rb
+            member: Any = rb
             for depth, part in enumerate(parts, start=1):
                 inside = ".".join(["ringbalance", *parts[:depth]])
-                is_module = hasattr(found, "__path__") and find_spec(inside) is not None
-                found = import_module(inside) if is_module else getattr(found, part)
+                is_module = hasattr(member, "__path__") and find_spec(inside) is not None
+                member = import_module(inside) if is_module else getattr(member, part)
         for name in re.findall(r"\brb\.([a-zA-Z_]\w*)", text(page)):
             assert name in rb.__all__, f"{page}: rb.{name}"
 

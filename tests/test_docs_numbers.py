@@ -103,18 +103,20 @@ def test_where_friction_holds_the_masses(rotor: EccentricScene) -> None:
 
 def test_waves_on_the_paper_s_disc(paper_scene: Scene) -> None:
     page, disc = "how-it-works.md", paper_scene.disc
-    found = sloshing_response(
+    response = sloshing_response(
         disc=disc,
         fill_ratio=[0.25, 0.36, 0.38, 0.5],
         angular_velocity=paper_scene.rotor.speed,
         kinematic_viscosity=paper_scene.liquid.kinematic_viscosity,
         gravity=9.81,
     )
-    moment, pressure = (np.abs(each.value) for each in (found.amplification, found.pressure_amplification))
+    moment, pressure = (
+        np.abs(each.value) for each in (response.amplification, response.pressure_amplification)
+    )
     agrees(page, r"on the paper's disc ([\d.]+) at equal fills", moment[0])
-    low, high = found.amplification_interval[0]
+    low, high = response.amplification_interval[0]
     agrees(page, r"\(([\d.]+) to ([\d.]+) for natural frequencies", low, high)
-    fullest = found.amplification_interval[3]
+    fullest = response.amplification_interval[3]
     agrees(page, r"anything from ([\d.]+) to (\d+) times", *fullest)
     assert moment[1] < 2 < moment[2]
     assert "2 from a fill of 0.37 up" in words(page)

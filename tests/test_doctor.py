@@ -1,4 +1,4 @@
-"""What `doctor` says of a machine that lacks something."""
+"""Findings of `doctor` on a machine that lacks something."""
 
 from __future__ import annotations
 

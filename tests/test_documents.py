@@ -1,4 +1,4 @@
-"""What the commands print with `--json`: every key is documented, every documented key is printed, and
+"""JSON documents of the commands: every key is documented, every documented key is printed, and
 `to_dict()` of what the functions of the same names answer is the same document.
 """
 
@@ -55,12 +55,12 @@ BY_NAME: Final = {
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Scenes: the paper's with a short time limit, and with a gas line."""
-    found = tmp_path_factory.mktemp("scenes")
+    answers = tmp_path_factory.mktemp("scenes")
     short = rb.load_scene(PAPER).with_values({"run.time_limit": "6 s"})
     line = {"gas.conductance": "2 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
     for name, scene in (("short", short), ("line", short.with_values(line))):
-        (found / f"{name}.toml").write_bytes(toml_bytes(document_of(scene)))
-    return found
+        (answers / f"{name}.toml").write_bytes(toml_bytes(document_of(scene)))
+    return answers
 
 
 @pytest.fixture
@@ -88,29 +88,29 @@ def _printed(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> str:
 def rows(heading: str) -> dict[str, tuple[set[str], set[str]]]:
     """By top-level key: words in code type of its rows, and paths in their first column."""
     section = PAGE.read_text(encoding="utf-8").split(f"## {heading}\n")[1].split("\n## ")[0]
-    found: dict[str, tuple[set[str], set[str]]] = {}
+    answers: dict[str, tuple[set[str], set[str]]] = {}
     for line in section.splitlines():
         cells = re.split(r"(?<!\\)\|", line)
         if line.startswith("| `"):
             paths = re.findall(r"`([^`]+)`", cells[1])
             for path in paths:
-                words, firsts = found.setdefault(re.split(r"\.|\[", path)[0], (set(), set()))
+                words, firsts = answers.setdefault(re.split(r"\.|\[", path)[0], (set(), set()))
                 words |= {word.split(".")[-1].split("]")[-1] for word in re.findall(r"`([^`]+)`", line)}
                 firsts.add(path.replace("[]", ""))
-    return found
+    return answers
 
 
-def paths(value: Any, place: str = "") -> Iterator[tuple[str, str]]:
+def paths(value: Any, parent: str = "") -> Iterator[tuple[str, str]]:
     """Place and key of every entry of nested tables and lists; keys that are names count as "*"."""
     if isinstance(value, dict):
         for key, inside in value.items():
-            known = "*" if place in BY_NAME else key
-            yield place, known
-            yield from paths(inside, f"{place}.{known}" if place else known)
+            key_or_star = "*" if parent in BY_NAME else key
+            yield parent, key_or_star
+            yield from paths(inside, f"{parent}.{key_or_star}" if parent else key_or_star)
     elif isinstance(value, list):
         for each in value:
             if isinstance(each, dict | list):
-                yield from paths(each, place)
+                yield from paths(each, parent)
 
 
 def compare(heading: str, documents: list[Any], *, as_in: str = "") -> None:
@@ -118,23 +118,25 @@ def compare(heading: str, documents: list[Any], *, as_in: str = "") -> None:
 
     Args: `as_in`: heading of the section whose words of the same top-level keys count, too.
     """
-    own, shared = rows(heading), rows(SHARED)
+    listed, shared = rows(heading), rows(SHARED)
     for top, (words, _) in rows(as_in).items() if as_in else ():
-        if top in own:
-            own[top] = (own[top][0] | words, own[top][1])
+        if top in listed:
+            listed[top] = (listed[top][0] | words, listed[top][1])
     printed = {pair for document in documents for pair in paths(document)}
     missing = []
-    for place, key in printed:
-        top = (place or key).split(".")[0]
-        words = own.get(top, (set(), set()))[0] | (shared[top][0] if top in own and top in shared else set())
+    for parent, key in printed:
+        top = (parent or key).split(".")[0]
+        words = listed.get(top, (set(), set()))[0] | (
+            shared[top][0] if top in listed and top in shared else set()
+        )
         # A record within another is the one of its name, such as a fraction.
-        words = words | own.get(place.split(".")[-1], (set(), set()))[0]
+        words = words | listed.get(parent.split(".")[-1], (set(), set()))[0]
         if key != "*" and key not in words:
-            missing.append(f"{place}.{key}".strip("."))
+            missing.append(f"{parent}.{key}".strip("."))
     assert sorted(missing) == []
-    there = {f"{place}.{key}".strip(".") for place, key in printed}
-    promised = {path for _, firsts in own.values() for path in firsts}
-    assert sorted(promised - there) == []
+    printed_paths = {f"{parent}.{key}".strip(".") for parent, key in printed}
+    promised = {path for _, firsts in listed.values() for path in firsts}
+    assert sorted(promised - printed_paths) == []
 
 
 def test_keys_of_calibrate(folder: Path, printed: Any) -> None:
@@ -143,9 +145,9 @@ def test_keys_of_calibrate(folder: Path, printed: Any) -> None:
 
 
 def test_keys_of_simulate(folder: Path, printed: Any) -> None:
-    found = [printed("simulate", folder / f"{name}.toml") for name in ("short", "line")]
-    compare("`simulate --json`", found)
-    assert [len(each["gas_line_runs"]) for each in found] == [2, 0]
+    answers = [printed("simulate", folder / f"{name}.toml") for name in ("short", "line")]
+    compare("`simulate --json`", answers)
+    assert [len(each["gas_line_runs"]) for each in answers] == [2, 0]
 
 
 def test_keys_of_simulate_of_eccentric_masses(printed: Any) -> None:
@@ -207,8 +209,8 @@ def test_keys_of_verify(printed: Any) -> None:
 @pytest.mark.heavy
 def test_keys_of_extremes() -> None:
     scene = liquid_ring_scene(rb.load_scene(PAPER))
-    found = find_extremes(scene, size=Size(points=1, sweep=2, fineness=1.0))
-    violated = found.to_dict() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
+    answers = find_extremes(scene, size=Size(points=1, sweep=2, fineness=1.0))
+    violated = answers.to_dict() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
     compare("`extremes --json`", [violated])
 
 
@@ -220,7 +222,7 @@ def test_each_command_names_its_scene(words: tuple[str, str], printed: Any) -> N
 
 
 def as_json(result: Any) -> Any:
-    """What `to_dict` gives as it reads back from JSON."""
+    """Result of `to_dict` as it reads back from JSON."""
     return json.loads(json.dumps(result.to_dict(), allow_nan=False))
 
 

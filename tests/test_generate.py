@@ -17,10 +17,10 @@ def test_what_differs_is_named_or_written(
     same, other = tmp_path / "same", tmp_path / "new" / "other"
     same.write_bytes(b"a")
     contents = {same: b"a", other: b"b"}
-    asked: list[list[str]] = []
+    calls: list[list[str]] = []
 
     def files(words: list[str]) -> Iterator[tuple[Path, bytes]]:
-        asked.append(words)
+        calls.append(words)
         yield from contents.items()
 
     module = SimpleNamespace(files=files)
@@ -33,7 +33,7 @@ def test_what_differs_is_named_or_written(
     assert capsys.readouterr().out == f"{other}: written\n"
     assert other.read_bytes() == b"b"
     assert generate.main(["letters"]) == 0
-    assert asked == [["x", "y"], [], ["z"], []]
+    assert calls == [["x", "y"], [], ["z"], []]
 
 
 @pytest.mark.parametrize("words", [[], ["--write"], ["tables"]])

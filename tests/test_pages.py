@@ -1,4 +1,4 @@
-"""What `make pages` does with a page; no number in the text of a tutorial is typed."""
+"""Treatment of a page by `make pages`; no number in the text of a tutorial is typed."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def test_an_unknown_name_is_refused() -> None:
 
 
 def test_a_saved_law_runs_as_the_fresh_one(paper_scene: Scene, tmp_path: Path) -> None:
-    """What the README shows: calibrate, evaluate, save, load, simulate."""
+    """The steps of the README: calibrate, evaluate, save, load, simulate."""
     scene = paper_scene.with_values({"run.time_limit": "5 s"})
     law = rb.calibrate(scene).flow_law
     flow = law.evaluate(fill_ratio=[0.1, 0.25], gas_pressure=0.7e6)

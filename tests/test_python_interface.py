@@ -47,8 +47,8 @@ def test_answers_pickle_copy_and_print_shortly(name: str) -> None:
 def test_a_pool_gives_calibrations_back() -> None:
     scenes = [short().with_values({"tube.bore": bore}) for bore in ("1.4 mm", "1.6 mm")]
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        found = list(pool.map(rb.calibrate, scenes))
-    for scene, calibration in zip(scenes, found, strict=True):
+        calibrations = list(pool.map(rb.calibrate, scenes))
+    for scene, calibration in zip(scenes, calibrations, strict=True):
         assert calibration.to_dict() == rb.calibrate(scene).to_dict()
 
 
@@ -85,11 +85,11 @@ class Wrapped:
 
 def test_an_algorithm_of_one_s_own_runs_and_is_named() -> None:
     law = rb.paper_law(short())
-    own = rb.simulate(short(), flow_law=law, controller=Wrapped(1.0))
+    user_run = rb.simulate(short(), flow_law=law, controller=Wrapped(1.0))
     usual = answer("run")
-    np.testing.assert_array_equal(own.amplitude, usual.amplitude[: own.amplitude.size])
-    assert own.to_dict()["controller"] == "Wrapped"
-    assert own.to_dict()["gas_line_runs"] == []
+    np.testing.assert_array_equal(user_run.amplitude, usual.amplitude[: user_run.amplitude.size])
+    assert user_run.to_dict()["controller"] == "Wrapped"
+    assert user_run.to_dict()["gas_line_runs"] == []
     assert usual.to_dict()["controller"] == "target_vector"
 
 
@@ -154,16 +154,16 @@ def test_a_law_that_gives_no_arrays_is_refused_in_one_sentence(answer: Any, mess
 def test_what_a_law_of_one_s_own_does_not_give_is_said() -> None:
     law = rb.calibrate(short()).flow_law
     alone = rb.simulate(short(), flow_law=law, modelled=[])
-    own = rb.simulate(short(), flow_law=Slower(1.0))
-    assert own.model.moment is not None
-    assert own.law == "Slower"
-    np.testing.assert_allclose(own.amplitude[-1], alone.amplitude[-1], rtol=0.05, atol=1e-8)
-    unmodelled = {row.term for row in own.models_used if "no forces" in row.why}
+    user_run = rb.simulate(short(), flow_law=Slower(1.0))
+    assert user_run.model.moment is not None
+    assert user_run.law == "Slower"
+    np.testing.assert_allclose(user_run.amplitude[-1], alone.amplitude[-1], rtol=0.05, atol=1e-8)
+    unmodelled = {row.term for row in user_run.models_used if "no forces" in row.why}
     assert "tube inertia" in unmodelled
     for word in (*unmodelled, "moment", "chamber_volume", "density"):
-        assert word in own.status
+        assert word in user_run.status
     half = rb.simulate(short(), flow_law=Slower(0.5))
-    rates = [run.to_dict()["vibration_rate_m_per_s"] for run in (half, own)]
+    rates = [run.to_dict()["vibration_rate_m_per_s"] for run in (half, user_run)]
     assert rates[0] == pytest.approx(rates[1] / 2, rel=1e-9)
     with pytest.raises(TypeError, match="evaluate"):
         rb.simulate(short(), flow_law=object())  # type: ignore[call-overload]

@@ -75,7 +75,7 @@ OFTEN: Final = {
     ("injected", "liquid_ring_paper"),
     ("prescribed", "README"),
 }
-"""What is run with every change; all else is heavy."""
+"""Sequences that run with every change; all others are heavy."""
 RINGS: Final = sorted(
     path.stem
     for path in (ROOT / "scenes").glob("*.toml")
@@ -123,9 +123,9 @@ def followed(commands: list[str]) -> set[tuple[str, str]]:
     """Which command takes a file that which one before it has saved."""
     pairs, saved = set(), dict[str, str]()
     for words in map(shlex.split, commands):
-        place = words.index("--save") if "--save" in words else len(words)
-        pairs |= {(saved[word], words[0]) for word in words[:place] if word in saved}
-        saved |= dict.fromkeys(words[place + 1 : place + 2], words[0])
+        split = words.index("--save") if "--save" in words else len(words)
+        pairs |= {(saved[word], words[0]) for word in words[:split] if word in saved}
+        saved |= dict.fromkeys(words[split + 1 : split + 2], words[0])
     return pairs
 
 

@@ -24,7 +24,7 @@ IN_SCRIPT: Final = re.compile(
 
 
 class References(HTMLParser):
-    """What a page loads by itself, and where its links lead."""
+    """Addresses that a page loads by itself, and targets of its links."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -44,9 +44,9 @@ class References(HTMLParser):
 
 
 def styled(text: str) -> list[str]:
-    """What a style sheet loads; a picture within it loads nothing."""
+    """Addresses that a style sheet loads; a picture within it loads nothing."""
     places = (first or second for first, second in IN_STYLE.findall(text))
-    return [place for place in places if not place.startswith(("data:", "#"))]
+    return [url for url in places if not url.startswith(("data:", "#"))]
 
 
 @pytest.fixture(scope="module")
@@ -85,22 +85,22 @@ def test_every_document_is_a_page(site: Path) -> None:
 def loaded(site: Path, pages: dict[Path, References]) -> Iterator[tuple[Path, str]]:
     """All that pages, style sheets and scripts load, with the file that names it."""
     for path, references in pages.items():
-        yield from ((path, place) for place in references.loads)
+        yield from ((path, url) for url in references.loads)
     for path in site.rglob("*.css"):
-        yield from ((path, place) for place in styled(path.read_text(encoding="utf-8")))
+        yield from ((path, url) for url in styled(path.read_text(encoding="utf-8")))
     for path in site.rglob("*.js"):
-        yield from ((path, place) for place in IN_SCRIPT.findall(path.read_text(encoding="utf-8")))
+        yield from ((path, url) for url in IN_SCRIPT.findall(path.read_text(encoding="utf-8")))
 
 
 def test_no_request_leaves_the_site(site: Path, pages: dict[Path, References]) -> None:
     places = list(loaded(site, pages))
     assert len(places) > 100
-    outside = [(path, place) for path, place in places if urlsplit(place).scheme or place.startswith("//")]
+    outside = [(path, url) for path, url in places if urlsplit(url).scheme or url.startswith("//")]
     assert outside == []
     lacking = [
-        (path, place)
-        for path, place in places
-        if path.suffix != ".js" and not (path.parent / unquote(urlsplit(place).path)).exists()
+        (path, url)
+        for path, url in places
+        if path.suffix != ".js" and not (path.parent / unquote(urlsplit(url).path)).exists()
     ]
     assert lacking == []
 
@@ -118,7 +118,7 @@ def test_links_within_the_site_lead_somewhere(pages: dict[Path, References]) -> 
 
 
 def names(target: Path, pages: dict[Path, References]) -> set[str]:
-    """Where links into a page may lead."""
+    """Names within a page to which links may lead."""
     return pages[target].names | {""} if target in pages else set()
 
 
@@ -132,7 +132,7 @@ def names(target: Path, pages: dict[Path, References]) -> set[str]:
 )
 def test_a_request_is_seen(text: str, site: Path) -> None:
     page = {site / "x.html": References(text)}
-    assert any("example.org" in place for _, place in loaded(site, page))
+    assert any("example.org" in url for _, url in loaded(site, page))
     assert styled("@import 'https://example.org/a.css'; b { c: url(\"d.svg\") }") == [
         "https://example.org/a.css",
         "d.svg",

@@ -47,8 +47,8 @@ def evidence() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def whole() -> dict[str, Any]:
-    """The same document, shared: not to be changed."""
+def sample() -> dict[str, Any]:
+    """A shared evidence document: not to be changed."""
     return document()
 
 
@@ -72,5 +72,5 @@ def annex(pages: dict[str, str]) -> str:
 
 def document() -> dict[str, Any]:
     """A whole evidence document."""
-    whole: dict[str, Any] = json.loads(Path(__file__).with_name("sample.json").read_text(encoding="utf-8"))
-    return whole
+    sample: dict[str, Any] = json.loads(Path(__file__).with_name("sample.json").read_text(encoding="utf-8"))
+    return sample

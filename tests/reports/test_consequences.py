@@ -29,9 +29,9 @@ def _gain(law: str, k: float, share: float) -> Record:
 
 
 def test_both_laws_stand_beside_each_other(evidence: Record, said: Said) -> None:
-    own = {**evidence["summary"]["own"], "fraction": {"value": 0.97, "low": 0.9, "high": 0.99}}
+    judged = {**evidence["summary"]["own"], "fraction": {"value": 0.97, "low": 0.9, "high": 0.99}}
     gains = [_gain("paper", 50.0, 0.6), _gain("calibrated", 3.5, 1.94)]
-    text = said({**evidence, "consequences": {"gain": gains, "paper": own}}, "consequences")
+    text = said({**evidence, "consequences": {"gain": gains, "paper": judged}}, "consequences")
     assert re.search(r"the paper’s law \| 50.0 \|.*60.0 % \| 97 % of drawn", text, re.IGNORECASE)
     assert re.search(r"the calibrated law \| 3.50 \|.*194 % \| 84 % of drawn", text, re.IGNORECASE)
 

@@ -24,8 +24,8 @@ GLOSSARY = Path(__file__).resolve().parents[2] / "docs" / "glossary.md"
 
 def facts(evidence: Record) -> dict[str, str]:
     page = render(evidence)["report.html"]
-    found = re.findall(r'<dt>([^<]+)</dt><dd class="hash">(.*?)</dd>', page, flags=re.DOTALL)
-    return {label: re.sub(r"<[^>]+>", "", text) for label, text in found}
+    values = re.findall(r'<dt>([^<]+)</dt><dd class="hash">(.*?)</dd>', page, flags=re.DOTALL)
+    return {label: re.sub(r"<[^>]+>", "", text) for label, text in values}
 
 
 def test_symbols_are_those_of_the_glossary() -> None:
@@ -42,10 +42,10 @@ def test_symbols_are_those_of_the_glossary() -> None:
 
 @pytest.mark.usefixtures("unwritten")
 def test_the_document_names_what_it_was_made_of(evidence: Record) -> None:
-    told = facts(evidence)
-    assert told["Commit"] == "0123456789abcdef"
-    assert told["Command"] == "ringbalance report sample.toml"
-    assert hashlib.sha256(evidence_text(evidence).encode()).hexdigest() in told["evidence.json"]
+    shown = facts(evidence)
+    assert shown["Commit"] == "0123456789abcdef"
+    assert shown["Command"] == "ringbalance report sample.toml"
+    assert hashlib.sha256(evidence_text(evidence).encode()).hexdigest() in shown["evidence.json"]
     assert json.loads(evidence_text(evidence)) == evidence
     evidence["provenance"]["dirty"] = True
     assert facts(evidence)["Commit"].endswith("with local changes")
@@ -60,10 +60,10 @@ def test_kept_evidence_is_named_with_its_date_and_scene(evidence: Record) -> Non
 
 
 def test_provenance_names_neither_folder_nor_machine() -> None:
-    found = provenance()
-    assert len(found["lock_sha256"]) == 64
-    assert "/" not in found["command"]
-    assert set(found) == {"commit", "dirty", "lock_sha256", "command", "machine"}
+    values = provenance()
+    assert len(values["lock_sha256"]) == 64
+    assert "/" not in values["command"]
+    assert set(values) == {"commit", "dirty", "lock_sha256", "command", "machine"}
 
 
 def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
@@ -77,10 +77,10 @@ def test_long_tables_become_files_with_every_row(evidence: Record) -> None:
     case = evidence["verification"][0]
     case["tables"] = [table, short]
     assert (is_long(table), is_long(short)) == (True, False)
-    found = _csv_tables(evidence)
+    values = _csv_tables(evidence)
     assert table_file(case, table) == "claim_01_settled_after__by_period.csv"
-    rows = list(csv.reader(io.StringIO(found[table_file(case, table)])))
+    rows = list(csv.reader(io.StringIO(values[table_file(case, table)])))
     assert rows[0] == ["period [s]", "ending [1]"]
     assert [float(row[0]) for row in rows[1:]] == table["columns"]["period"]
-    assert {"loop_calibrated.csv", "loop_paper.csv"} <= set(found)
-    assert not any("short" in name for name in found)
+    assert {"loop_calibrated.csv", "loop_paper.csv"} <= set(values)
+    assert not any("short" in name for name in values)

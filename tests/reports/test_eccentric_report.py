@@ -28,12 +28,12 @@ UNCERTAIN = ("rotor.stiffness", "imbalance.mass", "masses.friction_arm")
 
 @pytest.fixture(scope="module")
 def scene() -> EccentricScene:
-    told = eccentric_scene(load_scene(bundled_scene("driven_masses_small")))
-    first, *_ = told.rotor.speed_profile
+    small = eccentric_scene(load_scene(bundled_scene("driven_masses_small")))
+    first, *_ = small.rotor.speed_profile
     profile = (first, replace(first, time=8.0), replace(first, time=10.0, speed=0.9 * first.speed))
     return with_tables(
-        told,
-        uncertainty=tuple(each for each in told.uncertainty if each.quantity in UNCERTAIN),
+        small,
+        uncertainty=tuple(each for each in small.uncertainty if each.quantity in UNCERTAIN),
         rotor={"speed_profile": profile},
         run={"time_limit": 11.0},
     )
@@ -52,8 +52,8 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
 
 @pytest.fixture(scope="module")
 def evidence(folder: Path) -> Record:
-    found: Record = json.loads((folder / "evidence.json").read_text())
-    return found
+    document: Record = json.loads((folder / "evidence.json").read_text())
+    return document
 
 
 def test_report_and_annex_are_written_with_their_figures(folder: Path) -> None:
@@ -77,7 +77,7 @@ def test_every_traced_number_is_the_evidence_s(folder: Path, evidence: Record) -
 
 
 def test_every_section_is_there_and_says_something(folder: Path) -> None:
-    pages = {place: (folder / f"{place}.html").read_text() for place in ("report", "annex")}
+    pages = {stem: (folder / f"{stem}.html").read_text() for stem in ("report", "annex")}
     for section in SECTIONS:
         # No claim was judged for this report, and the scene is not the paper's.
         page = pages["annex" if section.of_paper else section.document]

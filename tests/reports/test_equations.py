@@ -22,12 +22,12 @@ def test_every_equation_is_set_in_the_text_colour(name: str) -> None:
     assert root.attrib["aria-label"] == item.words
     assert "currentColor" in svg
     assert not re.search(r"#[0-9a-fA-F]{6}\b|rgb\(", svg)
-    assert all(found.startswith(f"eq-{name}-") for found in re.findall(r'id="([^"]+)"', svg))
+    assert all(identifier.startswith(f"eq-{name}-") for identifier in re.findall(r'id="([^"]+)"', svg))
 
 
 def test_the_kept_equations_are_those_of_the_program_as_set_today() -> None:
-    kept, now = doc_tables.EQUATIONS.read_bytes(), doc_tables.equations()
-    same = json.loads(lzma.decompress(kept)) == json.loads(lzma.decompress(now))
+    stored, now = doc_tables.EQUATIONS.read_bytes(), doc_tables.equations()
+    same = json.loads(lzma.decompress(stored)) == json.loads(lzma.decompress(now))
     assert same, "run tools/generate.py --write docs"
 
 

@@ -26,14 +26,14 @@ def meeting(first: list[float], third: list[float], met: list[int]) -> Record:
 
 
 def test_fills_that_gravity_drives_are_named_and_others_are_not() -> None:
-    found = meeting([0.3, 0.5, 0.6], [0.9, 1.1, 1.6], [2, 3])
+    interval = meeting([0.3, 0.5, 0.6], [0.9, 1.1, 1.6], [2, 3])
     # A frequency known to 6 % meets the speed anywhere from 0.94 to 1.06 of it.
-    assert (found["from_fill_ratio"], found["to_fill_ratio"]) == pytest.approx((0.14, 0.26), abs=0.01)
+    assert (interval["from_fill_ratio"], interval["to_fill_ratio"]) == pytest.approx((0.14, 0.26), abs=0.01)
 
 
 def test_a_mode_that_only_may_meet_the_speed_is_named() -> None:
-    found = meeting([0.3, 0.5, 0.6], [0.7, 0.8, 0.97], [])
-    assert (found["from_fill_ratio"], found["to_fill_ratio"]) == pytest.approx((0.47, 0.5), abs=0.005)
+    interval = meeting([0.3, 0.5, 0.6], [0.7, 0.8, 0.97], [])
+    assert (interval["from_fill_ratio"], interval["to_fill_ratio"]) == pytest.approx((0.47, 0.5), abs=0.005)
 
 
 def test_the_fill_at_which_the_swing_doubles_is_found() -> None:

@@ -20,8 +20,8 @@ Record = dict[str, Any]
 
 
 @pytest.fixture(scope="module")
-def drawings(whole: Record) -> dict[str, Drawing]:
-    found = page_content(whole).drawings
+def drawings(sample: Record) -> dict[str, Drawing]:
+    found = page_content(sample).drawings
     assert len({drawing.name for drawing in found}) == len(found)
     return {drawing.name: drawing for drawing in found}
 
@@ -110,10 +110,10 @@ CHANGES: dict[str, tuple[Any, ...]] = {
 
 def test_other_numbers_are_other_figures(evidence: Record, drawings: dict[str, Drawing]) -> None:
     for path in CHANGES.values():
-        place: Any = evidence
+        parent: Any = evidence
         for key in path[:-1]:
-            place = place[key]
-        place[path[-1]] *= 1.3
+            parent = parent[key]
+        parent[path[-1]] *= 1.3
     changed = {
         drawing.name
         for drawing in page_content(evidence).drawings

@@ -26,11 +26,11 @@ def view(evidence: Record) -> Record:
 
 
 def recommended(evidence: Record) -> Record:
-    """With other settings under which every drawn device settles."""
-    own = evidence["summary"]["own"]
+    """Evidence with other settings under which every drawn device settles."""
+    judged = evidence["summary"]["own"]
     every = {"value": 1.0, "low": 0.94, "high": 1.0, "count": 64, "of": 64}
-    required = [{**each, "fraction": every, "verdict": "met"} for each in own["required"]]
-    better = {**own, "fraction": every, "verdict": "met", "required": required}
+    required = [{**each, "fraction": every, "verdict": "met"} for each in judged["required"]]
+    better = {**judged, "fraction": every, "verdict": "met", "required": required}
     return {**evidence, "summary": {**evidence["summary"], "recommended": better}}
 
 
@@ -45,7 +45,7 @@ def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> N
 
 
 def test_each_step_says_what_it_reaches(evidence: Record, said: Said) -> None:
-    own = evidence["summary"]["own"]
+    judged = evidence["summary"]["own"]
     remedy = {
         "code": "bore",
         "name": "",
@@ -60,7 +60,7 @@ def test_each_step_says_what_it_reaches(evidence: Record, said: Said) -> None:
     page = said(evidence, "summary")
     assert "Bore 0.7 mm: 97 % of devices (93 % to 99 %), nine tenths within 9.0 s: met." in page
     assert "Measure the flow." in page
-    assert own["verdict"] in page
+    assert judged["verdict"] in page
 
 
 def test_the_gas_pressure_is_drawn_where_it_was_tried(evidence: Record) -> None:
@@ -74,9 +74,9 @@ def test_the_gas_pressure_is_drawn_where_it_was_tried(evidence: Record) -> None:
     assert view(evidence)["pressure"] is None
     levels = [{**level, "value": pressure} for pressure in (5e5, 6e5, 7e5)]
     evidence["summary"]["along"]["levels"] = levels
-    drawn = view(evidence)["pressure"]
-    assert drawn is not None
-    assert "gas pressure in MPa" in drawn.svg
+    figure = view(evidence)["pressure"]
+    assert figure is not None
+    assert "gas pressure in MPa" in figure.svg
 
 
 def test_the_settings_are_a_block_of_the_scene_file(paper_scene: Scene) -> None:

@@ -35,19 +35,19 @@ def work() -> Work:
 
 @pytest.fixture(scope="module")
 def collected(work: Work) -> Record:
-    found = SECTION.collect(work)
-    assert found is not None
-    return found
+    result = SECTION.collect(work)
+    assert result is not None
+    return result
 
 
 def test_the_map_agrees_with_the_law(work: Work, collected: Record) -> None:
     law = work.calibration.flow_law
     for row, column in ((10, 50), (60, 30), (90, 90), (119, 2)):
-        told = collected["regimes"][int(collected["regime"][row][column])]
+        regime = collected["regimes"][int(collected["regime"][row][column])]
         fill, gas = collected["fill_ratio"][column], collected["gas_pressure_Pa"][row]
         flow = law.evaluate(fill_ratio=fill, gas_pressure=gas)
-        assert (told == "blocked") == (float(flow.velocity) == 0)
-        assert (told == "siphon") == (int(flow.regime) == 1)
+        assert (regime == "blocked") == (float(flow.velocity) == 0)
+        assert (regime == "siphon") == (int(flow.regime) == 1)
 
 
 def test_liquid_spills_between_the_priming_pressure_and_a_full_bore(work: Work, collected: Record) -> None:
@@ -82,8 +82,8 @@ def test_the_pressure_that_lifts_the_liquid_over_the_crest_is_hydrostatics(
 
 def test_each_area_of_the_map_is_named_in_words(collected: Record) -> None:
     drawing = _operating_map(collected)
-    there = {collected["regimes"][int(sign)] for row in collected["regime"] for sign in row}
-    assert there <= {*texts(drawing), "undecided"}
+    regimes = {collected["regimes"][int(sign)] for row in collected["regime"] for sign in row}
+    assert regimes <= {*texts(drawing), "undecided"}
 
 
 def test_the_section_carries_its_dimensions(collected: Record) -> None:
@@ -130,10 +130,10 @@ def test_the_residual_ends_within_its_circle() -> None:
 
 @pytest.mark.parametrize(("pairs", "corners"), [(1, 2), (2, 4), (3, 6)])
 def test_pairs_together_cancel_the_sum_of_what_each_does(pairs: int, corners: int) -> None:
-    found = _reachable(1.0, 0.4, pairs)
-    assert len(found) == corners
+    result = _reachable(1.0, 0.4, pairs)
+    assert len(result) == corners
     # The farthest corner of n equal vectors spread over half a turn lies at 1/sin(pi/2n).
-    assert np.abs(found).max() == pytest.approx(1 / math.sin(math.pi / 2 / pairs))
+    assert np.abs(result).max() == pytest.approx(1 / math.sin(math.pi / 2 / pairs))
 
 
 def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> None:
@@ -153,5 +153,5 @@ def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
 @pytest.mark.parametrize("crest", [None, 15.0, 22.0, 31.5, 38.0, 43.0])
 def test_a_chambers_letter_stands_in_its_gas_beside_the_tube(crest: float | None) -> None:
     size = {"inner_radius": 20.0, "free_surface_radius": 40.0}
-    found = _letter_radius(size if crest is None else {**size, "crest_radius": crest})
-    assert min(found - 20.0, 40.0 - found, abs(found - (crest or 0.0))) >= 5.0
+    result = _letter_radius(size if crest is None else {**size, "crest_radius": crest})
+    assert min(result - 20.0, 40.0 - result, abs(result - (crest or 0.0))) >= 5.0

@@ -85,8 +85,8 @@ def test_every_link_leads_somewhere(pages: dict[str, str], name: str) -> None:
     links = [str(a["href"]) for tag, a in read(pages[name]).tags if tag in {"a", "use"} and "href" in a]
     assert links
     for link in links:
-        file, _, place = link.partition("#")
-        assert not place or place in ids_of(pages[file or name]), link
+        file, _, fragment = link.partition("#")
+        assert not fragment or fragment in ids_of(pages[file or name]), link
         assert (file or name) in pages or file.startswith("tables/"), link
 
 
@@ -100,8 +100,8 @@ def test_the_page_needs_nothing_else(pages: dict[str, str], name: str) -> None:
     for tag, attributes in read(page).tags:
         for name in ("src", "srcset", "href", "xlink:href"):
             value = attributes.get(name)
-            own = value is None or value.partition("#")[0] in {"", *pages}
-            assert own or str(value).startswith("data:image/webp;base64,"), (tag, value)
+            inside = value is None or value.partition("#")[0] in {"", *pages}
+            assert inside or str(value).startswith("data:image/webp;base64,"), (tag, value)
     assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
 
 
@@ -152,9 +152,9 @@ def test_tables_and_drawings_can_be_read_aloud(pages: dict[str, str], name: str)
     tags = read(pages[name]).tags
     assert all(attributes.get("scope") for tag, attributes in tags if tag == "th")
     assert all(a.get("aria-label") or a.get("aria-hidden") for tag, a in tags if tag == "svg")
-    told = [a["aria-labelledby"] for tag, a in tags if tag == "div" and a.get("role") == "img"]
-    assert set(told) <= {*ids_of(pages[name])}
-    assert len(told) == len([a for tag, a in tags if tag == "div" and a.get("class") == "drawing"]) > 0
+    labels = [a["aria-labelledby"] for tag, a in tags if tag == "div" and a.get("role") == "img"]
+    assert set(labels) <= {*ids_of(pages[name])}
+    assert len(labels) == len([a for tag, a in tags if tag == "div" and a.get("class") == "drawing"]) > 0
     assert [a.get("lang") for tag, a in tags if tag == "html"] == ["en"]
     assert all(a.get("aria-labelledby") for tag, a in tags if tag == "section")
 
@@ -205,10 +205,10 @@ def test_the_pages_say_what_the_evidence_says(evidence: Record) -> None:
 def test_no_result_is_typed_into_a_template() -> None:
     for item in files("ringbalance.reports").joinpath("templates").iterdir():
         if item.name.endswith(".html"):
-            whole = re.sub(r"(?s)<(script|style)\b.*?</\1>", " ", item.read_text(encoding="utf-8"))
+            template = re.sub(r"(?s)<(script|style)\b.*?</\1>", " ", item.read_text(encoding="utf-8"))
             # Quotations of the paper are marked as such.
-            whole = re.sub(r'(?s)<span class="printed">.*?</span>', " ", whole)
-            text = re.sub(r"(?s)\{[{%#].*?[}%#]\}|<[^>]+>", " ", whole)
+            template = re.sub(r'(?s)<span class="printed">.*?</span>', " ", template)
+            text = re.sub(r"(?s)\{[{%#].*?[}%#]\}|<[^>]+>", " ", template)
             # Nor are numbers of equations, figures and standards, and the levels of a credibility assessment.
             text = re.sub(r"(?:Eq|Fig)s?\. \d+(?: (?:and|to) \d+)?|API \d+|\b\d ::", " ", text)
             numbers = re.findall(r"(?<![\w-])\d+(?:\.\d+)?(?![\w-])", text)
@@ -221,9 +221,9 @@ def test_numbers_of_figures_tables_and_equations_stand_in_the_text(pages: dict[s
     prefix = "A" if name == "annex.html" else ""
     for kind, form in (("Figure", r"<b>Figure ([A\d]+)\.</b>"), ("Table", r"<b>Table ([A\d]+)\.</b>")):
         found = re.findall(form, pages[name])
-        assert found == [f"{prefix}{place}" for place in range(1, len(found) + 1)], kind
+        assert found == [f"{prefix}{fragment}" for fragment in range(1, len(found) + 1)], kind
     sections = re.findall(r'<h2 id="[\w]+-title"><span class="no">([A\d]+)</span>', pages[name])
-    assert sections == [f"{prefix}{place}" for place in range(1, len(sections) + 1)]
+    assert sections == [f"{prefix}{fragment}" for fragment in range(1, len(sections) + 1)]
     assert pages[name].count("<caption") == len(re.findall(r"<b>Table", pages[name]))
 
 

@@ -22,7 +22,7 @@ needs_opengl = pytest.mark.skipif(not OPENGL.available, reason=OPENGL.text)
 
 
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def plotted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The pictures of the six-chamber disc, through the command."""
     out = tmp_path_factory.mktemp("plot") / "out"
     assert run_command("plot", scene=bundled_scene("six_chamber"), out=out) == 0
@@ -34,21 +34,21 @@ def pixels(path: Path) -> Any:
 
 
 @needs_opengl
-def test_files_are_there_and_of_moderate_size(drawn: Path) -> None:
-    names = {path.relative_to(drawn).as_posix() for path in drawn.rglob("*") if path.is_file()}
+def test_files_are_there_and_of_moderate_size(plotted: Path) -> None:
+    names = {path.relative_to(plotted).as_posix() for path in plotted.rglob("*") if path.is_file()}
     assert names == {
         *(f"figures/{name}-{theme.name}.png" for name in ("disc", "pressure") for theme in THEMES),
         "fields/chamber_at_start.vtu",
         "fields/chamber_largest_fill.vtu",
     }
-    assert all(path.stat().st_size < 150_000 for path in drawn.rglob("*.png"))
+    assert all(path.stat().st_size < 150_000 for path in plotted.rglob("*.png"))
 
 
 @needs_opengl
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
 @pytest.mark.parametrize("name", ["disc", "pressure"])
-def test_a_picture_shows_something_on_the_ground_of_its_page(drawn: Path, name: str, theme: Any) -> None:
-    image = pixels(drawn / "figures" / f"{name}-{theme.name}.png")
+def test_a_picture_shows_something_on_the_ground_of_its_page(plotted: Path, name: str, theme: Any) -> None:
+    image = pixels(plotted / "figures" / f"{name}-{theme.name}.png")
     assert image.shape == (PICTURE[1], PICTURE[0], 3)
     ground = np.array([int(theme.ground[i : i + 2], 16) for i in (1, 3, 5)])
     assert (image[:20, :20] == ground).all()
@@ -58,8 +58,8 @@ def test_a_picture_shows_something_on_the_ground_of_its_page(drawn: Path, name: 
 
 
 @needs_opengl
-def test_the_colour_bar_runs_from_end_to_end(drawn: Path) -> None:
-    image = pixels(drawn / "figures" / "pressure-light.png")
+def test_the_colour_bar_runs_from_end_to_end(plotted: Path) -> None:
+    image = pixels(plotted / "figures" / "pressure-light.png")
     # Viridis: dark violet below, yellow on top.
     bottom, top = image[round(0.82 * PICTURE[1]) - 6, 60], image[round(0.24 * PICTURE[1]) + 6, 60]
     assert bottom == pytest.approx([68, 1, 84], abs=8)

@@ -66,11 +66,11 @@ def test_a_hundred_values_lead_to_the_evidence(file: Path, tmp_path: Path) -> No
     write_report(load_scene(file), tmp_path, scene_text=file.read_text(encoding="utf-8"), workers=2)
     pages = [(tmp_path / name).read_text(encoding="utf-8") for name in ("report.html", "annex.html")]
     evidence = json.loads((tmp_path / "evidence.json").read_bytes())
-    found = traces(pages)
-    assert len(found) > 30
+    traced = traces(pages)
+    assert len(traced) > 30
     assert untrue(pages, evidence) == []
     assert apart(evidence) == []
-    for path, text in random.Random(15).choices(found, k=100):
+    for path, text in random.Random(15).choices(traced, k=100):
         assert agrees(text, evidence_at(evidence, path)), (path, text)
     assert len(pages[0].encode()) <= MOST_BYTES
     if BROWSER is not None:

@@ -38,13 +38,13 @@ QUICK = ("gci_celik2008", "claim_01_volume", "coverage")
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder in which reports keep what looks at no scene."""
     return tmp_path_factory.mktemp("kept")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def few_cases(kept: Path) -> Iterator[None]:
+def few_cases(store: Path) -> Iterator[None]:
     """Three cases instead of all, one check, one claim, one heavy; and few devices."""
 
     def cases() -> list[CaseDefinition]:
@@ -52,7 +52,7 @@ def few_cases(kept: Path) -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence_module, "load_cases", cases)
-        patch.setattr(saved_module, "code_root", lambda: kept)
+        patch.setattr(saved_module, "code_root", lambda: store)
         patch.setattr(tune, "search", lambda *_, **__: ())
         patch.setattr(tune, "judged_all", partial(judged_all, most=16))
         patch.setattr(tune, "tried_remedies", lambda *_, **__: ())
@@ -141,13 +141,13 @@ def test_without_opengl_the_page_says_so(first: Report) -> None:
 
 @pytest.fixture(scope="module")
 def second(write: Write, first: Report, tmp_path_factory: pytest.TempPathFactory) -> Report:
-    """The same report again, into a folder with earlier results of its heavy case."""
+    """The report made again, into a folder with earlier results of its heavy case."""
     out = tmp_path_factory.mktemp("again")
-    kept = next(case for case in first.evidence["verification"] if case["id"] == "coverage")
+    coverage = next(case for case in first.evidence["verification"] if case["id"] == "coverage")
     earlier = [
-        {**kept, "verdict": "passed", "date": "2029-02-03"},
-        {**kept, "verdict": "failed", "date": "2028-01-01"},
-        {**kept, "verdict": "inconclusive", "date": "2030-01-01", "scene_sha256": "0" * 64},
+        {**coverage, "verdict": "passed", "date": "2029-02-03"},
+        {**coverage, "verdict": "failed", "date": "2028-01-01"},
+        {**coverage, "verdict": "inconclusive", "date": "2030-01-01", "scene_sha256": "0" * 64},
     ]
     (out / "evidence.json").write_text(json.dumps({"verification": earlier}))
     return write(out)
@@ -175,22 +175,22 @@ def test_what_looks_at_no_scene_is_run_once(first: Report, second: Report) -> No
     assert f"1 independent of the scene, run by the same program on {today}" in page
 
 
-def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Record) -> None:
+def test_a_real_document_has_the_shape_of_the_sample(first: Report, sample: Record) -> None:
     """The page's tests stand on a sample: each of its keys must exist in the real thing."""
 
-    def lacking(sample: Any, real: Any, place: str) -> list[str]:
-        if isinstance(sample, dict) and not place.endswith(
+    def lacking(expected: Any, real: Any, path: str) -> list[str]:
+        if isinstance(expected, dict) and not path.endswith(
             ("terms", "versions", "verification", "fill_ratio", "causes")
         ):
-            missing = [f"{place}/{key}" for key in sample if key not in real]
+            missing = [f"{path}/{key}" for key in expected if key not in real]
             return missing + [
-                f for k in sample if k in real for f in lacking(sample[k], real[k], f"{place}/{k}")
+                f for k in expected if k in real for f in lacking(expected[k], real[k], f"{path}/{k}")
             ]
-        if isinstance(sample, list) and sample and isinstance(sample[0], dict) and real:
-            return lacking(sample[0], real[0], place)
+        if isinstance(expected, list) and expected and isinstance(expected[0], dict) and real:
+            return lacking(expected[0], real[0], path)
         return []
 
-    assert [fault for fault in lacking(whole, first.evidence, "") if "verification" not in fault] == []
+    assert [fault for fault in lacking(sample, first.evidence, "") if "verification" not in fault] == []
 
 
 def test_the_scene_and_its_text_are_reported(first: Report, paper_scene: Scene) -> None:
@@ -201,13 +201,13 @@ def test_the_scene_and_its_text_are_reported(first: Report, paper_scene: Scene) 
 
 
 def test_thresholds_of_the_papers_disc(first: Report) -> None:
-    known = {each["key"]: each for each in first.evidence["calibration"]["quantities"]}
+    quantities = {each["key"]: each for each in first.evidence["calibration"]["quantities"]}
     # rho omega^2 (R2^2 - r_m^2)/2 with 44.5 mm, 31.5 mm and 10 000 rpm, and Eq. 19 with u = 0, by hand.
-    assert known["priming_pressure_vented"]["value"] == pytest.approx(0.5417e6, rel=1e-3)
-    assert known["stall_pressure_paper"]["value"] == pytest.approx(0.381e6, rel=1e-3)
+    assert quantities["priming_pressure_vented"]["value"] == pytest.approx(0.5417e6, rel=1e-3)
+    assert quantities["stall_pressure_paper"]["value"] == pytest.approx(0.381e6, rel=1e-3)
     # Density 0.2 % and speed 0.1 %, squared in the pressure, alone give 0.28 %; the radii add less than
     # three times that. The rest is waves: at the largest fill one may be resonant with gravity.
-    share = known["stall_pressure"]["parts"]["input"] / known["stall_pressure"]["value"]
+    share = quantities["stall_pressure"]["parts"]["input"] / quantities["stall_pressure"]["value"]
     assert math.hypot(0.002, 0.002) < share < 3 * math.hypot(0.002, 0.002)
 
 
@@ -231,9 +231,9 @@ def test_a_failure_leaves_the_old_report(
 
 @pytest.mark.heavy
 def test_heavy_results_are_kept_with_their_date(second: Report) -> None:
-    found = next(case for case in second.evidence["verification"] if case["id"] == "coverage")
+    heavy = next(case for case in second.evidence["verification"] if case["id"] == "coverage")
     # The newest result on this very scene; the one on another scene is left alone.
-    assert (found["verdict"], found["date"]) == ("passed", "2029-02-03")
+    assert (heavy["verdict"], heavy["date"]) == ("passed", "2029-02-03")
     assert "2029-02-03" in (second.page.parent / "annex.html").read_text()
 
 
@@ -246,7 +246,7 @@ def test_what_is_kept_is_heavy_and_dated(evidence: Record) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (b"", "evidence.json is not an evidence file"),
         (b"\xff\xfe{}", "evidence.json is not an evidence file"),
@@ -263,13 +263,13 @@ def test_what_is_kept_is_heavy_and_dated(evidence: Record) -> None:
     ],
 )
 def test_a_damaged_evidence_file_is_reported_before_the_work(
-    content: bytes, told: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    content: bytes, message: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(report_module, "drawing_beside", lambda *_: pytest.fail("begun"))
     (tmp_path / "evidence.json").write_bytes(content)
     with pytest.raises(OSError, match="move it away or choose another folder") as caught:
         write(tmp_path)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
     assert str(tmp_path / "evidence.json") in str(caught.value)
     assert (tmp_path / "evidence.json").read_bytes() == content
 
@@ -287,7 +287,7 @@ def test_what_is_in_the_way_of_a_report_is_reported_before_the_work(
 
 @pytest.mark.parametrize(("failed", "code"), [(False, 0), (True, 1)])
 def test_exit_codes(
-    whole: Record,
+    sample: Record,
     failed: bool,
     code: int,
     tmp_path: Path,
@@ -296,14 +296,14 @@ def test_exit_codes(
 ) -> None:
     cases = [
         case | {"verdict": "failed"} if failed and case["kind"] == "code_verification" else case
-        for case in whole["verification"]
+        for case in sample["verification"]
     ]
-    finished = Report(page=tmp_path / "report.html", evidence=whole | {"verification": cases})
+    finished = Report(page=tmp_path / "report.html", evidence=sample | {"verification": cases})
     monkeypatch.setattr(reporting, "write_scene_report", lambda *_, **__: finished)
     assert run_command("report", scene=bundled_scene("liquid_ring_paper"), out=tmp_path) == code
-    told = capsys.readouterr()
-    assert told.out.strip() == str(finished.page)
-    assert "claims of the liquid-ring paper" in told.err
+    printed = capsys.readouterr()
+    assert printed.out.strip() == str(finished.page)
+    assert "claims of the liquid-ring paper" in printed.err
 
 
 def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:

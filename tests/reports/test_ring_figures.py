@@ -1,4 +1,4 @@
-"""What the figures of a ring's loop are drawn of."""
+"""Frames and time spans of the figures of a ring's loop."""
 
 from __future__ import annotations
 

@@ -66,13 +66,13 @@ def test_another_file_of_the_program_or_package_counts_as_another_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(program, "files", lambda _: tmp_path)
-    found = set()
+    digests = set()
     for content in ("one", "other"):
         (tmp_path / "module.py").write_text(content)
-        found.add(program.program_digest.__wrapped__())
+        digests.add(program.program_digest.__wrapped__())
     monkeypatch.setattr(program, "version_of", lambda _: "9.9")
-    found.add(program.program_digest.__wrapped__())
-    assert len(found) == 3
+    digests.add(program.program_digest.__wrapped__())
+    assert len(digests) == 3
 
 
 def test_results_that_cannot_be_kept_cost_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

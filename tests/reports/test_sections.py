@@ -37,9 +37,9 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
 
 
 @pytest.mark.parametrize("name", ["report.html", "annex.html"])
-def test_the_contents_follow_the_list(pages: dict[str, str], whole: Record, name: str) -> None:
+def test_the_contents_follow_the_list(pages: dict[str, str], sample: Record, name: str) -> None:
     links = re.findall(r'<li><a href="#(\w+)">', pages[name])
-    assert links == [e["name"] for e in numbered(whole, views_of(whole)) if f"{e['document']}.html" == name]
+    assert links == [e["name"] for e in numbered(sample, views_of(sample)) if f"{e['document']}.html" == name]
     assert links[0] == {"report.html": "summary", "annex.html": "disc"}[name]
     places = [pages[name].index(f'<section id="{link}"') for link in links]
     assert places == sorted(places)
@@ -50,8 +50,8 @@ def test_a_section_without_evidence_stays_away(annex: str) -> None:
 
 
 def test_drawings_are_found_however_deep() -> None:
-    one, two = (Drawing(name=name, svg="") for name in "ab")
-    assert drawings_in({"x": [one, {"y": (two, None, "text")}], "z": 3}) == [one, two]
+    first, two = (Drawing(name=name, svg="") for name in "ab")
+    assert drawings_in({"x": [first, {"y": (two, None, "text")}], "z": 3}) == [first, two]
 
 
 def test_a_plain_section_needs_no_functions() -> None:

@@ -51,16 +51,16 @@ _PLAIN: list[tuple[int, dict[str, Any]]] = []
 
 
 def test_the_calibrated_law_is_the_default(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, found = document(scene_file, capsys)
+    code, run = document(scene_file, capsys)
     # At 1 % the inertia of the liquid in the tube counts, so that fill and velocity are integrated together.
-    assert found["law"] == "calibrated"
-    assert code == (0 if found["settled"] else 1)
+    assert run["law"] == "calibrated"
+    assert code == (0 if run["settled"] else 1)
 
 
 def test_the_papers_law_settles(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, found = document(scene_file, capsys, law="paper")
-    assert (code, found["law"]) == (0, "paper")
-    assert found["settling_time_s"] < 5
+    code, run = document(scene_file, capsys, law="paper")
+    assert (code, run["law"]) == (0, "paper")
+    assert run["settling_time_s"] < 5
 
 
 def test_a_saved_law_gives_the_same_run(
@@ -74,10 +74,10 @@ def test_not_settling_is_exit_code_1_with_its_result(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = changed(scene_file, tmp_path, 'pressure = "0.7 MPa"', 'pressure = "0.1 MPa"')
-    code, found = document(path, capsys, law="paper")
+    code, run = document(path, capsys, law="paper")
     assert code == 1
-    assert found["outcome"] == "stalled"
-    assert "gas.pressure" in found["status"]
+    assert run["outcome"] == "stalled"
+    assert "gas.pressure" in run["status"]
 
 
 def test_tables_go_to_standard_output_and_progress_does_not(
@@ -107,8 +107,8 @@ def test_the_law_based_algorithm_runs_from_a_scene(
 ) -> None:
     path = changed(scene_file, tmp_path, 'kind = "target_vector"', 'kind = "law_based"')
     assert main(["simulate", str(path), "--law", "paper", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert len({injection["time_s"] for injection in found["injections"]}) == 1
+    run = json.loads(capsys.readouterr().out)
+    assert len({injection["time_s"] for injection in run["injections"]}) == 1
 
 
 @pytest.mark.parametrize(
@@ -135,14 +135,14 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 def test_a_table_holds_every_instant_of_a_run(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _, found = document(scene_file, capsys, law="paper", csv=tmp_path / "run.csv")
+    _, run = document(scene_file, capsys, law="paper", csv=tmp_path / "run.csv")
     rows = rows_of(tmp_path / "run.csv")
-    assert [float(row["time_s"]) for row in rows] == found["time_s"]
-    assert [float(row["amplitude_m"]) for row in rows] == found["amplitude_m"]
-    assert [float(row["fill_ratio_B"]) for row in rows] == found["fill_ratio"]["B"]
+    assert [float(row["time_s"]) for row in rows] == run["time_s"]
+    assert [float(row["amplitude_m"]) for row in rows] == run["amplitude_m"]
+    assert [float(row["fill_ratio_B"]) for row in rows] == run["fill_ratio"]["B"]
     seen = [float(row["measured_amplitude_m"]) for row in rows if row["measured_amplitude_m"]]
-    assert seen == found["samples"]["amplitude_m"]
-    opened = found["injections"][0]
+    assert seen == run["samples"]["amplitude_m"]
+    opened = run["injections"][0]
     at = [
         row
         for row in rows
@@ -157,19 +157,19 @@ def test_a_table_of_eccentric_masses_holds_every_sample(
 ) -> None:
     path = ringbalance.bundled_scene("driven_masses_small")
     short = changed(path, tmp_path, 'time_limit = "30 s"', 'time_limit = "0.5 s"')
-    _, found = document(short, capsys, csv=tmp_path / "run.csv", plot=tmp_path / "run.svg")
+    _, run = document(short, capsys, csv=tmp_path / "run.csv", plot=tmp_path / "run.svg")
     rows = rows_of(tmp_path / "run.csv")
     assert len(rows) == 501
     assert float(rows[-1]["time_s"]) == pytest.approx(0.5)
-    assert float(rows[-1]["energy_J"]) == found["energy_J"]
+    assert float(rows[-1]["energy_J"]) == run["energy_J"]
     assert math.hypot(float(rows[7]["whirl_x_m"]), float(rows[7]["whirl_y_m"])) == pytest.approx(
         float(rows[7]["amplitude_m"])
     )
-    begun = {stage["name"]: stage["start_s"] for stage in found["stages"]}
+    begun = {stage["name"]: stage["start_s"] for stage in run["stages"]}
     for name, start in begun.items():
         assert float(next(row for row in rows if row["stage"] == name)["time_s"]) == start
-    drawn = ElementTree.fromstring((tmp_path / "run.svg").read_text())
-    figures = drawn.findall("{http://www.w3.org/2000/svg}svg")
+    sheet = ElementTree.fromstring((tmp_path / "run.svg").read_text())
+    figures = sheet.findall("{http://www.w3.org/2000/svg}svg")
     # At constant speed there is no run-up.
     assert len(figures) == 4
     assert "var(" not in (tmp_path / "run.svg").read_text()
@@ -179,12 +179,12 @@ def test_a_sheet_shows_the_figures_of_a_run(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     document(scene_file, capsys, law="paper", plot=tmp_path / "run.svg")
-    drawn = ElementTree.fromstring((tmp_path / "run.svg").read_text())
-    told = [figure.attrib["aria-label"] for figure in drawn.findall("{http://www.w3.org/2000/svg}svg")]
-    assert len(told) == 4
+    sheet = ElementTree.fromstring((tmp_path / "run.svg").read_text())
+    message = [figure.attrib["aria-label"] for figure in sheet.findall("{http://www.w3.org/2000/svg}svg")]
+    assert len(message) == 4
     for words in ("amplitude", "valve open", "fill ratios", "polar"):
-        assert any(words in text for text in told)
-    below = [float(figure.attrib["y"]) for figure in drawn.findall("{http://www.w3.org/2000/svg}svg")]
+        assert any(words in text for text in message)
+    below = [float(figure.attrib["y"]) for figure in sheet.findall("{http://www.w3.org/2000/svg}svg")]
     assert below == sorted(below)
     assert len(set(below)) == 3
 
@@ -215,8 +215,8 @@ def test_outputs_that_cannot_be_written_are_refused_before_the_run(
 ) -> None:
     (tmp_path / "file.csv").touch()
     (tmp_path / "folder.svg").mkdir()
-    given = value if option == "--seed" else str(tmp_path / value)
-    assert main(["simulate", str(scene_file), "--law", "paper", option, given, "--json"]) == 2
+    argument = value if option == "--seed" else str(tmp_path / value)
+    assert main(["simulate", str(scene_file), "--law", "paper", option, argument, "--json"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert said in printed.err
@@ -225,7 +225,7 @@ def test_outputs_that_cannot_be_written_are_refused_before_the_run(
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["simulate", "SMALL", "--law", "paper"], '--law = "paper": the balancer of'),
         (["tune", "SMALL", "--law", "paper"], '--law = "paper": the balancer of'),
@@ -234,9 +234,9 @@ def test_outputs_that_cannot_be_written_are_refused_before_the_run(
     ],
 )
 def test_an_option_that_cannot_be_meant_is_refused(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     small = str(ringbalance.bundled_scene("driven_masses_small"))
     assert main([small if word == "SMALL" else word for word in words]) == 2
     out, error = capsys.readouterr()
-    assert (out, told in error, len(error.splitlines())) == ("", True, 1)
+    assert (out, message in error, len(error.splitlines())) == ("", True, 1)

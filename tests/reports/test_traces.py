@@ -15,30 +15,30 @@ Record = dict[str, Any]
 
 
 @pytest.fixture(scope="module")
-def found(pages: dict[str, str]) -> list[tuple[str, str]]:
+def traced_numbers(pages: dict[str, str]) -> list[tuple[str, str]]:
     return traces(pages.values())
 
 
-def test_a_wrong_number_is_noticed(evidence: Record, found: list[tuple[str, str]]) -> None:
-    for path in {path for path, _ in found}:
+def test_a_wrong_number_is_noticed(evidence: Record, traced_numbers: list[tuple[str, str]]) -> None:
+    for path in {path for path, _ in traced_numbers}:
         value = evidence_at(evidence, path)
-        text = next(text for own, text in found if own == path)
+        text = next(text for traced_path, text in traced_numbers if traced_path == path)
         shown, half = printed(text) or (0.0, 1.0)
         if isinstance(value, float) and abs(shown) > 3 * half:
             assert not agrees(text, 1.37 * value), path
 
 
-def test_one_quantity_is_printed_with_one_value(found: list[tuple[str, str]]) -> None:
+def test_one_quantity_is_printed_with_one_value(traced_numbers: list[tuple[str, str]]) -> None:
     names = {path: group[0] for group in SAME for path in group}
     values: dict[str, list[tuple[float, float, str]]] = {}
-    for path, text in found:
+    for path, text in traced_numbers:
         if number := printed(text):
             values.setdefault(names.get(path, path), []).append((*number, text))
-    twice = {path: told for path, told in values.items() if len(told) > 1}
+    twice = {path: readings for path, readings in values.items() if len(readings) > 1}
     assert twice
-    for path, told in twice.items():
-        for value, half, text in told:
-            for other, other_half, other_text in told:
+    for path, readings in twice.items():
+        for value, half, text in readings:
+            for other, other_half, other_text in readings:
                 apart = abs(value - other)
                 # A value in another unit is told apart by its power of ten.
                 assert apart <= half + other_half or not 0.01 < abs(value / (other or 1)) < 100, (
@@ -48,8 +48,8 @@ def test_one_quantity_is_printed_with_one_value(found: list[tuple[str, str]]) ->
                 )
 
 
-def test_places_of_one_quantity_agree(whole: Record) -> None:
-    assert apart(whole) == []
+def test_places_of_one_quantity_agree(sample: Record) -> None:
+    assert apart(sample) == []
 
 
 def test_two_values_of_one_quantity_are_found(evidence: Record) -> None:

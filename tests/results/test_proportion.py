@@ -19,8 +19,8 @@ def test_wilsons_bounds() -> None:
         (0, 20, 0.0, 0.1611),
         (1, 29, 0.0061, 0.1718),
     ):
-        found = Proportion(count=count, of=of)
-        assert (found.low, found.high) == pytest.approx((low, high), abs=5e-5)
+        result = Proportion(count=count, of=of)
+        assert (result.low, result.high) == pytest.approx((low, high), abs=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -46,11 +46,11 @@ def test_a_wider_interval_decides_later() -> None:
 def test_a_difference_of_paired_fractions() -> None:
     """Against the spread of many drawn pairs."""
     random = np.random.default_rng(1)
-    found = []
+    result = []
     for _ in range(400):
         base, other = random.random((2, 256))
         first, second = (base < 0.9) & (other < 0.98), base < 0.9
-        found.append(Paired.of(first, second).difference)
-    changes, halves = np.array(found).T
+        result.append(Paired.of(first, second).difference)
+    changes, halves = np.array(result).T
     assert np.mean(changes) == pytest.approx(-0.9 * 0.02, abs=2e-3)
     assert 1.96 * np.std(changes) == pytest.approx(np.mean(halves), rel=0.1)

@@ -31,7 +31,7 @@ LAW = Table(caption="law", heads=("state", "u\nm/s"), rows=[("blocked", "–"), 
 
 
 class Answer(Result):
-    """As short as a result may be."""
+    """A result as short as it may be."""
 
     def rows(self) -> Rows:
         found = Finding(code="off_axis", values={"distance_m": 0.5e-3})

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ringbalance as rb
 from ringbalance.controller.eccentric_mass import control_records, scene_records
@@ -20,13 +17,11 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_scene,
 )
 from ringbalance.scene import (
-    AnyScene,
     Scene,
     SceneError,
     bundled_scene,
     liquid_ring_scene,
     load_scene,
-    scene_from,
 )
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.loop_models import RunSettings
@@ -163,43 +158,3 @@ def test_keys_are_fields(table: str) -> None:
     """A key reaches the record's field of its name; nothing is written in a file and then ignored."""
     assert _keys(table) == {field.name for field in fields(RECORDS[table])}
     assert set(TABLES) == {*RECORDS, "accuracy", "uncertainty", "fitted", "measured"}
-
-
-_PATHS = [(table, key) for table in TABLES for key in sorted(_keys(table))]
-_JUNK = st.one_of(
-    st.floats(-1e3, 1e3).map(lambda value: f"{value} s"),
-    st.floats(0, 10).map(lambda value: f"{value} kg"),
-    st.floats(0, 10).map(lambda value: f"{value} m"),
-    st.floats(-400, 400).map(lambda value: f"{value} deg"),
-    st.integers(-5, 5),
-    st.floats(),
-    st.text(max_size=9),
-    st.lists(st.sampled_from(["1 mm", "3 deg", 7, "-2 s", {"time": "1 s"}]), max_size=3),
-    st.dictionaries(st.text(max_size=4), st.integers(), max_size=2),
-)
-
-
-@given(changes=st.lists(st.tuples(st.sampled_from(_PATHS), _JUNK), min_size=1, max_size=3))
-@settings(max_examples=150, deadline=None, derandomize=True)
-def test_junk_ends_in_a_scene_or_in_a_scene_error(
-    changes: list[tuple[tuple[str, str], Any]], as_toml: Callable[[Mapping[str, Any]], str]
-) -> None:
-    document = tomllib.loads(bundled_scene("eccentric_mass_paper").read_text(encoding="utf-8"))
-    for (table, key), value in changes:
-        document.setdefault(table, {})[key] = value
-    scene = _loaded(as_toml(document).encode())
-    if scene is not None:
-        assert isinstance(scene, EccentricScene)
-        assert scene.rotor.mass >= scene.imbalance.mass >= 0
-        assert scene.sensor.step <= scene.lqr.step
-        assert scene.rotor.speed_profile
-
-
-def _loaded(content: bytes) -> AnyScene | None:
-    try:
-        return scene_from(content=content, file="my_disc.toml")
-    except SceneError as error:
-        lines = str(error).splitlines()
-        if not error.faults or len(lines) != len(error.faults) or not all(map(str.isprintable, lines)):
-            raise AssertionError("a fault is not one printable line") from error
-    return None

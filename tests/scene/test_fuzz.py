@@ -10,12 +10,16 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, scene_from
+from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS, EccentricScene
+from ringbalance.scene import AnyScene, SceneError, bundled_scene, liquid_ring_scene, scene_from
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.units import DIMENSIONS
 
 TABLES = tuple(LIQUID_RING.tables)
-PATHS = [(table, key) for table in TABLES for key in (*LIQUID_RING.tables[table].keys, "colour")]
+PATHS, DRIVEN_PATHS = (
+    [(name, key) for name, table in schema.tables.items() for key in (*table.keys, "colour")]
+    for schema in (LIQUID_RING, ECCENTRIC_MASS)
+)
 UNITS = sorted({unit for kind in DIMENSIONS.values() for unit in kind.units})
 NUMBERS = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True).map(str),
@@ -38,16 +42,16 @@ JUNK = st.recursive(
     max_leaves=4,
 )
 FUZZ = settings(
-    max_examples=250,
+    max_examples=100,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 
 
-def _loaded(content: bytes) -> Scene | None:
+def _loaded(content: bytes) -> AnyScene | None:
     try:
-        return liquid_ring_scene(scene_from(content=content, file="my_disc.toml"))
+        return scene_from(content=content, file="my_disc.toml")
     except SceneError as error:
         lines = str(error).splitlines()
         if not error.faults or len(lines) != len(error.faults) or not all(map(str.isprintable, lines)):
@@ -66,9 +70,17 @@ def _numbers(record: object) -> Iterator[float]:
             yield from _numbers(getattr(record, field.name))
 
 
-def _assert_sound(scene: Scene) -> None:
-    disc, tube = scene.disc, scene.tube
+def _assert_sound(scene: AnyScene | None) -> None:
+    if scene is None:
+        return
     assert all(map(math.isfinite, _numbers(scene)))
+    if isinstance(scene, EccentricScene):
+        assert scene.rotor.mass >= scene.imbalance.mass >= 0
+        assert scene.sensor.step <= scene.lqr.step
+        assert scene.rotor.speed_profile
+        return
+    scene = liquid_ring_scene(scene)
+    disc, tube = scene.disc, scene.tube
     assert 0 < disc.inner_radius < disc.outer_radius
     assert math.asin(disc.plate_thickness / disc.inner_radius) < disc.central_angle / 2
     assert disc.chambers % 2 == 0
@@ -98,9 +110,22 @@ def test_junk_in_place_of_values(
     document = {table: dict(content) for table, content in newcomer_document.items()}
     for (table, key), value in changes:
         document.setdefault(table, {})[key] = value
-    scene = _loaded(as_toml(document).encode())
-    if scene is not None:
-        _assert_sound(scene)
+    _assert_sound(_loaded(as_toml(document).encode()))
+
+
+@given(changes=st.lists(st.tuples(st.sampled_from(DRIVEN_PATHS), JUNK), min_size=1, max_size=3))
+@FUZZ
+def test_junk_in_place_of_values_of_eccentric_masses(
+    changes: list[tuple[tuple[str, str], Any]],
+    driven_document: dict[str, Any],
+    as_toml: Callable[[Mapping[str, Any]], str],
+) -> None:
+    document = {
+        key: dict(value) if isinstance(value, dict) else value for key, value in driven_document.items()
+    }
+    for (table, key), value in changes:
+        document.setdefault(table, {})[key] = value
+    _assert_sound(_loaded(as_toml(document).encode()))
 
 
 @given(changes=st.lists(st.tuples(st.integers(0, 999), st.floats(0, 3)), min_size=1, max_size=3))
@@ -125,9 +150,7 @@ def test_scaled_values(
         table, key = paths[index % len(paths)]
         number, unit = document[table][key].split(" ", 1)
         document[table][key] = f"{float(number) * factor} {unit}"
-    scene = _loaded(as_toml(document).encode())
-    if scene is not None:
-        _assert_sound(scene)
+    _assert_sound(_loaded(as_toml(document).encode()))
 
 
 @given(table=st.sampled_from((*TABLES, "name", "balancer", "colour")), value=JUNK)
@@ -138,16 +161,12 @@ def test_junk_in_place_of_tables(
     newcomer_document: dict[str, Any],
     as_toml: Callable[[Mapping[str, Any]], str],
 ) -> None:
-    scene = _loaded(as_toml({**newcomer_document, table: value}).encode())
-    if scene is not None:
-        _assert_sound(scene)
+    _assert_sound(_loaded(as_toml({**newcomer_document, table: value}).encode()))
 
 
 @given(at=st.integers(0, 10**6), deleted=st.integers(0, 40), inserted=st.binary(max_size=10))
 @FUZZ
 def test_damaged_files(at: int, deleted: int, inserted: bytes) -> None:
     whole = bundled_scene("liquid_ring_paper").read_bytes()
-    place = at % len(whole)
-    scene = _loaded(whole[:place] + inserted + whole[place + deleted :])
-    if scene is not None:
-        _assert_sound(scene)
+    start = at % len(whole)
+    _assert_sound(_loaded(whole[:start] + inserted + whole[start + deleted :]))

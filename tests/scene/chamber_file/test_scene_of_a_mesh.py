@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from drawn_chamber import drawn, loaded, msh_2, msh_4, scene_text
 
-from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene, scene_table
+from ringbalance.scene import AnyScene, Scene, SceneError, bundled_scene, load_scene, scene_table
 from ringbalance.scene.chamber_file.record import MEANINGS
 from ringbalance.scene.uncertain import with_value
 
@@ -20,6 +20,13 @@ def scene_of(folder: Path, kind: str = "tetra10", **disc: str | int) -> Scene:
     scene = loaded(folder, msh_2(drawn(kind)), "chamber.msh", **disc)
     assert isinstance(scene, Scene)
     return scene
+
+
+def edited(folder: Path, old: str, new: str, *, mesh_unit: str = "mm") -> AnyScene:
+    """The scene of a folder's chamber.msh with one text in it replaced."""
+    text = scene_text("chamber.msh", mesh_unit=mesh_unit).replace(old, new, 1)
+    (folder / "my_disc.toml").write_text(text, encoding="utf-8")
+    return load_scene(folder / "my_disc.toml")
 
 
 def extents(scene: Scene) -> dict[str, float]:
@@ -48,36 +55,25 @@ def test_a_changed_dimension_stretches_the_mesh(quantity: str, tmp_path: Path) -
     assert again.disc.geometry == changed.disc.geometry
 
 
-@pytest.mark.parametrize(("inlet", "covered"), [(24, False), (39, True)])
-def test_the_liquid_must_not_cover_a_gas_inlet(inlet: int, covered: bool, tmp_path: Path) -> None:
+def test_the_liquid_must_not_cover_a_gas_inlet(tmp_path: Path) -> None:
     """At half a chamber the surface lies at 31.6 mm."""
     scene_of(tmp_path)
-    text = scene_text("chamber.msh", mesh_unit="mm").replace(
-        "[gas]", f'[gas]\ninlet_radius = "{inlet} mm"', 1
-    )
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
-    if not covered:
-        assert isinstance(load_scene(tmp_path / "my_disc.toml"), Scene)
-        return
+    assert isinstance(edited(tmp_path, "[gas]", '[gas]\ninlet_radius = "24 mm"'), Scene)
     with pytest.raises(SceneError, match="the liquid covers inlet_radius, 39 mm"):
-        load_scene(tmp_path / "my_disc.toml")
+        edited(tmp_path, "[gas]", '[gas]\ninlet_radius = "39 mm"')
 
 
 def test_plates_of_a_mesh_have_no_thickness(tmp_path: Path) -> None:
     scene = scene_of(tmp_path)
     with pytest.raises(ValueError, match="no plate_thickness of its own"):
         with_value(scene=scene, quantity="plate_thickness", value=1e-3)
-    text = scene_text("chamber.msh", mesh_unit="mm") + '\n[uncertainty]\nplate_thickness = "0.1 mm"\n'
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match=r"\[uncertainty\] plate_thickness .* no thickness of its own"):
-        load_scene(tmp_path / "my_disc.toml")
+        edited(tmp_path, "[run]", '[uncertainty]\nplate_thickness = "0.1 mm"\n[run]')
 
 
 def test_uncertain_dimensions_are_stated_as_ever(tmp_path: Path) -> None:
     scene_of(tmp_path)
-    text = scene_text("chamber.msh", mesh_unit="mm") + '\n[uncertainty]\nouter_radius = "0.1 mm"\n'
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
-    scene = load_scene(tmp_path / "my_disc.toml")
+    scene = edited(tmp_path, "[run]", '[uncertainty]\nouter_radius = "0.1 mm"\n[run]')
     rows = {row.path: row for row in scene_table(scene)} if isinstance(scene, Scene) else {}
     assert rows["disc.outer_radius"].uncertainty == "0.1 mm"
     assert rows["disc.outer_radius"].origin == "derived"
@@ -117,18 +113,16 @@ def test_keys_of_a_mesh_need_one(tmp_path: Path) -> None:
 def test_the_number_of_chambers_is_given_or_follows(tmp_path: Path) -> None:
     drawing = drawn()
     assert scene_of(tmp_path).disc.chambers == 4
-    text = scene_text("chamber.msh", mesh_unit="mm").replace("chambers = 4", "")
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match="chambers is needed: the mesh takes 80 deg"):
-        load_scene(tmp_path / "my_disc.toml")
+        edited(tmp_path, "chambers = 4", "")
     for number, (x, y, z) in drawing.points.items():
         angle = np.arctan2(y, x) * 90 / 80
         radius = np.hypot(x, y)
         drawing.points[number] = (float(radius * np.cos(angle)), float(radius * np.sin(angle)), z)
     (tmp_path / "chamber.msh").write_bytes(msh_4(drawing))
-    found = load_scene(tmp_path / "my_disc.toml")
-    assert isinstance(found, Scene)
-    assert found.disc.chambers == 4
+    scene = load_scene(tmp_path / "my_disc.toml")
+    assert isinstance(scene, Scene)
+    assert scene.disc.chambers == 4
 
 
 def test_a_named_port(tmp_path: Path) -> None:
@@ -141,11 +135,8 @@ def test_a_named_port(tmp_path: Path) -> None:
     assert isinstance(ported, Scene)
     assert ported.tube.port_radius == pytest.approx(0.0385, rel=0.02)
     assert ported.origin_of("tube.port_radius") == "derived"
-    text = scene_text("chamber.msh", mesh_unit="mm")
-    text = text.replace("[tube]\n", '[tube]\nport_radius = "30 mm"\n')
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match='port_radius is 30 mm, but the boundary "port" lies from'):
-        load_scene(tmp_path / "my_disc.toml")
+        edited(tmp_path, "[tube]\n", '[tube]\nport_radius = "30 mm"\n')
 
 
 @pytest.mark.parametrize(
@@ -164,10 +155,8 @@ def test_another_unit_is_named(
     mesh = drawn()
     mesh.points = {n: (drawing * x, drawing * y, drawing * z) for n, (x, y, z) in mesh.points.items()}
     (tmp_path / "chamber.msh").write_bytes(msh_4(mesh))
-    text = scene_text("chamber.msh", mesh_unit=declared).replace("[tube]\n", f"[tube]\n{lengths}\n")
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SceneError) as caught:
-        load_scene(tmp_path / "my_disc.toml")
+        edited(tmp_path, "[tube]\n", f"[tube]\n{lengths}\n", mesh_unit=declared)
     message = str(caught.value)
     assert message.count("\n") == 0
     assert f'in "{declared}" the chamber reaches' in message
@@ -177,10 +166,8 @@ def test_another_unit_is_named(
 
 def test_a_length_that_fits_no_unit_is_its_own_error(tmp_path: Path) -> None:
     (tmp_path / "chamber.msh").write_bytes(msh_4(drawn()))
-    text = scene_text("chamber.msh", mesh_unit="mm").replace('length = "120 mm"', 'length = "50 mm"')
-    (tmp_path / "my_disc.toml").write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match="the tube cannot reach the opposite port") as caught:
-        load_scene(tmp_path / "my_disc.toml")
+        edited(tmp_path, 'length = "120 mm"', 'length = "50 mm"')
     assert "scale" not in str(caught.value)
 
 

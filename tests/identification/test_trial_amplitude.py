@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from synthetic_rigs import observations
 
 from ringbalance.identification.criticism import Review
@@ -90,22 +91,25 @@ def washers() -> Observations:
     return observed(np.asarray(WASHER * counts, dtype=np.float64), np.zeros(5), mean, width)
 
 
-def by_vectors(scene: Scene) -> FitResult:
-    return fit(rotor(scene), data=[washers()])
+@pytest.fixture(scope="module")
+def by_vectors(paper_scene: Scene) -> FitResult:
+    """The washers fitted with the rotor's own unbalance at any angle."""
+    return fit(rotor(paper_scene), data=[washers()])
 
 
-def in_line(scene: Scene) -> FitResult:
-    """As if the rotor's own unbalance stood at the washers' angle, so that amplitudes add."""
-    aligned = rotor(scene, phase=0.0)
+@pytest.fixture(scope="module")
+def in_line(paper_scene: Scene) -> FitResult:
+    """The washers fitted as if the rotor's own unbalance stood at their angle, so that amplitudes add."""
+    aligned = rotor(paper_scene, phase=0.0)
     return fit(aligned, data=[washers()], parameters=["influence_coefficient", "initial_amplitude"])
 
 
-def test_the_rotor_of_rodrigues_has_one_coefficient(paper_scene: Scene) -> None:
+def test_the_rotor_of_rodrigues_has_one_coefficient(by_vectors: FitResult, in_line: FitResult) -> None:
     """1.02 +- 0.05 um per g mm, stated beforehand for amplitudes in line; both fits must agree with it.
 
     Agreement: the difference is within the root of the sum of the squares of both half-widths.
     """
-    for result in (by_vectors(paper_scene), in_line(paper_scene)):
+    for result in (by_vectors, in_line):
         found = result.parameter("influence_coefficient")
         half = (found.interval[1] - found.interval[0]) / 2
         assert abs(found.value / PER_G_MM - 1.02) < np.hypot(half / PER_G_MM, 0.05)
@@ -113,28 +117,26 @@ def test_the_rotor_of_rodrigues_has_one_coefficient(paper_scene: Scene) -> None:
         assert found.verdict is Identified.IDENTIFIED
 
 
-def test_the_page_has_what_the_fits_find(paper_scene: Scene) -> None:
+def test_the_page_has_what_the_fits_find(by_vectors: FitResult, in_line: FitResult) -> None:
     text = (Path(__file__).resolve().parents[2] / "docs" / "fit.md").read_text(encoding="utf-8")
-    free, aligned = (
-        fitted(paper_scene).parameter("influence_coefficient") for fitted in (by_vectors, in_line)
-    )
+    free, aligned = (each.parameter("influence_coefficient") for each in (by_vectors, in_line))
     low, high = (end / PER_G_MM for end in free.interval)
     assert f"{free.value / PER_G_MM:.2f} ({low:.2f} to {high:.2f}) µm per" in text
     half = (aligned.interval[1] - aligned.interval[0]) / 2 / PER_G_MM
     assert f"{aligned.value / PER_G_MM:.3f} ± {half:.3f} where" in text
 
 
-def test_a_washer_elsewhere_would_tell_most_of_the_phase(paper_scene: Scene) -> None:
+def test_a_washer_elsewhere_would_tell_most_of_the_phase(by_vectors: FitResult) -> None:
     """All washers stood at one angle: one elsewhere tells the angle to the own unbalance."""
-    told = next_measurement(by_vectors(paper_scene), "initial_phase")
+    told = next_measurement(by_vectors, "initial_phase")
     best = next(g for g in told.gains if g.candidate.startswith("trial amplitude"))
     assert "angle 0 deg" not in best.candidate
     assert best.ratio < 0.5
 
 
-def test_its_vibration_is_linear_in_the_unbalance(paper_scene: Scene) -> None:
+def test_its_vibration_is_linear_in_the_unbalance(paper_scene: Scene, by_vectors: FitResult) -> None:
     """No pattern beyond the stated uncertainties; a vibration that grew with the square would be told."""
-    assert Review.of(by_vectors(paper_scene)).criticism.describes
+    assert Review.of(by_vectors).criticism.describes
     linear = washers()
     grown = np.array(linear.columns["amplitude"]) * np.array([1.0, 1.0, 1.0, 1.25, 1.6])
     bent = replace(linear, columns=dict(linear.columns) | {"amplitude": grown})

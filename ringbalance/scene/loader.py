@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from functools import cache
 from importlib import resources
@@ -160,12 +160,26 @@ def _checked_reading(
     """Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last."""
     kind = _kind(document)
     tables: Mapping[str, TableRead] = before.tables if before and _kind(before.document) == kind else {}
-    reading, faults = scene_kind(kind).read(
+    reading, read_faults = scene_kind(kind).read(
         document, file=file, folder=folder, derived=derived, before=tables
     )
-    faults = (*faults, *_origin_faults(reading, faults), *fitted_faults(reading))
+    schema, faults = reading.schema, list(read_faults)
+    faulty = {(fault.table, fault.key) for fault in faults}
+    for name in schema.tables:
+        content = reading.tables[name].content
+        for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
+            if key not in content and (name, key) not in faulty:
+                fault = Fault(
+                    file=file,
+                    table=name,
+                    key=f"{ORIGIN}.{key}",
+                    value=toml_text(origin),
+                    problem=f"the file gives no {key}, so it has no origin",
+                    allowed=f"a table with {key}, or no origin of it",
+                )
+                faults.append(fault)
+    faults += fitted_faults(reading)
     if faults:
-        schema = reading.schema
         keys = {"": schema.names_at(()), **{name: list(each.keys) for name, each in schema.tables.items()}}
 
         def rank(fault: Fault) -> tuple[int, int]:
@@ -203,9 +217,20 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
         ):
             record = kind(**field_values)
         records[name] = record
-    same = before is not None and before.tables.get("uncertainty") is reading.tables["uncertainty"]
-    uncertainty = parts_before["uncertainty"] if same else tuple(_uncertainty(reading))
-    return {**records, "tolerance": values["accuracy.tolerance"], "uncertainty": uncertainty}
+    result = {**records, "tolerance": values["accuracy.tolerance"]}
+    if before is not None and before.tables.get("uncertainty") is reading.tables["uncertainty"]:
+        return {**result, "uncertainty": parts_before["uncertainty"]}
+    uncertainty = []
+    for key in reading.schema.tables["uncertainty"].keys:
+        stated = values.get(f"uncertainty.{key}")
+        if stated is None or key == ORIGIN:
+            continue
+        # By "table.key" where [uncertainty] has a table for each table.
+        of_table = isinstance(stated, dict)
+        widths = {f"{key}.{name}": each for name, each in stated.items()} if of_table else {key: stated}
+        for quantity, (width, relative) in widths.items():
+            uncertainty.append(InputUncertainty(quantity=quantity, half_width=width, relative=relative))
+    return {**result, "uncertainty": tuple(uncertainty)}
 
 
 @cache
@@ -215,35 +240,6 @@ def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
         (each.name, f"{table}.{each.name}", None if each.default is MISSING else each.default)
         for each in fields(kind)
     )
-
-
-def _uncertainty(reading: SceneReading) -> Iterator[InputUncertainty]:
-    """By key, or by "table.key" where [uncertainty] has a table for each table."""
-    for key in reading.schema.tables["uncertainty"].keys:
-        stated = reading.values.get(f"uncertainty.{key}")
-        if stated is None or key == ORIGIN:
-            continue
-        of_table = isinstance(stated, dict)
-        widths = {f"{key}.{name}": each for name, each in stated.items()} if of_table else {key: stated}
-        for quantity, (width, relative) in widths.items():
-            yield InputUncertainty(quantity=quantity, half_width=width, relative=relative)
-
-
-def _origin_faults(reading: SceneReading, faults: Iterable[Fault]) -> Iterator[Fault]:
-    """One error for each origin of a value that does not stand in the file, unless the value has one."""
-    faulty = {(fault.table, fault.key) for fault in faults}
-    for name in reading.schema.tables:
-        content = reading.tables[name].content
-        for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
-            if key not in content and (name, key) not in faulty:
-                yield Fault(
-                    file=reading.file,
-                    table=name,
-                    key=f"{ORIGIN}.{key}",
-                    value=toml_text(origin),
-                    problem=f"the file gives no {key}, so it has no origin",
-                    allowed=f"a table with {key}, or no origin of it",
-                )
 
 
 def _kind(document: Mapping[str, Any]) -> str:

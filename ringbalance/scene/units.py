@@ -63,30 +63,26 @@ class _Dimension:
 
 
 def _dimensions() -> Mapping[str, _Dimension]:
-    rows = packaged_rows("ringbalance.scene", "data", "units.csv")
-    return MappingProxyType(
-        {
-            row["dimension"]: _Dimension(
-                name=row["name"],
-                example=row["example"],
-                units=MappingProxyType(dict(map(_unit, row["units"].split("; ")))),
-                smallest=float(row["smallest"]),
-                largest=float(row["largest"]),
+    dimensions = {}
+    for row in packaged_rows("ringbalance.scene", "data", "units.csv"):
+        units = {}
+        # "rpm 1/30*pi" or "degC 1 273.15": name, factor, and an offset where there is one.
+        for text in row["units"].split("; "):
+            name, factor, *offset = text.split(" ")
+            above, _, below = factor.removesuffix("*pi").partition("/")
+            units[name] = _Unit(
+                factor=Fraction(above) / Fraction(below or 1),
+                offset=Fraction(offset[0] if offset else 0),
+                pi=factor.endswith("*pi"),
             )
-            for row in rows
-        }
-    )
-
-
-def _unit(text: str) -> tuple[str, _Unit]:
-    """Name and unit from "rpm 1/30*pi" or "degC 1 273.15": a factor, and an offset where there is one."""
-    name, factor, *offset = text.split(" ")
-    above, _, below = factor.removesuffix("*pi").partition("/")
-    return name, _Unit(
-        factor=Fraction(above) / Fraction(below or 1),
-        offset=Fraction(offset[0] if offset else 0),
-        pi=factor.endswith("*pi"),
-    )
+        dimensions[row["dimension"]] = _Dimension(
+            name=row["name"],
+            example=row["example"],
+            units=MappingProxyType(units),
+            smallest=float(row["smallest"]),
+            largest=float(row["largest"]),
+        )
+    return MappingProxyType(dimensions)
 
 
 DIMENSIONS: Mapping[str, _Dimension] = _dimensions()

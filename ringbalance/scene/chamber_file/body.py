@@ -108,23 +108,38 @@ class Body:
         Args: `scale`: metres in the file's unit.
         Raises: MeshFileError: its cells or nodes are such that nothing further can be looked at.
         """
-        blocks, marks = contents.blocks, contents.marks
+        blocks = contents.blocks
         solid = [number for number, (kind, _) in enumerate(blocks) if dimension(kind) == 3]
         wrong = [*_wrong_kinds(contents, solid), *_wrong_nodes(contents)]
         if wrong:
             raise MeshFileError(wrong)
-        lower = [nodes.ravel() for kind, nodes in blocks if dimension(kind) < 2]
+        cell_names: dict[str, dict[int, BoolArray]] = {}
+        # A file has a block for each face of the drawing.
+        facets: dict[tuple[str, str], list[IntArray]] = {}
+        lesser: dict[str, None] = {}
+        for mark in (mark for mark in contents.marks if mark.where.any()):
+            kind, nodes = blocks[mark.block]
+            if dimension(kind) == 3:
+                none = {number: np.zeros(len(blocks[number][1]), dtype=np.bool_) for number in solid}
+                parts = cell_names.setdefault(mark.name, none)
+                parts[mark.block] = parts[mark.block] | mark.where
+            elif dimension(kind) == 2:
+                facets.setdefault((mark.name, kind), []).append(nodes[mark.where])
+            else:
+                lesser[mark.name] = None
+        drawing = [nodes.ravel() for kind, nodes in blocks if dimension(kind) < 2]
         return cls(
             kind=next(kind for kind in CELL_KINDS if kind == blocks[solid[0]][0]),
             points=contents.points * scale,
             cells=np.concatenate([blocks[number][1] for number in solid]),
-            cell_names=tuple(_cell_names(contents, solid)),
-            named=tuple(_named(contents)),
-            lesser=tuple(
-                dict.fromkeys(m.name for m in marks if m.where.any() and dimension(blocks[m.block][0]) < 2)
+            cell_names=tuple((name, np.concatenate([*parts.values()])) for name, parts in cell_names.items()),
+            named=tuple(
+                NamedFacets(name=name, kind=kind, nodes=np.concatenate(parts))
+                for (name, kind), parts in facets.items()
             ),
+            lesser=tuple(lesser),
             other_names=contents.other_names,
-            drawing=np.concatenate([np.empty(0, dtype=np.int64), *lower]),
+            drawing=np.concatenate([np.empty(0, dtype=np.int64), *drawing]),
         )
 
 
@@ -165,24 +180,3 @@ def _wrong_nodes(contents: Contents) -> Iterator[Contradiction]:
         if lost.any():
             problem = f"{kind} elements have nodes that the file does not give ({lost.sum()})"
             yield Contradiction(problem=problem, allowed="")
-
-
-def _cell_names(contents: Contents, solid: list[int]) -> Iterator[tuple[str, BoolArray]]:
-    marks = [mark for mark in contents.marks if mark.block in solid and mark.where.any()]
-    for name in dict.fromkeys(mark.name for mark in marks):
-        parts = {number: np.zeros(len(contents.blocks[number][1]), dtype=np.bool_) for number in solid}
-        for mark in marks:
-            if mark.name == name:
-                parts[mark.block] = parts[mark.block] | mark.where
-        yield name, np.concatenate(list(parts.values()))
-
-
-def _named(contents: Contents) -> Iterator[NamedFacets]:
-    """Facets by name and kind; a file has a block for each face of the drawing."""
-    parts: dict[tuple[str, str], list[IntArray]] = {}
-    for mark in contents.marks:
-        kind, nodes = contents.blocks[mark.block]
-        if dimension(kind) == 2 and mark.where.any():
-            parts.setdefault((mark.name, kind), []).append(nodes[mark.where])
-    for (name, kind), nodes_of in parts.items():
-        yield NamedFacets(name=name, kind=kind, nodes=np.concatenate(nodes_of))

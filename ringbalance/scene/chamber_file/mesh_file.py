@@ -402,28 +402,25 @@ def _marks(parts: _MeshContent) -> Iterator[Mark]:
 
 
 def _sides(parts: _MeshContent) -> Iterator[tuple[str, IntArray]]:
-    """Name and facets of each line of a *SURFACE, as numbers of nodes."""
+    """Name and facets of each line of a *SURFACE, as numbers of nodes in meshio's order."""
     for name, first, side in parts.surfaces:
         is_element = first.isdigit() and len(first) < 16
         numbers = np.array([int(first)]) if is_element else _numbers_in(first, parts)
         for kind, _, rows in parts.elements:
             inside = np.isin(rows[:, 0], numbers)
-            if inside.any():
-                yield name, rows[inside, 1:][:, _face(kind, side)]
-
-
-def _face(kind: str, side: str) -> list[int]:
-    """Nodes of a face of a cell, in meshio's order; of a shell, its own."""
-    if kind not in CELL_KINDS:
-        return list(range(_NODES[kind]))
-    cell_faces = faces(kind)
-    numbered = _FACES[len(cell_faces)]
-    if side not in [f"S{count}" for count in range(1, 1 + len(numbered))]:
-        raise MeshFileError.of(
-            f"*SURFACE names face {side[:9]} of {kind} cells, which have no such face", "S1 to S6"
-        )
-    corners = set(numbered[int(side[1]) - 1])
-    return next(list(each) for each in cell_faces if set(each[: len(corners)]) == corners)
+            if not inside.any():
+                continue
+            # A shell is a face itself.
+            face = list(range(_NODES[kind]))
+            if kind in CELL_KINDS:
+                cell_faces = faces(kind)
+                corners = {f"S{i}": set(each) for i, each in enumerate(_FACES[len(cell_faces)], start=1)}
+                if side not in corners:
+                    problem = f"*SURFACE names face {side[:9]} of {kind} cells, which have no such face"
+                    raise MeshFileError.of(problem, "S1 to S6")
+                wanted = corners[side]
+                face = next(list(each) for each in cell_faces if set(each[: len(wanted)]) == wanted)
+            yield name, rows[inside, 1:][:, face]
 
 
 READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(

@@ -263,11 +263,24 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
     held = np.zeros((len(KNOWN_NAMES), len(sides)), dtype=np.bool_)
     for each in body.named:
         at, real = _places(body, facets, each, facets.keys[sides])
-        wrong += _no_facets(body, facets, each, real)
-        wrong += _other_middles(body, facets.nodes[sides[at[real]]], each, real)
+        # Named elements that are no outer facet: between two cells, or of no cell.
+        _, side = _places(body, facets, each, np.sort(facets.keys))
+        for strange, what in ((side & ~real, "lie between two cells"), (~side, "are no side of any cell")):
+            what = f"facets named {toml_text(each.name)} {what}"
+            wrong += _about(body, what, each.corners[strange], "facets of the chamber's surface")
+        nodes, nodes_of_cell = each.nodes[real], facets.nodes[sides[at[real]]]
+        if nodes_of_cell.shape[1] == nodes.shape[1]:
+            other = (np.sort(nodes_of_cell, axis=1) != np.sort(nodes, axis=1)).any(axis=1)
+            what = "named facets have other mid-side nodes than their cells"
+            wrong += _about(body, what, nodes[other], "facets and cells with the same nodes")
         if each.name in KNOWN_NAMES:
             held[KNOWN_NAMES.index(each.name), at[real]] = True
-    wrong += _unknown(body, facets, sides, held)
+    for each in (named for named in body.named if named.name not in KNOWN_NAMES):
+        # Facets of an unknown name that have no known one beside it.
+        at, real = _places(body, facets, each, facets.keys[sides])
+        alone = ~(real & held[:, at].any(axis=0))
+        what = f"facets have the unknown name {toml_text(each.name)}{did_you_mean(each.name, KNOWN_NAMES)}"
+        wrong += _about(body, what, each.corners[alone], ", ".join(KNOWN_NAMES))
     several = held.sum(axis=0) > 1
     if several.any():
         both = [KNOWN_NAMES[index] for index in np.flatnonzero(held[:, several][:, 0])]
@@ -301,17 +314,6 @@ def _volume_names(body: Body) -> Iterator[Contradiction]:
         yield from _about(body, what, body.corners[~inside], f"every cell in {toml_text(volume)}")
 
 
-def _unknown(body: Body, facets: Facets, sides: IntArray, held: BoolArray) -> Iterator[Contradiction]:
-    """Facets of an unknown name that have no known one beside it. Args: `held`: as names times `sides`."""
-    for each in body.named:
-        if each.name not in KNOWN_NAMES:
-            at, real = _places(body, facets, each, facets.keys[sides])
-            alone = ~(real & held[:, at].any(axis=0))
-            hint = did_you_mean(each.name, KNOWN_NAMES)
-            what = f"facets have the unknown name {toml_text(each.name)}{hint}"
-            yield from _about(body, what, each.corners[alone], ", ".join(KNOWN_NAMES))
-
-
 def _missing(body: Body) -> Iterator[Contradiction]:
     """An error where no facet is the outer wall, with the names that the file does have."""
     names = dict.fromkeys(each.name for each in body.named)
@@ -328,22 +330,3 @@ def _missing(body: Body) -> Iterator[Contradiction]:
     listed = ", ".join(map(toml_text, all_names)) or "none"
     problem = f'no facets have the name "{OUTER_WALL}"; names in the file: {listed[:300]}'
     yield Contradiction(problem=problem, allowed=f'a named boundary "{OUTER_WALL}" (Gmsh: Physical Surface)')
-
-
-def _no_facets(body: Body, facets: Facets, named: NamedFacets, real: BoolArray) -> Iterator[Contradiction]:
-    """Named elements that are no outer facet: between two cells, or of no cell."""
-    _, side = _places(body, facets, named, np.sort(facets.keys))
-    for wrong, what in ((side & ~real, "lie between two cells"), (~side, "are no side of any cell")):
-        what = f"facets named {toml_text(named.name)} {what}"
-        yield from _about(body, what, named.corners[wrong], "facets of the chamber's surface")
-
-
-def _other_middles(
-    body: Body, cell: IntArray, named: NamedFacets, real: BoolArray
-) -> Iterator[Contradiction]:
-    """Facets of second order whose mid-side nodes are not those of their cell."""
-    nodes = named.nodes[real]
-    if cell.shape[1] == nodes.shape[1]:
-        wrong = (np.sort(cell, axis=1) != np.sort(nodes, axis=1)).any(axis=1)
-        what = "named facets have other mid-side nodes than their cells"
-        yield from _about(body, what, nodes[wrong], "facets and cells with the same nodes")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -311,7 +312,7 @@ MESHES: dict[str, Broken] = {
     ),
     "wrong axis": Broken(lambda: msh_4(drawn()), ("see mesh_axis and the origin",), keys={"mesh_axis": "x"}),
     "round the axis": Broken(
-        spoilt(lambda d: [moved(d, n, x - 30.0, y, z) for n, (x, y, z) in d.points.items()]),
+        spoilt(lambda d: d.points.update({n: (x - 30.0, y, z) for n, (x, y, z) in d.points.items()})),
         ("the shaft's axis", "mesh_axis and the origin"),
     ),
     "port elsewhere": Broken(spoilt(port_on_inner_wall), ("does not cover port_radius, 19.52",)),
@@ -351,7 +352,7 @@ FILES: dict[str, Broken] = {
         spoilt(lambda d: add(d, "line", [1, 2], 0), write=msh_4), ("elements of it are in no physical group",)
     ),
     "all saved 2.2": Broken(
-        spoilt(lambda d: [setattr(each, "group", 0) for each in d.elements.values()]),
+        spoilt(lambda d: replace(d, elements={n: replace(e, group=0) for n, e in d.elements.items()})),
         ("elements of it are in no physical group, as with Mesh.SaveAll = 1",),
     ),
     "no nodes": Broken(text("$Nodes", "$Knots"), (UNREAD,)),

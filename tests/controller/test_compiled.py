@@ -6,14 +6,20 @@ import math
 import os
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
-from ringbalance.controller import compiled_loop
-from ringbalance.reduced_model.injection import moment
+from ringbalance.controller import compiled_loop, loop_records
+from ringbalance.controller.eccentric_mass import memory
+from ringbalance.controller.liquid_ring import plant
+from ringbalance.reduced_model.injection import dynamics, moment
+from ringbalance.reduced_model.law import flow_law
 from ringbalance.scene.platform.compiled import _compiled_sources, compiled
+from ringbalance.scene.platform.kept_code import KeptCode
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -101,7 +107,27 @@ def test_every_compiled_functions_source_tells_stale_code() -> None:
     ]
     files = {Path(function.__code__.co_filename).resolve() for function in functions}
     assert "moment.py" in {file.name for file in files}
-    assert files <= {path.resolve() for path in _compiled_sources()}
+    sources = {path.resolve() for path in _compiled_sources()}
+    assert files <= sources
+    # Compiled code has the values of constants in it.
+    constants = (loop_records, dynamics, memory, plant, flow_law)
+    assert {Path(str(module.__file__)).resolve() for module in constants} <= sources
+
+
+@pytest.mark.parametrize(("name", "shared"), [("ringbalance.copied", True), ("copied", False)])
+def test_copies_of_the_program_share_kept_code(tmp_path: Path, name: str, shared: bool) -> None:
+    keys = set()
+    for folder in ("first", "second"):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "copied.py"
+        path.write_text("def twice(x):\n    return 2 * x\n")
+        spec = spec_from_file_location(name, path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        keys.add(KeptCode(module.twice, "digest")._path("float64").name)
+    assert (len(keys) == 1) is shared
 
 
 def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None:

@@ -214,22 +214,31 @@ _COMPILED: Final = ("controller", "reduced_model")
 """Folders whose functions are compiled, from the package's root."""
 
 
+_IMPORT: Final = re.compile(rb"^from ringbalance\.([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
+_CONSTANT: Final = re.compile(rb"\b(?:[A-Z][A-Z_0-9]*|Regime)\b")
+"""Imported name whose value is in the compiled code."""
+
+
 def _compiled_sources() -> tuple[Path, ...]:
-    """Every source that holds functions that are compiled, and the machinery's own."""
+    """Sources that hold compiled functions, the machinery's own, and those that define constants of both."""
     this_file, root = Path(__file__), Path(__file__).parents[2]
-    sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
-    marked = [path for path in sources if any(mark in path.read_bytes() for mark in _MARKS)]
-    return tuple(
-        sorted(
-            [
-                this_file,
-                this_file.with_name("both_ways.py"),
-                this_file.with_name("kept_code.py"),
-                root / "physics/gas.py",
-                *marked,
+    paths = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
+    pending = [path for path in paths if any(mark in path.read_bytes() for mark in _MARKS)]
+    pending += [this_file.with_name(name) for name in ("compiled.py", "both_ways.py", "kept_code.py")]
+    pending.append(root / "physics/gas.py")
+    sources: set[Path] = set()
+    while pending:
+        path = pending.pop()
+        if path in sources or not path.is_file():
+            continue
+        sources.add(path)
+        if not path.is_relative_to(root / "scene"):
+            pending += [
+                root.joinpath(*module.decode().split(".")).with_suffix(".py")
+                for module, names in _IMPORT.findall(path.read_bytes())
+                if _CONSTANT.search(names)
             ]
-        )
-    )
+    return tuple(sorted(sources))
 
 
 _Handler = Callable[[int, FrameType | None], Any]

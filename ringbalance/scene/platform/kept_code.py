@@ -126,7 +126,10 @@ class KeptCode:
         source, line = inspect.getfile(function), function.__code__.co_firstlineno
         code = hashlib.sha256(function.__code__.co_code).hexdigest()
         self._name = f"{Path(source).stem}.{function.__name__}-{line}"
-        self._known = f"{source}:{line}:{function.__qualname__}:{digest}:{code}"
+        # The program's own modules are known by name: copies in several folders share the code.
+        own_module = function.__module__.startswith("ringbalance.")
+        origin = function.__module__ if own_module else source
+        self._known = f"{origin}:{line}:{function.__qualname__}:{digest}:{code}"
         self._turn: int | None = None
 
     @property

@@ -49,7 +49,7 @@ from ringbalance.scene import write_whole
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.cases.bent_tube import REYNOLDS, VISCOSITY, path_over_crest
+from ringbalance.verification.cases.bent_tube import REYNOLDS, VISCOSITY_M2_S, path_over_crest
 from ringbalance.verification.navier_stokes.tube import (
     SectionMesh,
     developed_section,
@@ -155,7 +155,7 @@ def bend(scene: Scene, out: Path) -> Iterator[Row]:
     """Loss over two bends of a turning tube, against the kept solution in three dimensions."""
     start, end = 2.0, 20.0
     rotation = rotation_reynolds_number(
-        angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY
+        angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY_M2_S
     )
     around = (4, 6, 8)
     runs = [

@@ -150,7 +150,7 @@ def _ring_study(scene: Scene) -> Record:
         fill_ratio=half, opposite_fill_ratio=half, gas_pressure=scene.gas.pressure
     )
     # Both laws over the fill, at the pressures of Fig. 4, or at the scene's own and at twice that.
-    pressures = [papers.LOW_PRESSURE, papers.HIGH_PRESSURE]
+    pressures = [papers.LOW_PRESSURE_PA, papers.HIGH_PRESSURE_PA]
     if scene.gas.pressure not in pressures:
         pressures = [scene.gas.pressure, 2 * scene.gas.pressure]
     fill = np.linspace(0.0, scene.disc.max_fill_ratio, _LAW_FILLS)

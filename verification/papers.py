@@ -42,13 +42,13 @@ LOWEST_PRESSURE: Final = printed(0.54e6, last_digit=0.01e6)
 HIGHEST_PRESSURE: Final = printed(1.77e6, last_digit=0.01e6)
 """Working range, after Eq. 19."""
 DEPARTURE_LOW: Final = printed(0.456, last_digit=0.001)
-"""Under Fig. 4, at LOW_PRESSURE."""
+"""Under Fig. 4, at LOW_PRESSURE_PA."""
 DEPARTURE_HIGH: Final = printed(0.229, last_digit=0.001)
-"""Under Fig. 4, at HIGH_PRESSURE."""
-LOW_PRESSURE: Final = 0.7e6
-HIGH_PRESSURE: Final = 1.5e6
+"""Under Fig. 4, at HIGH_PRESSURE_PA."""
+LOW_PRESSURE_PA: Final = 0.7e6
+HIGH_PRESSURE_PA: Final = 1.5e6
 """Gas pressures of Fig. 4, Pa."""
-DENSITY: Final = 1000.0
+DENSITY_KG_M3: Final = 1000.0
 """Table 1, kg/m^3."""
 LAMBDA_TOLERANCE: Final = 0.007
 """Section 5.2: 72 mm within 0.7 %."""
@@ -56,7 +56,7 @@ LAMBDA_TOLERANCE: Final = 0.007
 
 def at_paper_density(scene: Scene) -> Scene:
     """A scene with the density of Table 1, 1000 kg/m^3, in place of the liquid's own."""
-    return dataclasses.replace(scene, liquid=dataclasses.replace(scene.liquid, density=DENSITY))
+    return dataclasses.replace(scene, liquid=dataclasses.replace(scene.liquid, density=DENSITY_KG_M3))
 
 
 def rounded_radius(quantity: Callable[[float], float]) -> float:

@@ -38,7 +38,7 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 
 LEVEL: Final = 0.05
 """Chance that a model that is right is said to fail."""
-FEWEST: Final = 5
+MIN_TESTED_ROWS: Final = 5
 """Rows of a block that is tested."""
 _MOST_NAMED_FINDINGS: Final = 3
 """Findings that the sentence names."""
@@ -143,7 +143,7 @@ class _Criticism:
             rows = fit.block == block
             count, residuals = int(np.count_nonzero(rows)), fit.residuals[rows]
             freedom = float(count - np.sum(basis[rows] ** 2))
-            if count < FEWEST or freedom <= 1:
+            if count < MIN_TESTED_ROWS or freedom <= 1:
                 continue
             if np.all(fit.known_noise[rows]):
                 square = float(np.sum(residuals**2))

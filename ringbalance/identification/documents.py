@@ -97,7 +97,7 @@ _WORDS: Final = {
     Identified.PRACTICALLY: "hardly",
     Identified.STRUCTURALLY: "no",
 }
-_FAR: Final = 3.0
+_NOTABLE_RESIDUAL: Final = 3.0
 """Normalised residual of a row that is named."""
 
 
@@ -188,9 +188,9 @@ def _findings(result: FitResult, review: Review) -> Iterator[Finding]:
             values = {"first": first.name, "second": second.name, "correlation": correlation}
             yield Finding(code="errors_correlated", values=values)
     for file in result.residuals:
-        far = file.lines[np.max(np.abs(file.normalised), axis=1) > _FAR]
+        far = file.lines[np.max(np.abs(file.normalised), axis=1) > _NOTABLE_RESIDUAL]
         if far.size:
-            values = {"file": file.file, "lines": _listed(far.tolist()), "deviations": _FAR}
+            values = {"file": file.file, "lines": _listed(far.tolist()), "deviations": _NOTABLE_RESIDUAL}
             yield Finding(code="rows_far_off", values=values)
         if np.any(file.down_weighted):
             lines = _listed(file.lines[file.down_weighted].tolist())

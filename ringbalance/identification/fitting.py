@@ -37,7 +37,7 @@ _LAMBDA_FAR: Final = 2**0.25
 root of two that rms amplitudes are wrong by where zero to peak is stated."""
 
 
-_FAR: Final = 3.0
+_MAX_PULL_SIGMAS: Final = 3.0
 """Standard deviations by which data may disagree with what is known beforehand."""
 _MOVABLE_FRACTION: Final = 0.1
 """Fraction of the prior standard deviation by which data must be able to move a value to disagree."""
@@ -108,7 +108,9 @@ class FittedParameter:
             prior = (self.before_interval[1] - self.before) / NORMAL_95
             left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
             moved = math.sqrt(max(prior**2 - left**2, 0.0))
-            disagrees |= moved > _MOVABLE_FRACTION * prior and abs(self.value - self.before) > _FAR * moved
+            disagrees |= (
+                moved > _MOVABLE_FRACTION * prior and abs(self.value - self.before) > _MAX_PULL_SIGMAS * moved
+            )
         if self.before_source == "[uncertainty]" and disagrees:
             doubts.append(text_of("outside_stated" if self.contradicts else "data_outside_stated"))
         far = self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR

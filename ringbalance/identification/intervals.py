@@ -38,12 +38,12 @@ from ringbalance.scene.fitted import LARGEST_ERROR
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.uncertain import NORMAL_95
 
-_CLOSE: Final = 0.01
+_END_TOLERANCE: Final = 0.01
 """Relative, of the root of S at an end of the interval."""
 _GAIN: Final = 1e-3
 """Gain of S below which the other parameters are not moved further."""
 _TRIALS: Final = 16
-_LONGEST: Final = 0.7
+_MAX_STEP: Final = 0.7
 """In t, of a step beyond what is known."""
 _LARGEST_STEP: Final = 3.0
 """Factor by which a trial may go beyond what the curvature at the optimum says."""
@@ -125,7 +125,7 @@ def _end(
     direction = spread[:, which] / max(float(spread[which, which]), 1e-300)
     inside, outside, start = (0.0, 0.0), (math.inf, math.inf), best.t
     points: list[tuple[float, float]] = []
-    distance = min(factor * sigma, _LONGEST)
+    distance = min(factor * sigma, _MAX_STEP)
     for _ in range(_TRIALS):
         trial = best_t + sign * distance
         if (trial - bound) * sign >= 0:
@@ -137,7 +137,7 @@ def _end(
         root = math.sqrt(max(rise, 0.0))
         points.append((trial, rise))
         at_bound = root < factor and trial == bound
-        if at_bound or abs(root - factor) <= _CLOSE * factor:
+        if at_bound or abs(root - factor) <= _END_TOLERANCE * factor:
             return trial, at_bound, end, points
         if root < factor:
             inside, start = (distance, root), end
@@ -148,7 +148,7 @@ def _end(
         reach, root = inside
         if math.isinf(outside[0]):
             slope = root / reach if reach > 0 else 1 / sigma
-            furthest = min(reach + _LONGEST, _LARGEST_STEP * max(reach, factor * sigma))
+            furthest = min(reach + _MAX_STEP, _LARGEST_STEP * max(reach, factor * sigma))
             distance = min(factor / max(slope, 1e-300), furthest)
         else:
             part = (factor - root) / (outside[1] - root)

@@ -35,7 +35,7 @@ STEP: Final = 1e-3
 """In t, of central differences; their error is STEP^2/6 times a third derivative of order one."""
 _RANK: Final = 1e-10
 """Smallest singular value that counts, relative to the largest."""
-_SHORTEST: Final = 1e-2
+_MIN_STEP_FRACTION: Final = 1e-2
 """Fraction of `STEP` below which there is no difference to that side."""
 _JUMP: Final = 0.1
 """Part of the differences on both sides by which they may differ: beyond it there is a jump between them."""
@@ -137,7 +137,7 @@ class Problem:
         """
         ends = [np.clip(t + step, *self.bounds) for step in (-STEP, STEP)]
         # Next to a bound a difference would be round-off over next to nothing.
-        below, above = (np.where(np.abs(end - t) < _SHORTEST * STEP, t, end) for end in ends)
+        below, above = (np.where(np.abs(end - t) < _MIN_STEP_FRACTION * STEP, t, end) for end in ends)
         down, up = np.split(self._differences(t, np.concatenate([below, above])), 2, axis=1)
         part = (t - below) / (above - below)
         apart = np.abs(up - down) > _JUMP * (np.abs(up) + np.abs(down))

@@ -28,9 +28,9 @@ _NO_EFFECT: Final = 1e-3
 _NEARBY: Final = 1e-2
 """Change of the sum of squares, relative or of few standard deviations, that tells one start's minimum from
 another's."""
-_APART: Final = 1.0
+_START_DISTANCE: Final = 1.0
 """Distance in t of a further start, in prior standard deviations or, without a prior, in half of ln 2."""
-_WIDE: Final = 0.35
+_MAX_START_REACH: Final = 0.35
 _LEAST_GAIN: Final = 1e-8
 """Gain of the sum of squares below which a step to the optimum is not taken: a ten-thousandth of a standard
 deviation of a parameter."""
@@ -102,11 +102,13 @@ def optimum(
         for _ in range(30):
             ratio = (1 + ratio) ** (1 / (size + 1))
         both = zip(problem.parameters, problem.start.tolist(), strict=True)
-        reach = np.array([min(p.prior / p.slope(t), _WIDE) if p.prior else _WIDE for p, t in both])
+        reach = np.array(
+            [min(p.prior / p.slope(t), _MAX_START_REACH) if p.prior else _MAX_START_REACH for p, t in both]
+        )
         points = [problem.start]
         for n in range(1, starts):
             part = np.mod(n * ratio ** -np.arange(1, size + 1), 1.0)
-            points.append(np.clip(problem.start + _APART * reach * (2 * part - 1), low, high))
+            points.append(np.clip(problem.start + _START_DISTANCE * reach * (2 * part - 1), low, high))
         ends = [searched(residuals, point, gain=_NEARBY) for point in points]
         t = min(ends, key=lambda end: float(end[1] @ end[1]))[0]
     else:

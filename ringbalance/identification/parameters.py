@@ -96,7 +96,11 @@ class Parameter:
         if name in START:
             # Of the vibration without trial weight nothing is known beforehand.
             start, is_angle = float(getattr(scene.rotor, name)), name == "initial_phase"
-            ends = (start - math.pi, start + math.pi) if is_angle else (start / _FAR, start * _FAR)
+            ends = (
+                (start - math.pi, start + math.pi)
+                if is_angle
+                else (start / _AMPLITUDE_FACTOR, start * _AMPLITUDE_FACTOR)
+            )
             return cls(
                 name=name,
                 symbol=name,
@@ -151,9 +155,9 @@ _SYMBOLS: Final = {
 }
 _REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central_angle": 1.1, "speed": 1.1}
 """Factor up to which a logarithmic parameter is looked for."""
-_WIDE: Final = 30.0
+_RANGE_FACTOR: Final = 30.0
 _ANGLE: Final = "rad"
-_FAR: Final = 1000.0
+_AMPLITUDE_FACTOR: Final = 1000.0
 """Factor up to which the amplitude of a vibration is looked for."""
 START: Final = ("initial_amplitude", "initial_phase")
 """Parameters that belong to the measurement and not to the device."""
@@ -203,18 +207,18 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
         "hump_position": (0.02, 0.98),
         "vapour_pressure": (0.0, ambient),
         "ambient_pressure": (0.5 * ambient, 2 * ambient),
-        "extra_loss": (0.0, _WIDE * (offset + start)),
-        "drag_coefficient": (1e-3, _WIDE * (offset + start)),
+        "extra_loss": (0.0, _RANGE_FACTOR * (offset + start)),
+        "drag_coefficient": (1e-3, _RANGE_FACTOR * (offset + start)),
         "hump_radius": (0.5 * start, tube.port_radius),
         "port_radius": (tube.hump_radius or 0.5 * start, disc.outer_radius),
         "length": (max(0.2 * start, sum(b.angle * b.radius for b in tube.bends)), 5 * start),
         "critical_ratio": (0.02, 0.98),
-        "roughness": (start / _WIDE, min(_WIDE * start, 0.04 * tube.bore)),
+        "roughness": (start / _RANGE_FACTOR, min(_RANGE_FACTOR * start, 0.04 * tube.bore)),
         "plate_thickness": (start / 3, 2 * start),
     }
     if name in fixed:
         return fixed[name]
-    reach = _REACH.get(name, _WIDE)
+    reach = _REACH.get(name, _RANGE_FACTOR)
     return start / reach, start * reach
 
 
@@ -256,8 +260,8 @@ class _SceneInputs:
             name=name,
             symbol=name,
             start=start,
-            lowest=start - math.pi if is_angle else start / _WIDE,
-            highest=start + math.pi if is_angle else start * _WIDE,
+            lowest=start - math.pi if is_angle else start / _RANGE_FACTOR,
+            highest=start + math.pi if is_angle else start * _RANGE_FACTOR,
             prior=quantity.half_width / NORMAL_95 or None,
             scale=1.0 if is_angle else None,
             change=lambda scene, value: with_values_at(scene, {name: value}),

@@ -34,14 +34,14 @@ _AGREES: Final = 1e-2
 """Relative change of the noise at which it is settled."""
 _LEAST_NOISE: Final = 1e-6
 """Ratio of the least noise to the root mean square of a group's data."""
-_WIDE: Final = 1.0
+_FREE_SIGMA: Final = 1.0
 """Standard deviation of a parameter of which nothing is known, in its own scale."""
 _STEPS: Final = 8
 """Steps of Newton to the influence coefficient and the lag."""
-_CLOSE: Final = 1e-3
+_SETTLED_CHANGE: Final = 1e-3
 """Relative change of the influence coefficient at which it is settled."""
 _LEAST_CHANCE: Final = 1e-300
-_FEWEST: Final = 0.5
+_MIN_FREEDOM: Final = 0.5
 """Degrees of freedom that a group needs."""
 
 
@@ -190,7 +190,7 @@ class ReadingComparison:
             if not self._response or not math.isfinite(deviance):
                 break
             turn = 1 + complex(*(step[self._response] * (1, -1)))
-            if abs(turn - 1) < _CLOSE:
+            if abs(turn - 1) < _SETTLED_CHANGE:
                 break
             t = self._moved(t, turn)
         return deviance
@@ -268,9 +268,9 @@ def _settled(
     # What is known beforehand of each unknown, one standard deviation a row, and how far t is off it.
     priors = np.zeros((t.size + held.shape[1], design.shape[1]))
     priors[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
-    off = np.concatenate([(problem.start - t) / _WIDE, -pulled])
+    off = np.concatenate([(problem.start - t) / _FREE_SIGMA, -pulled])
     for i, (parameter, inner) in enumerate(zip(problem.parameters, t.tolist(), strict=True)):
-        priors[i, i] = parameter.slope(inner) / parameter.prior if parameter.prior else 1 / _WIDE
+        priors[i, i] = parameter.slope(inner) / parameter.prior if parameter.prior else 1 / _FREE_SIGMA
         if parameter.prior:
             off[i] = (parameter.start - parameter.value(inner)) / parameter.prior
     apart = problem.measured - predicted
@@ -284,7 +284,7 @@ def _settled(
         components = base.T @ left
         rest, taken = left - base @ components, np.sum(base[:count] ** 2, axis=1)
         freedom = np.array([np.sum(1 - taken[group == g]) for g in groups])
-        if np.any(freedom < _FEWEST):
+        if np.any(freedom < _MIN_FREEDOM):
             return math.inf, np.zeros_like(components)
         squares = np.array([np.sum(rest[:count][group == g] ** 2) for g in groups])
         settled = np.maximum(noise * np.sqrt(squares / freedom), least)

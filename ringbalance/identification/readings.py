@@ -35,7 +35,7 @@ from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.reading_likelihood import ReadingComparison
 from ringbalance.results.rows import Value, text_of
 
-_FAR: Final = 5.0
+_SUSPECT_RATIO: Final = 5.0
 """Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
 a unit, and beyond what a test rig changes."""
 _FAR_VIBRATION: Final = 100.0
@@ -69,7 +69,7 @@ def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
             low, high = limits
             middle = float(np.median(np.abs(values[values != 0])))
             ratio = middle / high if middle > high else middle / low if middle < low else 1.0
-            limit = _FAR_VIBRATION if column.amplitude else _FAR
+            limit = _FAR_VIBRATION if column.amplitude else _SUSPECT_RATIO
             facts: dict[str, Value] = {
                 "column": column.head,
                 "file": Path(observations.file).name,

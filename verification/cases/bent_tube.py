@@ -26,7 +26,7 @@ from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import BentTubeFlow, Segment, bend_shift
 
 REYNOLDS: Final = 200.0
-VISCOSITY: Final = 20e-6
+VISCOSITY_M2_S: Final = 20e-6
 """m^2/s: a silicone oil."""
 LEG_IN, HUMP, LEG_OUT = 3.0, 6.0, 12.0
 """Straight lengths over the bore."""
@@ -82,7 +82,7 @@ def _solve(
 def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
     rotation = rotation_reynolds_number(
-        angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY
+        angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY_M2_S
     )
     losses: list[float] = []
     for mesh in _MESHES if defect is None else _MESHES[1:2]:
@@ -145,9 +145,9 @@ def _law_terms(scene: Scene, length: float, rotation: float) -> dict[str, float]
     """Friction, rotation and bends of the tube law, and the bends' effect by their curvature on rotation."""
     bore, bend = scene.tube.bore, scene.tube.bends[0]
     tube = dataclasses.replace(scene.tube, length=length * bore, bends=(bend, bend), drag_coefficient=None)
-    liquid = dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY)
+    liquid = dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY_M2_S)
     same = dataclasses.replace(scene, tube=tube, liquid=liquid, uncertainty=())
-    loss = tube_loss(same, [REYNOLDS * VISCOSITY / bore])
+    loss = tube_loss(same, [REYNOLDS * VISCOSITY_M2_S / bore])
     arcs = 2 * 64 / REYNOLDS * bend.angle * bend.radius / bore
     shift = bend_shift(
         reynolds=REYNOLDS,

@@ -33,12 +33,12 @@ from ringbalance.verification.papers import (
     CHAMBER_MOMENT,
     CHAMBER_VOLUME,
     DENSE_DISC_MOMENT,
-    DENSITY,
+    DENSITY_KG_M3,
     DEPARTURE_LOW,
     DISC_MOMENT,
     INITIAL_LIQUID_VOLUME,
     LAMBDA_TOLERANCE,
-    LOW_PRESSURE,
+    LOW_PRESSURE_PA,
     MAX_LIQUID_VOLUME,
     RING_RADIUS,
     at_paper_density,
@@ -77,8 +77,8 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     def from_departure(departure: float) -> float:
         """Eqs. 18 and 19 turned round: (1 - D)^2 = (p0 - s)/(p0 + s) with s = rho omega^2 V/(2 B theta)."""
         ratio = (1 - departure) ** 2
-        stall = LOW_PRESSURE * (1 - ratio) / (1 + ratio)
-        per_volume = DENSITY * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
+        stall = LOW_PRESSURE_PA * (1 - ratio) / (1 + ratio)
+        per_volume = DENSITY_KG_M3 * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
         return stall / per_volume / 0.5
 
     def liquid(radius: float) -> float:
@@ -150,7 +150,7 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
 
 def moment_ends(scene: Scene) -> Evidence:
     """The moment alone: Eq. 7 knows no plates."""
-    return Evidence(quantities={"moment": chamber_moment(at_paper_density(scene), density=DENSITY)})
+    return Evidence(quantities={"moment": chamber_moment(at_paper_density(scene), density=DENSITY_KG_M3)})
 
 
 def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -158,7 +158,7 @@ def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     printed_scene, fills = at_paper_density(scene), (0.1, 0.2, 0.3, 0.4, 0.5)
     disc, bare = printed_scene.disc, with_plate(printed_scene.disc, 0.0)
     ring = ring_of(printed_scene, fills)
-    computed = chamber_moment(printed_scene, density=DENSITY)
+    computed = chamber_moment(printed_scene, density=DENSITY_KG_M3)
     if defect == "plates_left_out":
         computed = computed.with_correction()
     # Eq. 7 takes the sine of half the central angle.
@@ -200,13 +200,13 @@ def _radius_by_eq_3(disc: Disc, fill: float = 0.5) -> float:
 
 
 def _eq_7(disc: Disc, radius: float) -> float:
-    return float(paper.moment_paper(disc=disc, density=DENSITY, surface_radius=radius))
+    return float(paper.moment_paper(disc=disc, density=DENSITY_KG_M3, surface_radius=radius))
 
 
 def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Moment of two adjacent full chambers, from one chamber's by finite elements."""
     printed_scene = at_paper_density(scene)
-    both = chamber_moment(printed_scene, density=DENSITY, factor=math.sqrt(2))
+    both = chamber_moment(printed_scene, density=DENSITY_KG_M3, factor=math.sqrt(2))
     if defect == "plates_left_out":
         both = both.with_correction()
     printed = float(paper.capacity(chamber_moment=CHAMBER_MOMENT.value))
@@ -236,8 +236,8 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
 
 def density(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The moment at one and at two grams per millilitre by finite elements."""
-    full, twice = (scene.disc.max_fill_ratio,), 2 * DENSITY
-    light, dense = (ring_of(scene, full, density=each) for each in (DENSITY, twice))
+    full, twice = (scene.disc.max_fill_ratio,), 2 * DENSITY_KG_M3
+    light, dense = (ring_of(scene, full, density=each) for each in (DENSITY_KG_M3, twice))
     capacity = chamber_moment(scene, density=twice, factor=math.sqrt(2))
     if defect == "plates_left_out":
         capacity = capacity.with_correction()
@@ -295,13 +295,13 @@ def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 def correction(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Eq. 22 with Eq. 21's mass, literally and per transferred mass, beside Eqs. 7 and 8."""
     full = scene.disc.max_fill_ratio
-    mass = float(paper.correction_mass(disc=scene.disc, density=DENSITY, fill_ratio=full))
+    mass = float(paper.correction_mass(disc=scene.disc, density=DENSITY_KG_M3, fill_ratio=full))
     arm = CHAMBER_MOMENT.value / mass if defect == "lambda_from_eq_7" else paper.PAPER_LAMBDA_M
     chamber, both = (
         abs(complex(paper.correction_moment(real_mass=mass, imaginary_mass=other, moment_per_mass=arm)))
         for other in (0.0, mass)
     )
-    exact = float(exact_moment(disc=scene.disc, density=DENSITY, fill_ratio=full))
+    exact = float(exact_moment(disc=scene.disc, density=DENSITY_KG_M3, fill_ratio=full))
     table = CaseTable(
         name="balancing ability by each route",
         columns={

@@ -42,7 +42,7 @@ _FIG_7_PHASES_DEG: Final = (45.0, 135.0)
 """Phases of the imbalance in Figs. 7 and 8."""
 _TARGET_ERROR_RAD: Final = math.radians(10.0)
 """Error of the masses' positions in Fig. 8."""
-_MAX_MASS_RATE: Final = 1.0
+_MAX_MASS_RATE_RAD_S: Final = 1.0
 """Largest rate of the masses against the rotor, rad/s."""
 
 
@@ -196,9 +196,11 @@ def bound(scene: EccentricScene, level: Level, defect: str | None = None) -> Evi
     """
     speed = scene.rotor.speed_profile[0].speed
     parameters = PlantParameters.of(scene)
-    turning = _motion_bound(parameters, speed=speed, rate=_MAX_MASS_RATE)
+    turning = _motion_bound(parameters, speed=speed, rate=_MAX_MASS_RATE_RAD_S)
     judged = (
-        _motion_bound(parameters, speed=0.0, rate=_MAX_MASS_RATE) if defect == "rotor_at_rest" else turning
+        _motion_bound(parameters, speed=0.0, rate=_MAX_MASS_RATE_RAD_S)
+        if defect == "rotor_at_rest"
+        else turning
     )
     runs = _balanced_at_constant_speed(scene, time_limit=30.0).runs.values()
     largest = max(run.worst_amplitude for run in runs)

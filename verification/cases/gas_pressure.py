@@ -24,7 +24,7 @@ from ringbalance.verification.evidence import (
 )
 from ringbalance.verification.finite_elements import found_of, ring_of
 from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.papers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
+from ringbalance.verification.papers import DENSITY_KG_M3, HIGHEST_PRESSURE, LOWEST_PRESSURE
 from ringbalance.verification.reference.chambers import exact_moment, wall_pressure_of
 
 _SCAN_POINTS: Final = 101
@@ -45,11 +45,11 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
 
     def priming(radius: float) -> float:
         """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
-        return DENSITY * omega**2 * (outer**2 - radius**2) / 2
+        return DENSITY_KG_M3 * omega**2 * (outer**2 - radius**2) / 2
 
-    stall = paper.stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=omega)
+    stall = paper.stall_pressure(disc=scene.disc, density=DENSITY_KG_M3, angular_velocity=omega)
     velocity_high = paper.velocity_from_pressures(
-        density=DENSITY,
+        density=DENSITY_KG_M3,
         drag_coefficient=paper.PAPER_DRAG_COEFFICIENT,
         pressure_difference=HIGHEST_PRESSURE.value,
     )
@@ -67,7 +67,7 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
             "by_priming": Found(value=priming(crest), reference=LOWEST_PRESSURE),
         },
         numbers={
-            "by_ring": wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY),
+            "by_ring": wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY_KG_M3),
             "scene_hump": crest,
             "velocity_high": velocity_high,
         },

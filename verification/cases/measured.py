@@ -51,9 +51,9 @@ _CELLS: Final = {
     "light": DuctMesh(across_axis=16, along_axis=10),
     "heavy": DuctMesh(across_axis=24, along_axis=16),
 }
-_WASHER: Final = 12.4e-6
+_WASHER_KG_M: Final = 12.4e-6
 """Unbalance of a washer, kg m."""
-_WASHER_UNCERTAINTY: Final = 0.5e-6
+_WASHER_UNCERTAINTY_KG_M: Final = 0.5e-6
 """Expanded uncertainty (95 %) of a washer's unbalance, kg m."""
 _TAUGHT_COUNTS: Final = (0, 1, 2)
 """Numbers of washers that gave the coefficient."""
@@ -226,7 +226,7 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     none, first, second = (a**2 for a in amplitudes[:3])
     square = (second - 2 * first + none) / 2
     cosine = (first - none - square) / (2 * math.sqrt(square * none))
-    kappa = MUTATIONS[defect] * (math.sqrt(square) / _WASHER)
+    kappa = MUTATIONS[defect] * (math.sqrt(square) / _WASHER_KG_M)
     calibrated = dataclasses.replace(
         scene.rotor,
         influence_coefficient=kappa,
@@ -234,14 +234,14 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         initial_amplitude=amplitudes[0],
         initial_phase=math.acos(cosine),
     )
-    unbalance = _WASHER * np.arange(5)
+    unbalance = _WASHER_KG_M * np.arange(5)
     predicted = np.abs(calibrated.vibration(unbalance))
-    standard_uncertainty = kappa * _WASHER_UNCERTAINTY / 2
+    standard_uncertainty = kappa * _WASHER_UNCERTAINTY_KG_M / 2
     quantities = {}
     for count in _PREDICTED_COUNTS:
         # The mean over all speeds; u_D of the scatter over these and of the washers on the disc.
         mean, scatter = amplitudes[count], float(np.std(readings[count], ddof=1))
-        washers = mean * _WASHER_UNCERTAINTY / (2 * _WASHER * math.sqrt(count))
+        washers = mean * _WASHER_UNCERTAINTY_KG_M / (2 * _WASHER_KG_M * math.sqrt(count))
         quantities[f"washers_{count}"] = Found(
             value=float(predicted[count]),
             # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.

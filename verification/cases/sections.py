@@ -64,7 +64,7 @@ from ringbalance.verification.navier_stokes.tube import (
 _SLOW_SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0
 _FAST_LIMIT: Final = 0.07863
-_SLOW: Final = 1.0
+_SLOW_ROTATION: Final = 1.0
 _SLOW_KL: Final = 20.0
 _ROTATIONS: Final = np.array([1e1, 1e2, 1e3, 1e4])
 _FACTORS: Final = {None: 1.0, "coriolis_off_by_a_percent": 1.01, "radius_for_bore": 0.25}
@@ -117,7 +117,7 @@ def rotating_section(scene: Scene, level: Level, defect: str | None = None) -> E
     around, factor = _SECTION_AROUND[level], _FACTORS[defect]
     system = SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0).system()
     rest = _without_inertia(system, 0.0)
-    slow = (_without_inertia(system, factor * _SLOW) - rest) / (_SLOW**2 / _SLOW_SERIES)
+    slow = (_without_inertia(system, factor * _SLOW_ROTATION) - rest) / (_SLOW_ROTATION**2 / _SLOW_SERIES)
     flow = solve_section(system=system, kl=factor * _SLOW_KL, s=0.0)
     inertia = (friction_ratio(flow) - rest) / (_SLOW_KL**2 / _INERTIA_SERIES)
     fast = np.array([_without_inertia(system, factor * rotation) for rotation in _ROTATIONS.tolist()])

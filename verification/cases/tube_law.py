@@ -50,7 +50,7 @@ _PRINTED_K: Final = Reference(
 """About 50."""
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 """In units of the scene's."""
-_NARROWEST: Final = 0.1
+_MIN_BORE_RATIO: Final = 0.1
 """Smallest bore searched for k = 50, in units of the scene's."""
 _WARM_K: Final = 333.15
 _OIL: Final = "silicone oil 100 cSt"
@@ -233,9 +233,9 @@ def _bore_for(scene: Scene, k: float) -> float:
     def excess(factor: float) -> float:
         return float(_with_bore(scene, factor).k.value[0]) - k
 
-    if excess(1.0) >= 0 or excess(_NARROWEST) <= 0:
+    if excess(1.0) >= 0 or excess(_MIN_BORE_RATIO) <= 0:
         return scene.tube.bore
-    return float(brentq(excess, _NARROWEST, 1.0, xtol=1e-6)) * scene.tube.bore
+    return float(brentq(excess, _MIN_BORE_RATIO, 1.0, xtol=1e-6)) * scene.tube.bore
 
 
 def _differences(scene: Scene, bare: Scene) -> CaseTable:

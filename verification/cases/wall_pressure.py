@@ -25,11 +25,11 @@ from ringbalance.verification.evidence import (
 from ringbalance.verification.finite_elements import found_of, mesh_table, ring_of
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.papers import (
-    DENSITY,
+    DENSITY_KG_M3,
     DEPARTURE_HIGH,
     DEPARTURE_LOW,
-    HIGH_PRESSURE,
-    LOW_PRESSURE,
+    HIGH_PRESSURE_PA,
+    LOW_PRESSURE_PA,
     RING_RADIUS,
     at_paper_density,
     rounded_radius,
@@ -46,7 +46,7 @@ _JUDGED: Final = {"thin": 0, "half": 2, "full": 5}
 """Judged fills, by their positions among these."""
 _SPEED_RATIOS: Final = (0.1, 0.2, 0.5, 1.0)
 """Speeds of the table over the scene's."""
-_PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
+_PRESSURES: Final = {"low": LOW_PRESSURE_PA, "high": HIGH_PRESSURE_PA}
 _PRINTED: Final = {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
 _CURVE_POINTS: Final = 41
 
@@ -184,10 +184,10 @@ def velocity_departure(scene: Scene, level: Level, defect: str | None = None) ->
     }
     share = np.linspace(0, 1, _CURVE_POINTS)
     fall = _relative_velocity(
-        printed_scene, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share
+        printed_scene, LOW_PRESSURE_PA, share[::-1] if defect == "chambers_exchanged" else share
     )
     stall = paper.stall_pressure(
-        disc=printed_scene.disc, density=DENSITY, angular_velocity=printed_scene.rotor.speed
+        disc=printed_scene.disc, density=DENSITY_KG_M3, angular_velocity=printed_scene.rotor.speed
     )
     law = flow_law_of(printed_scene)
     law_falls, figures = {}, []
@@ -232,7 +232,7 @@ def _departures(scene: Scene) -> dict[str, Found]:
 
 
 def _full_pressure(scene: Scene) -> float:
-    return float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY))
+    return float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY_KG_M3))
 
 
 def _eq_19(scene: Scene, pressure: float, radius: float | None = None) -> float:
@@ -241,7 +241,7 @@ def _eq_19(scene: Scene, pressure: float, radius: float | None = None) -> float:
     volume = None if radius is None else disc.axial_width * float(area(disc=disc, surface_radius=radius))
     fall = paper.departure(
         disc=disc,
-        density=DENSITY,
+        density=DENSITY_KG_M3,
         angular_velocity=scene.rotor.speed,
         gas_pressure=pressure,
         pair_volume=volume,
@@ -252,7 +252,7 @@ def _eq_19(scene: Scene, pressure: float, radius: float | None = None) -> float:
 def _relative_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:
     """u(x)/u(x_max) with the true wall pressure and one k."""
     fills = np.array([share, 1 - share]) * scene.disc.max_fill_ratio
-    driven, other = wall_pressure_of(scene, fills, density=DENSITY)
+    driven, other = wall_pressure_of(scene, fills, density=DENSITY_KG_M3)
     squared = pressure + driven - other
     return np.asarray(np.sqrt(squared / squared[-1]), dtype=np.float64)
 

@@ -24,12 +24,12 @@ from ringbalance.verification.reference.chambers import exact_wall_pressure
 
 ROUND_OFF: Final = 1e-12
 """Relative: what floating point may take from a conserved or monotone quantity."""
-WIDE: Final = 1.0
+WIDE_RATIO: Final = 1.0
 """Half-width over value from which on an answer is no more than an order of magnitude."""
 
-_MAX_PLAIN_VELOCITY: Final = 0.33 * 1480.0
+_MAX_PLAIN_VELOCITY_M_S: Final = 0.33 * 1480.0
 """A third of the speed of sound in water at 20 degC, m/s; beyond, no answer stands without a reservation."""
-_MAX_PLAIN_PRESSURE: Final = 0.05 * 2.2e9
+_MAX_PLAIN_PRESSURE_PA: Final = 0.05 * 2.2e9
 """A twentieth of the bulk modulus of water at 20 degC, Pa; likewise."""
 
 
@@ -107,7 +107,7 @@ def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float
     elif not chamber.status.ok:
         ending = Ending.STATUS
     else:
-        ending = Ending.WIDE if max(lever_width, k_width) > WIDE else Ending.SOLVED
+        ending = Ending.WIDE if max(lever_width, k_width) > WIDE_RATIO else Ending.SOLVED
     return asdict(
         PointJudgement(
             ending=ending,
@@ -176,10 +176,10 @@ def _absurd(calibration: Calibration) -> Iterator[str]:
     law, gas = calibration.flow_law, calibration.scene.gas.pressure
     fills = np.linspace(0.0, law.max_fill_ratio, 9)
     fastest = np.abs(law.evaluate(fill_ratio=fills, gas_pressure=gas, primed=True).velocity).max()
-    if fastest > _MAX_PLAIN_VELOCITY:
+    if fastest > _MAX_PLAIN_VELOCITY_M_S:
         yield f"{fastest:.3g} m/s in the tube without a reservation"
     highest = calibration.chamber.wall_pressure.value.max()
-    if highest > _MAX_PLAIN_PRESSURE:
+    if highest > _MAX_PLAIN_PRESSURE_PA:
         yield f"{highest / 1e6:.3g} MPa on the wall without a reservation"
 
 

@@ -33,7 +33,7 @@ from ringbalance.scene.faults import closest, did_you_mean
 from ringbalance.scene.kinds import Contradiction
 from ringbalance.scene.toml import toml_text
 
-_SAME: Final = 1e-7
+_SAME_NODE_SHARE: Final = 1e-7
 """Distance, as a share of the body, below which two nodes are meant to be one."""
 _ON: Final = 1e-6
 """Distance from a facet, as a share of its size, below which a node lies on it."""
@@ -121,7 +121,7 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
     """Nodes at one place that are not the same node: the body has a slit there."""
     nodes = np.unique(facets.nodes[facets.outer])
     points = body.points[nodes]
-    step = _SAME * (float(np.ptp(points, axis=0).max()) or 1.0)
+    step = _SAME_NODE_SHARE * (float(np.ptp(points, axis=0).max()) or 1.0)
     same = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
     twice = nodes[np.unique(np.concatenate(same))]
     allowed = "merged nodes (Gmsh: Coherence Mesh), so that cells meet"

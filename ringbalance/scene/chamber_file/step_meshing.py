@@ -17,7 +17,7 @@ from ringbalance.scene.chamber_file.record import KNOWN_NAMES
 from ringbalance.scene.platform.memory import bounded_memory
 
 _MEMORY_BYTES: Final = 4 * 2**30
-_SAME: Final = 1e-6
+_SAME_RADIUS_SHARE: Final = 1e-6
 _Entity = tuple[int, int]
 
 
@@ -62,7 +62,7 @@ def _placed(faces: list[_Entity]) -> Iterator[tuple[_Entity, str]]:
         nodes[face] = [(math.hypot(x, y), z) for x, y, z in rows]
     radii = [radius for each in nodes.values() for radius, _ in each]
     heights = [height for each in nodes.values() for _, height in each]
-    near = _SAME * max(radii)
+    near = _SAME_RADIUS_SHARE * max(radii)
     for face, each in nodes.items():
         for name, axis, value in (
             ("outer_wall", 0, max(radii)),

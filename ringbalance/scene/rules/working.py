@@ -37,7 +37,7 @@ _LARGEST_EXPONENT: Final = 0.25
 """n of a gas column."""
 LARGEST_COMPRESSION: Final = 0.02
 """p/K."""
-METAL_DENSITY: Final = 3000.0
+METAL_DENSITY_KG_M3: Final = 3000.0
 """kg/m^3; what is denser is taken for a liquid metal."""
 _WATER, _METAL, _OTHER = 2.0e9, 25e9, 0.8e9
 _ROUNDED: Final = 1 - 5e-4
@@ -51,7 +51,7 @@ def bulk_modulus(liquid: Liquid) -> float:
         387 (IAPWS-95); mercury 25 GPa, gallium more; silicone and perfluorinated oils, the softest that are
         in use, 0.8 to 1 GPa by their speeds of sound, recalled and not read.
     """
-    if liquid.density > METAL_DENSITY:
+    if liquid.density > METAL_DENSITY_KG_M3:
         return _METAL
     return _WATER if liquid.name.casefold() == "water" else _OTHER
 

@@ -13,13 +13,19 @@ from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.physics.pressure import ring as ring_module
 from ringbalance.physics.pressure.loads import liquid_integrals
-from ringbalance.physics.pressure.ring import ring_quantities
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
 RHO, G = 1000.0, 9.80665
+
+
+def ring_of(disc: Disc, omega: float, fills: list[float], **more: Any) -> RingQuantities:
+    return ring_quantities(
+        disc=disc, density=RHO, angular_velocity=omega, fill_ratio=fills, **{"gravity": G, **more}
+    )
 
 
 def without_gravity(disc: Disc, fill: float, omega: float) -> dict[str, float]:
@@ -34,9 +40,7 @@ def without_gravity(disc: Disc, fill: float, omega: float) -> dict[str, float]:
 def test_the_mean_force_over_a_turn_is_centrifugal(disc: Disc, gravity: float) -> None:
     """Walls push the liquid round its circle: sum of p n = omega^2 U."""
     omega = 90.0
-    ring = ring_quantities(
-        disc=disc, density=RHO, angular_velocity=omega, fill_ratio=[0.2, 0.5], gravity=gravity
-    )
+    ring = ring_of(disc, omega, [0.2, 0.5], gravity=gravity)
     assert ring.status.ok
     np.testing.assert_allclose(ring.resultant_force.value, omega**2 * ring.moment.value, rtol=1e-7)
 
@@ -57,11 +61,8 @@ def test_the_walls_of_a_chamber_balance_without_gravity(disc: Disc, fill: float)
 
 def test_gravity_is_of_second_order_in_the_means_and_first_in_the_ripple(disc: Disc) -> None:
     """Halving g quarters the change of the mean and halves the ripple."""
-    omega, fill = 120.0, [0.3]
-    rings = [
-        ring_quantities(disc=disc, density=RHO, angular_velocity=omega, fill_ratio=fill, gravity=g)
-        for g in (0.0, G / 2, G)
-    ]
+    omega = 120.0
+    rings = [ring_of(disc, omega, [0.3], gravity=g) for g in (0.0, G / 2, G)]
     for name in ("wall_pressure", "moment"):
         means = [float(getattr(ring, name).value[0]) for ring in rings]
         # The surface itself is drawn differently once it is searched, so half and whole are compared.
@@ -123,13 +124,7 @@ def tilted(disc: Disc, fill: float, omega: float, angle: float) -> tuple[float, 
 
 def test_means_over_a_turn_are_those_of_the_exact_isobars(disc: Disc) -> None:
     omega, count = 90.0, 24
-    ring = ring_quantities(
-        disc=disc,
-        density=RHO,
-        angular_velocity=omega,
-        fill_ratio=[0.3],
-        gravity=G,
-    )
+    ring = ring_of(disc, omega, [0.3])
     exact = np.mean(
         [tilted(disc, 0.3, omega, angle) for angle in 2 * np.pi * np.arange(count) / count], axis=0
     )
@@ -139,50 +134,26 @@ def test_means_over_a_turn_are_those_of_the_exact_isobars(disc: Disc) -> None:
 
 
 def test_enough_angles_are_taken_for_the_mean(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
-    arguments: dict[str, Any] = {
-        "disc": disc,
-        "density": RHO,
-        "angular_velocity": 80.0,
-        "fill_ratio": [0.3],
-        "gravity": G,
-        "cells": [(4, 12), (2, 6), (1, 3)],
-    }
-    chosen = ring_quantities(**arguments)
+    cells = [(4, 12), (2, 6), (1, 3)]
+    chosen = ring_of(disc, 80.0, [0.3], cells=cells)
     monkeypatch.setattr(ring_module, "_angles", lambda *_: np.linspace(0, np.pi, 13))
-    many = ring_quantities(**arguments)
+    many = ring_of(disc, 80.0, [0.3], cells=cells)
     for name in ("wall_pressure", "moment", "moment_per_volume"):
         value = getattr(many, name).value
         np.testing.assert_allclose(getattr(chosen, name).value, value, rtol=1e-8)
 
 
 def test_a_vertical_shaft_gets_three_dimensions(disc: Disc) -> None:
-    ring = ring_quantities(
-        disc=disc,
-        density=RHO,
-        angular_velocity=100.0,
-        fill_ratio=[0.3],
-        gravity=G,
-        shaft="vertical",
-        cells=[(4, 12, 4), (2, 6, 2), (1, 3, 1)],
-    )
+    cells = [(4, 12, 4), (2, 6, 2), (1, 3, 1)]
+    ring = ring_of(disc, 100.0, [0.3], shaft="vertical", cells=cells)
     assert ring.status.ok
     np.testing.assert_allclose(ring.resultant_force.value, 100.0**2 * ring.moment.value, rtol=1e-5)
     with pytest.raises(ValueError, match="dimension 3"):
-        ring_quantities(
-            disc=disc,
-            density=RHO,
-            angular_velocity=100.0,
-            fill_ratio=[0.3],
-            gravity=G,
-            shaft="vertical",
-            dimension=2,
-        )
+        ring_of(disc, 100.0, [0.3], shaft="vertical", dimension=2)
 
 
 def test_a_broken_ring_is_said_and_has_no_values(disc: Disc) -> None:
-    ring = ring_quantities(
-        disc=disc, density=RHO, angular_velocity=40.0, fill_ratio=[0.0, 0.02, 0.5], gravity=G
-    )
+    ring = ring_of(disc, 40.0, [0.0, 0.02, 0.5])
     assert ring.status.code is StatusCode.NO_RING
     assert "0.02" in ring.status.text
     np.testing.assert_array_equal(ring.solved, [True, False, True])

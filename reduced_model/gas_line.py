@@ -61,7 +61,7 @@ class LineAnswer:
 def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
     """The scene's gas line, or the slow and the fast end of the default range of what it does not give."""
     gas = scene.gas
-    ends = (("slow", 0), ("fast", 1))
+    ends: tuple[tuple[str, int], ...] = (("slow", 0), ("fast", 1))
     if gas.conductance is not None and gas.valve_lag is not None:
         ends = (("given", 0),)
     return tuple(

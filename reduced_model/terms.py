@@ -144,7 +144,7 @@ def _tube_terms(scene: Scene) -> Iterator[Term]:
     else:
         driven = flow.siphon > 0
         lost = np.maximum(1 - flow.separated[driven] / flow.siphon[driven], 0.0)
-        value = 1.0 if np.any(driven & ~flow.primes) else float(np.max(lost, initial=0.0))
+        value: float | None = 1.0 if np.any(driven & ~flow.primes) else float(np.max(lost, initial=0.0))
         text = "1 - u_separated/u_siphon, or 1 where the column to the siphon crest outweighs the gas"
         moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
         gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"

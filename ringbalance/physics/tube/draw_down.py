@@ -61,7 +61,7 @@ def _draw_down_depth(
     rate = np.asarray(flow_rate, dtype=np.float64)
     sink = np.asarray(_POINT_SINK_FACTOR * (rate**2 / acceleration) ** 0.2)
     rim = np.asarray(1.5 * (rate / (math.pi * bore * np.sqrt(acceleration))) ** (2 / 3))
-    h = np.minimum(sink, rim)
+    h: FloatArray = np.asarray(np.minimum(sink, rim))
     if np.all(np.asarray(kinematic_viscosity) == 0):
         return h
     way = np.maximum(np.log(feed_radius / np.maximum(h, bore / 2)) - _MEAN_OF_LAYER, 0.0)

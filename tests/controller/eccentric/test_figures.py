@@ -1,4 +1,4 @@
-"""The data behind the paper's figures and the extremes: what is claimed, what is result, what bounds it."""
+"""The data behind the paper's figures and the extremes: what is claimed, what results, what bounds it."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ from ringbalance.verification.cases.driven_balancing import (
     _balanced_at_constant_speed,
     _estimate_imbalance,
     _figure_four,
+    _friction_runs,
     _imbalance_record,
     _motion_bound,
     _off_target,
+    friction_time,
     run_up,
 )
 from ringbalance.verification.cases.driven_positioning import _efforts, _printed_compensation, growth
@@ -40,6 +42,12 @@ def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> No
     assert np.min(within) > 1000
 
 
+def test_figure_five_finds_both_friction_arms(paper: EccentricScene) -> None:
+    for arm, run in _friction_runs(paper).items():
+        assert run.history["friction_arm"][-1] == pytest.approx((arm, arm), rel=0.02)
+        assert friction_time(run, arm) < 1.0
+
+
 def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricScene) -> None:
     efforts = _efforts(paper, step=5e-4)
     np.testing.assert_allclose(growth(efforts["exact"]), 1.0, rtol=1e-3)
@@ -48,6 +56,14 @@ def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricSce
     # q/r and mass ratio as the paper has them: a larger ratio costs more.
     assert np.all(np.diff(efforts["exact"], axis=1) > 0)
     assert np.all(efforts["short"][0, :, -1] > efforts["short"][1, :, -1])
+
+
+def test_figure_seven_balances_both_imbalances(paper: EccentricScene) -> None:
+    result = _balanced_at_constant_speed(paper, time_limit=20.0)
+    expected = abs(PlantParameters.of(paper).steady_whirl(100 * RPM, (0.0, math.pi)))
+    assert result.before == pytest.approx((expected, expected))
+    assert max(result.after) < 2e-3 * expected
+    assert all(run.settled for run in result.runs.values())
 
 
 def test_figure_eight_is_mended_by_fine_tuning(paper: EccentricScene) -> None:

@@ -87,7 +87,8 @@ class HumpProfile:
     ) -> HumpProfile:
         """Follow the pressure along the path at one operating state.
 
-        p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there and alpha
+        p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there plus
+        alpha, the kinetic-energy factor of the velocity profile.
 
         Where the column is separated the cavity reaches from the crest to the column that the opposite
         chamber supports; the momentum of what falls onto it is left out.
@@ -95,8 +96,8 @@ class HumpProfile:
             fill_ratio: x of the driven chamber.
             opposite_fill_ratio: default max_fill_ratio - fill_ratio.
             gas_pressure: gauge, Pa, in the driven chamber; default the scene's.
-            primed: whether the tube holds a continuous column beforehand.
-            points: number of even places along the path; more stand where something changes.
+            primed: True if the tube holds a continuous column beforehand.
+            points: number of evenly spaced points of the path; more where something changes.
         Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
             points.
         Range: legs as in `path`; the scene does not give where the bends lie: evenly over both legs.

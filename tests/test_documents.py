@@ -166,7 +166,7 @@ def few_devices() -> Iterator[None]:
         patch.setattr(search_module, "_HEATS", ((0, 4),))
         patch.setattr(search_module, "_ROUNDS", 1)
         patch.setattr(search_module, "DEVICES", 4)
-        patch.setattr(search_module, "_CURVE", (Draws.block(64, 2), Draws.block(66, 2)))
+        patch.setattr(search_module, "_SCAN_DRAWS", (Draws.block(64, 2), Draws.block(66, 2)))
         yield
 
 

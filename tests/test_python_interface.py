@@ -65,7 +65,7 @@ def test_what_tune_recommends_is_a_scene_that_runs() -> None:
 def test_a_search_over_the_pressure_is_an_option(monkeypatch: pytest.MonkeyPatch, pressure: bool) -> None:
     monkeypatch.setattr(face, "tuned", lambda _, **options: options)
     options: Any = rb.tune(short(), flow_law=rb.paper_law(short()), pressure=pressure)
-    assert options["along"] is pressure
+    assert options["scan"] is pressure
 
 
 class Wrapped:

@@ -144,7 +144,7 @@ def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, sc
     moment = calibrated.moment.pair_moment(fill_ratio=0.25 - moved, opposite_fill_ratio=0.25 + moved)
     change = abs(float(moment)) * scene.rotor.influence_coefficient
     assert given.smallest_correction == pytest.approx(change, rel=2e-2)
-    weak = with_tables(scene, gas={"pressure": 0.05e6})
+    weak = with_tables(replace(scene, gas=gas), gas={"pressure": 0.05e6})
     (none,) = line_answers(weak, calibrated)
     assert none.smallest_correction is None
     assert "starts no flow" in line_text((none,))

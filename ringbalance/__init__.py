@@ -1,8 +1,8 @@
 """ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?
 
 Begin with `load_scene`, `calibrate` and `simulate`; then `tune`, `fit`, `compare`, `sweep`, `find_design`,
-`trade`, `extremes`, `plot` and `write_report`. `help(ringbalance.calibrate)` has what it takes and gives, and
-an example. The names are loaded when they are first used, so that `import ringbalance` costs nothing.
+`trade`, `extremes`, `plot` and `write_report`. `help(ringbalance.calibrate)` shows its arguments, its result
+and an example. The names are loaded when they are first used, so that `import ringbalance` costs nothing.
 docs/python.md shows them at work.
 """
 
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-# The balancers, each one line; a third is one more.
+# One entry for each kind of balancer.
 register(
     "liquid_ring",
     scene="ringbalance.scene.rules.liquid_ring:KIND",

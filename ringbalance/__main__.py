@@ -1,4 +1,4 @@
-"""`python -m ringbalance`, and the command `ringbalance`: an interrupt ends both in silence from here on."""
+"""Entry point of `python -m ringbalance` and the command `ringbalance`; an interrupt gives no traceback."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 try:
     from ringbalance.cli import main
 except KeyboardInterrupt:
-    # As `ringbalance.cli.INTERRUPTED`, which is not there yet.
+    # The value of `ringbalance.cli.INTERRUPTED`, which is not imported yet.
     sys.exit(130)
 
 # Worker processes import this module again under another name.

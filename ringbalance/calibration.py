@@ -1,4 +1,4 @@
-"""Calibration and the paper's law for Python; they load none of the closed loop."""
+"""Calibration and the paper's law for Python, without loading the closed loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line: the parser of the commands, and what the exit codes mean.
+"""The command line: parser of the commands, and exit codes.
 
 A command's module is imported only when the command runs, so that `--help` loads nothing from numpy down.
 Results go to standard output, everything else to standard error.
@@ -59,7 +59,7 @@ THREAD_COUNTS = (
 
 
 def _converted(hint: Any, tokens: Sequence[Token]) -> Any:
-    """Convert as cyclopts does, but round no number to a whole one, and take no folder's name for a file."""
+    """Convert as cyclopts does, but refuse a decimal for an integer and a file's path ending in a slash."""
     kinds = {hint, *get_args(hint)}
     for text in (token.value for token in tokens):
         if int in kinds and "." in text:
@@ -183,7 +183,7 @@ def _run_guarded(arguments: Sequence[str] | None) -> int:
         raise
     except CycloptsError as error:
         _say(f"ringbalance: {_usage_fault(error)}")
-    # Looked up only when something was raised: the room of scenes is not loaded for `--help`.
+    # Looked up only when something was raised: `--help` loads no module of scenes.
     except ringbalance.SceneError as error:
         _say(str(error))
     except OSError as error:
@@ -192,7 +192,7 @@ def _run_guarded(arguments: Sequence[str] | None) -> int:
         elif error.errno is None:
             text = str(error)
         else:
-            # The machine refused something that no file name stands for, such as a process or a full disk.
+            # An error of the system without a file name: no further process, or a full disk.
             frame = traceback.extract_tb(error.__traceback__)[-1]
             text = f"{error.strerror} (in {frame.name}, {frame.filename}, line {frame.lineno})"
         _say(f"ringbalance: {text}")
@@ -212,13 +212,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is imported, and whatever the user set: one thread gives the same sums on every machine.
     os.environ.update(dict.fromkeys(THREAD_COUNTS, "1"))
     drop_unusable_size(os.environ)
-    # An interpreter that ends looks for garbage in all that it holds, which its process gives back anyway.
+    # At its end an interpreter collects garbage among all objects, whose memory the process frees anyway.
     atexit.register(gc.freeze)
     if refusal := prepare_streams() or interpreter_error():
         _say(f"ringbalance: {refusal}")
         return BAD_INPUT
     try:
-        # Modules, and what compiles them, make many objects and little garbage: looking for it took a tenth.
+        # Loading and compiling modules makes many objects and little garbage: its collection took a tenth.
         with interrupts(), seldom_collected():
             return _run_guarded(arguments)
     except KeyboardInterrupt:

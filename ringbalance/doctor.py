@@ -26,7 +26,7 @@ _WORDS: Final = {"ok": "ok", "absent": "not there", "broken": "to mend"}
 
 
 class MachineCheck(NamedTuple):
-    """One thing that the program needs, or is better with."""
+    """One thing that the program needs or can make use of."""
 
     name: str
     state: State

@@ -125,7 +125,7 @@ def simulate_file(options: SimpleNamespace) -> int:
         document = run.to_dict() if options.json else {}
         sheet = ""
         if options.plot is not None:
-            # Loading what draws takes as long as a short run.
+            # Loading the modules that draw takes as long as a short run.
             sheet = registered("function", "sheet")(registered("function", "figures_of")(scene, run))
     if options.csv is not None:
         write_whole(options.csv, csv_text(balancer.history(run)))

@@ -1,4 +1,4 @@
-"""Runs a command: checks its options, reads its scene, shows its progress and prints its result."""
+"""Run a command: check its options, read its scene, show its progress and print its result."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def run_command(name: str, /, **settings: Any) -> int:
         options["workers"] = os.cpu_count() or 1
     if "law" in options and "scene" in options:
         options["flow_law"] = law_for(options["scene"], options["law"])
-    # The scene was read just now: its tolerance alone may differ from the file's.
+    # No second check: the scene was read just now, and only its tolerance may differ from the file's.
     work = getattr(target, "__wrapped__", target)
     with activity(name, command.begin) as shown:
         options["progress"] = shown.show
@@ -57,7 +57,7 @@ def run_command(name: str, /, **settings: Any) -> int:
     if save and law:
         law.save(save)
     elif save and getattr(result, "judgement", result):
-        # Not of a search that could judge no design.
+        # A search that could judge no design has nothing to save.
         write_whole(save, file_text(result.recommended_scene, to=save.parent))
     print_result(result, json=options["json"], headline=command.headline)
     if save and law:

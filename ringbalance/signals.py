@@ -28,8 +28,8 @@ class _Interrupt:
     Python drops an exception that is raised in a finaliser or in a weak reference's callback, and with it an
     interrupt that happens to arrive there; `unraisable` is called instead, and sends the signal again.
     A module that is being loaded may catch whatever is raised, and a process that is being started complains
-    when its parent falls silent: there the signal waits until that is done. To block it would not do, since
-    another thread may take it, and Python raises in the main one all the same.
+    when its parent falls silent: in both cases the signal is sent again later. Blocking it does not help:
+    another thread may take it, and Python raises in the main thread all the same.
     """
 
     def __init__(self) -> None:
@@ -65,7 +65,7 @@ class _Interrupt:
 
 @contextmanager
 def interrupts() -> Iterator[None]:
-    """While this lasts, SIGTERM raises KeyboardInterrupt as SIGINT does, and none is lost.
+    """Let SIGTERM raise KeyboardInterrupt as SIGINT does, and lose neither, within a `with` block.
 
     A signal that is ignored stays so, as SIGINT is in a shell's background job; outside the main thread,
     where Python takes no handlers, nothing changes.

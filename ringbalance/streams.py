@@ -147,7 +147,7 @@ class _NamedFile(io.FileIO):
     def write(self, data: Buffer) -> int:
         """Write bytes.
 
-        Returns: How many were written.
+        Returns: Number of bytes written.
         Raises: OSError: the stream cannot be written; its `filename` is the stream's title.
         """
         try:
@@ -158,7 +158,7 @@ class _NamedFile(io.FileIO):
 
 
 def prepare_streams() -> str:
-    """Make standard output and error safe to write to, whatever the shell made of them.
+    """Make standard output and error safe to write to, even if the shell closed them.
 
     Returns: Reason why results cannot be written; empty: they can.
     """
@@ -185,8 +185,8 @@ def interpreter_error() -> str:
 def drop_unusable_size(environment: MutableMapping[str, str]) -> None:
     """Remove a terminal size that no table fits into: the actual size, or 80 columns, is then used.
 
-    Args: `environment`: of the process; COLUMNS below 20 and LINES below 1 are removed, and what is no
-        number.
+    Args: `environment`: variables of the process; COLUMNS below 20, LINES below 1 and values that are no
+        numbers are removed.
     """
     for name, least in (("COLUMNS", _MIN_COLUMNS), ("LINES", 1)):
         value = environment.get(name, "")

@@ -1,4 +1,4 @@
-"""Scene files: from TOML with units to frozen, validated, SI-only records, or every error at once.
+"""Scene files: TOML with units read into frozen, validated, SI-only records, or all errors reported together.
 
 The names below are loaded when they are first used, so that registering a kind of balancer loads no reader.
 """

@@ -1,4 +1,4 @@
-"""Arrays and numbers as every room has them: types, and what numpy lacks."""
+"""Types of arrays for all packages, and helpers that numpy lacks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:
 
 
 def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
-    """Stretches of equal values, each reaching to the first of the next so that a line has no gap."""
+    """Value and slice of each block of equal values; a slice includes the next block's first value, so that a
+    drawn line has no gap."""
     parts, start = [], 0
     for value, members in groupby(values):
         stop = start + len(list(members))
@@ -37,11 +38,11 @@ def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
 
 
 def plain(values: npt.ArrayLike) -> Any:
-    """A float for a single number, else the array: of one scene or of many whose numbers are arrays."""
+    """Float of a single number (one scene), else an array (many designs)."""
     array = np.asarray(values, dtype=np.float64)
     return float(array) if array.ndim == 0 else array
 
 
 def finite(value: float | None) -> float | None:
-    """A number as JSON can hold it: None for one that is not finite."""
+    """A finite number, else None: JSON has no infinity and no NaN."""
     return value if value is not None and math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""A scene with other values: its document changed, and read again with every check that a file passes.
+"""Changed scenes: the document gets other values and is read again with all checks of a file.
 
 A record that was changed in any other way still has the hash, the origins and the derived defaults of its
 file, and nothing has checked it: `checked_scene` refuses it.
@@ -28,16 +28,16 @@ from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.scene.units import DIMENSIONS, plain_number, written_like
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")
-"""Paths on which a mesh, or the meshing of a solid, depends."""
+"""Paths on which reading a mesh, or meshing a solid, depends."""
 _OF_CHECKS: Final = (*_OF_MESH, "tube.port_radius", "gas.inlet_radius")
-"""Paths with which a mesh is compared as it is read."""
+"""Paths whose values a mesh is checked against when it is read."""
 
 
 def with_values(scene: SceneFile, values: Mapping[str, object], *, origin: Origin = "given") -> AnyScene:
     """The scene whose document has other values.
 
-    Args: `values`: by path, see `SceneFile.with_values`. `origin`: of all of them.
-    Raises: SceneError: everything that is wrong with the result, or a scene that `checked_scene` refuses.
+    Args: `values`: by path, see `SceneFile.with_values`. `origin`: of all these values.
+    Raises: SceneError: all errors of the result, or a scene that `checked_scene` refuses.
     """
     return _changed(scene, _known(checked_scene(scene)), values, origin)
 
@@ -63,7 +63,7 @@ def _changed(
 def nameless(scene: Kind, values: Mapping[str, object]) -> tuple[Kind, str]:
     """The scene of `with_values` without names, hashes and origins, and the SHA-256 that it would have.
 
-    For thousands of designs: what did not change is neither read nor made again.
+    For thousands of designs: unchanged tables are neither read nor built again.
     Args: `scene`: one that `checked_scene` passes. `values`: see `SceneFile.with_values`.
     Raises: SceneError: as `with_values`.
     """
@@ -82,7 +82,7 @@ def _digest(document: Mapping[str, Any], checked: CheckedValues) -> str:
 def _changed_document(
     scene: SceneFile, checked: CheckedValues, values: Mapping[str, object], origin: Origin
 ) -> dict[str, Any]:
-    """The document with other values; what none of them concerns are the same objects."""
+    """The document with other values; unchanged tables stay the same objects."""
     schema, document = scene_kind(scene.balancer).schema, dict(checked.document)
     for path, value in values.items():
         if not isinstance(path, str):
@@ -92,7 +92,7 @@ def _changed_document(
 
 
 def _with_same_mesh(scene: SceneFile, changed: AnyScene, values: Mapping[str, object]) -> AnyScene:
-    """The changed scene. Raises: SceneError: the file of its mesh is another one than it was."""
+    """The changed scene. Raises: SceneError: the mesh file has changed since the scene was read."""
     if not _concerned(_OF_MESH, values) and changed.mesh_digest != scene.mesh_digest:
         fault = Fault(
             file=scene.file,
@@ -111,7 +111,7 @@ def _concerned(concern: Iterable[str], values: Iterable[str]) -> bool:
 
 
 def rechecked(scene: AnyScene) -> AnyScene:
-    """A scene that a calculation has changed, such as a tuned one, as `with_values` would have made it.
+    """A scene changed by a calculation, such as tuning, read again and checked as by `with_values`.
 
     The changed values have the origin "inferred".
     Raises: SceneError: a changed value that no scene file could have.
@@ -123,7 +123,7 @@ def rechecked(scene: AnyScene) -> AnyScene:
 def checked_scene(scene: SceneFile) -> AnyScene:
     """Refuse a scene whose values are not those that were checked as it was read or changed.
 
-    Raises: SceneError: a record that was made or changed in another way, with each value that differs.
+    Raises: SceneError: a record made or changed in another way; one error for each value that differs.
     Raises: TypeError: no scene.
     """
     if not isinstance(scene, SceneFile):
@@ -144,14 +144,14 @@ def checked_scene(scene: SceneFile) -> AnyScene:
 
 
 def document_of(scene: SceneFile) -> Mapping[str, Any]:
-    """The scene's document, as TOML has it. Raises: SceneError: a scene that was not read."""
+    """The scene's document, parsed from TOML. Raises: SceneError: a scene that was not read from a file."""
     return _known(scene).document
 
 
 def file_text(scene: SceneFile, *, to: Path) -> bytes:
-    """The scene as a file in a folder, from which its mesh, if it names one, is found.
+    """Bytes of a scene file for a folder; the path of a mesh becomes relative to that folder.
 
-    Raises: SceneError: a scene that was not read.
+    Raises: SceneError: a scene that was not read from a file.
     """
     checked = _known(scene)
     document = deepcopy(dict(checked.document))
@@ -161,7 +161,7 @@ def file_text(scene: SceneFile, *, to: Path) -> bytes:
 
 
 def _known(scene: SceneFile) -> CheckedValues:
-    """Raises: SceneError: a record that was not read."""
+    """Checked values of a scene. Raises: SceneError: a record that was not read from a file."""
     if scene.checked is None:
         allowed = "ringbalance.load_scene(path), and with_values to change what it gives"
         raise SceneError.of_file(scene.file, "this scene was made without the checks of a file", allowed)
@@ -169,7 +169,7 @@ def _known(scene: SceneFile) -> CheckedValues:
 
 
 def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
-    """Path and value of each key whose value is not the one that was checked."""
+    """Path and value of each key that differs from its checked value."""
     for name, before in _known(scene).parts.items():
         now = getattr(scene, name)
         if now is before:
@@ -177,7 +177,7 @@ def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
         if is_dataclass(now) and type(now) is type(before):
             for field in fields(now):
                 path, value = f"{name}.{field.name}", getattr(now, field.name)
-                # Two meshes are equal when they name the same file, whatever their nodes are.
+                # Meshes of one file name compare equal, whatever their nodes: only identity counts.
                 comparable = not isinstance(value, ChamberGeometry)
                 checked = getattr(before, field.name)
                 if value is not checked and not (comparable and value == checked):
@@ -187,9 +187,9 @@ def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
 
 
 def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema, origin: Origin) -> None:
-    """Put a value into a document, or take it away for None; reading refuses what no key takes.
+    """Put a value into a document, or remove it for None; values that no key takes are refused on reading.
 
-    Tables on the way to it are copied, since other documents may have them too.
+    Tables on the path are copied, since other documents may share them.
     """
     *steps, name = path.split(".")
     content, keys = document, schema.top
@@ -212,14 +212,14 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
         try:
             value, deviation = plain_number(value, DIMENSIONS[dimension].si_unit if dimension else "")
         except ValueError:
-            # A quantity that no key takes stands there as text, for the error of reading it.
+            # A quantity that no key takes is kept as text, so that reading reports the error.
             value, deviation = str(value), 0.0
         content[name] = _written(value, takes, like=content.get(name, _as_usual(keys.get(name))))
         if deviation:
             width = _written(NORMAL_95 * deviation, takes)
             _place(document, f"uncertainty.{name}", width, schema=schema, origin=origin)
     if steps and ORIGIN not in (name, *steps[1:]):
-        # The origin of the changed value in place of that of the value before.
+        # The origin of the changed value replaces that of the previous value.
         table, key = document[steps[0]], (*steps[1:], name)[0]
         before = table.pop(ORIGIN, {})
         stated = (
@@ -230,21 +230,21 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
         if value is not None and origin != "given":
             stated[key] = origin
         if stated:
-            # The same object, where nothing was said of the value, need not be read again.
+            # An unchanged table of origins stays the same object and is not read again.
             table[ORIGIN] = before if stated == before else stated
 
 
 def _as_usual(key: Key | None) -> str | None:
-    """A quantity in the unit in which a person writes it."""
+    """One unit of a key as text, such as "1 mm"; None without a usual unit."""
     return f"1 {key.usual_unit}" if key is not None and key.usual_unit else None
 
 
 def _written(
     value: Any, takes: ValueReader | Entries | Mapping[str, Key] | None, *, like: object = None
 ) -> Any:
-    """A value as a scene file would have it: a number for a quantity with a unit is one in SI.
+    """A value as a scene file states it; a plain number for a quantity with a unit is in SI.
 
-    Args: `like`: what stands there now, or would usually; its unit is kept.
+    Args: `like`: present or usual text of the quantity, whose unit is kept.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):

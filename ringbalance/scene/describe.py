@@ -44,11 +44,11 @@ class _SceneLine:
     path: str
     shown: Shown
     dimension: str
-    """Empty without unit."""
+    """Kind of quantity, such as "length"; empty without unit."""
 
 
 _EXACT_DIGITS = 15
-"""Digits of a number whose last place does not matter."""
+"""Significant digits of a value converted to its usual unit."""
 _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Disc": ("disc",),
@@ -61,7 +61,7 @@ _GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "Run": ("run", "tolerance"),
     }
 )
-"""Tables, and single paths, of which the groups consist."""
+"""Tables and single paths of each group."""
 
 
 def _described_lines() -> Iterator[_SceneLine]:
@@ -118,7 +118,7 @@ def scene_table(scene: Scene) -> tuple[Row, ...]:
 
 
 def _line_at(path: str) -> _SceneLine:
-    """Description of a value of any kind of scene; by its path where its declaration has no name for it."""
+    """Description of a value of any kind of scene; named by its path where its declaration gives no name."""
     if path in _LINES:
         return _LINES[path]
     table, _, key = path.split("[")[0].partition(".")
@@ -156,7 +156,7 @@ def in_usual_unit(path: str, value: float) -> float:
 
 
 def setting_text(path: str, value: object) -> str:
-    """A value of a scene, SI, as a reader knows it."""
+    """Text of a scene value, given in SI, with its usual unit."""
     if value is None:
         return "none"
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -165,7 +165,7 @@ def setting_text(path: str, value: object) -> str:
         line = _line_at(path)
         if line.dimension:
             return format_quantity(value, line.dimension, _suited_unit(line, value), digits=4)
-        # Whole numbers count something, or are a seed: every digit counts.
+        # Integers are counts or seeds: all digits matter.
         number = value if isinstance(value, int) else format(value, ".4g")
         return f"{number} {line.shown.unit}".rstrip()
     return str(value)
@@ -179,14 +179,14 @@ def _suited_unit(line: _SceneLine, *values: float) -> str:
 
 
 def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault:
-    """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
+    """Error in a value of a loaded scene, detected after reading; to be raised in a `SceneError`."""
     table, key = path.split(".")
     written = toml_text(_written(_line_at(path), _value(scene, path)))
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)
 
 
 def scene_lines(scene: AnyScene) -> Iterator[str]:
-    """Main values of a scene with their keys, for its text in a terminal."""
+    """Main values of a scene with their paths, as lines of text."""
     for paths in scene_kind(scene.balancer).main:
         yield ", ".join(f"{path} {setting_text(path, _value(scene, path))}" for path in paths)
 

@@ -1,4 +1,4 @@
-"""Keys of the table [design] of a liquid ring: limits of what a design may be."""
+"""Keys of the table [design] of a liquid ring: limits of a design."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -29,7 +29,7 @@ class _ValveAtHand:
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """Ranges from which `ringbalance design` chooses; `tune` reads the pressure alone."""
+    """Ranges from which `ringbalance design` chooses; `tune` reads only the pressure."""
 
     outer_radius: Annotated[
         PositiveLength | None,

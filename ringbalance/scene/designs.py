@@ -1,7 +1,8 @@
 """Many designs of one kind at once: a scene whose numbers are arrays, and both sides of every input.
 
-Leaves of geometry, tube and regime take a scene's records and broadcast, so such a scene goes through them as
-one with plain numbers does; arrays that run along something else, as the fill does, have the designs last.
+Functions of geometry, tube and regime broadcast over a scene's records, so that a scene of arrays passes
+through them as one of plain numbers does; arrays with further axes, such as the fill, have the designs on the
+last axis.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ _NUMBERS = (float, np.ndarray)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Designs:
-    """Designs that differ in numbers alone: shapes, kinds and which terms there are, are common to all."""
+    """Designs that differ only in numbers: shapes, kinds and modelled terms are common to all."""
 
     scene: Scene
-    """Numbers that differ are arrays of shape (n,)."""
+    """Common scene; numbers that differ are arrays of shape (n,)."""
     size: int
-    """n."""
+    """Number of designs, n."""
 
     @classmethod
     def of(cls, scene: Scene, values: Mapping[str, FloatArray]) -> Designs:
@@ -47,9 +48,9 @@ class Designs:
 
     @classmethod
     def stacked(cls, scenes: Sequence[Scene], *, each: int = 1) -> Designs:
-        """The designs of scenes that differ in numbers alone.
+        """The designs of scenes that differ only in numbers, in the order of the scenes.
 
-        Args: `each`: n of every scene whose own numbers are arrays of shape (n,), one behind the other.
+        Args: `each`: number of designs n in each scene, whose numbers are then arrays of shape (n,).
         """
         return cls(scene=_stacked(scenes, each), size=each * len(scenes))
 
@@ -77,7 +78,7 @@ class Designs:
 
 @cache
 def _fields(kind: type[Any]) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
-    """Names of a record's fields, none where it is no record, and what gives all their values."""
+    """Names of a record's fields, and a function that returns their values; no names for any other type."""
     names = tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
     return names, attrgetter(*names) if len(names) > 1 else lambda record: tuple(
         getattr(record, n) for n in names
@@ -116,7 +117,7 @@ def _varies(value: Any) -> bool:
 
 
 def _taken(value: Any, rows: IntArray) -> Any:
-    """Entries of a value's arrays."""
+    """The value with its arrays reduced to some rows."""
     if isinstance(value, np.ndarray):
         return value[rows]
     if isinstance(value, tuple):
@@ -127,7 +128,7 @@ def _taken(value: Any, rows: IntArray) -> Any:
 
 
 def _alike(first: Any, second: Any) -> bool:
-    """True for two records that differ in numbers alone."""
+    """True for two values that differ only in numbers."""
     if first is second or (isinstance(first, _NUMBERS) and isinstance(second, _NUMBERS)):
         return True
     if type(first) is not type(second):
@@ -141,7 +142,7 @@ def _alike(first: Any, second: Any) -> bool:
 
 
 def alike(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Places of scenes that differ in numbers alone, kind by kind."""
+    """Indices of scenes, grouped so that those of a group differ only in numbers."""
     batches: list[list[int]] = []
     for number, scene in enumerate(scenes):
         same = next((rows for rows in batches if _alike(scenes[rows[0]], scene)), None)
@@ -155,16 +156,16 @@ def alike(scenes: Sequence[Scene]) -> list[list[int]]:
 def in_batches(
     scenes: Sequence[Scene], function: Callable[[Designs], FloatArray], *, each: int | None = None
 ) -> FloatArray:
-    """Values of a function of designs for scenes that may differ in more than numbers, kind by kind.
+    """Values of a function of designs for scenes that may differ in more than numbers; one call a group.
 
-    Args: `function`: returns an array whose last axis runs over the designs. `each`: n where numbers of every
-        scene are arrays of shape (n,).
-    Returns: The same over the scenes, in their order; with n on a last axis of its own.
+    Args: `function`: returns an array whose last axis runs over the designs. `each`: number of designs n
+        in every scene, whose numbers are then arrays of shape (n,).
+    Returns: Array over the scenes, in their order, on its last axis; with `each`, a further last axis of n.
     """
     parts, batches = [], alike(scenes)
     for rows in batches:
         value = function(Designs.stacked([scenes[i] for i in rows], each=each or 1))
-        # Where no number of the batch differs, or none that the function knows, one value is that of all.
+        # One value holds for all rows where no number that the function uses differs between them.
         all_rows = np.broadcast_to(value, (*value.shape[:-1], len(rows) * (each or 1)))
         parts.append(all_rows.reshape(*value.shape[:-1], len(rows), -1))
     order = np.argsort(np.concatenate(batches))
@@ -179,14 +180,14 @@ def changes_of(
     *,
     each: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Values of a scene, and how they change with each uncertainty: all sides in one batch of 2 m + 1 rows.
+    """Values of a scene and their changes with each uncertainty, from one batch of 2 m + 1 rows.
 
-    Each moves to its 2.5 and 97.5 % quantiles, because a sensitivity at the value itself misses what bends
-    within the interval.  All that follows from it follows, such as the velocity at which k is asked for,
-    unless the function holds it.
+    Each uncertain quantity moves to its 2.5 and 97.5 % quantiles, because a derivative at the nominal value
+    misses curvature within the interval.  Dependent quantities, such as the velocity at which k is evaluated,
+    follow unless the function fixes them.
     Args: `function`: as for `in_batches`. `each`: as for `in_batches`.
     Returns: The scene's values, and their changes at the low and the high side, shape (m, 2, ...); NaN
-        where a side does not have the quantity, zero by what is no change of the scene.
+        where a quantity does not exist at a side, zero for an uncertainty that changes nothing in the scene.
     Source: ASME V&V 20-2009, one input at a time.
     """
     numbers = [number for number, error in enumerate(errors) if error.change]

@@ -1,8 +1,8 @@
-"""Drawn devices by number: where in its distribution each uncertain input of a device lies.
+"""Drawn devices by number: quantile of each uncertain input of a device in the input's distribution.
 
-A block of 64 devices is a Latin hypercube: every input takes each 64th of its distribution once.  The column
-of an input depends on the seed, the block and the input's name alone, so that a device keeps its inputs in
-every setting, remedy, command and process, and with any number of further inputs.
+A block of 64 devices is a Latin hypercube: every input has one value in each 64th of its distribution.  The
+column of an input depends only on the seed, the block and the input's name, so that a device keeps its inputs
+in every setting, remedy, command and process, and with any number of further inputs.
 Source: McKay, Beckman and Conover, "A Comparison of Three Methods for Selecting Values of Input Variables in
     the Analysis of Output from a Computer Code", Technometrics 21 (1979).
 """
@@ -23,9 +23,9 @@ BLOCK: Final = 64
 """Devices of one Latin hypercube."""
 _KEPT_COLUMNS: Final = 4096
 _LEAST_QUANTILE: Final = 1e-12
-"""Fraction at either end of a distribution that no device lies in."""
+"""Smallest distance of a quantile from 0 and from 1."""
 _NOISE_KEY: Final = 3
-"""Number in the key of a run's noise, which the keys of drawn inputs do not have."""
+"""Last number of the key of a run's noise, which no key of a drawn input has."""
 
 
 def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
@@ -45,17 +45,17 @@ def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
 
 
 def run_noise(seed: int, number: int) -> np.random.Generator:
-    """Random numbers of the sensors in the run of a drawn device."""
+    """Random generator of the sensor noise in the run of a drawn device."""
     key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE_KEY))
     return np.random.Generator(np.random.PCG64(key))
 
 
 @lru_cache(32)
 def noise_table(seed: int, numbers: tuple[int, ...], samples: int, *, devices: bool = True) -> FloatArray:
-    """First numbers of these in the runs of devices, shape (devices, samples, 2); not to be written to.
+    """First standard normal numbers of the sensor noise in runs, shape (devices, samples, 2); read only.
 
-    Args: `devices`: whether they are drawn; else each has the noise of a single run of the scene as it is,
-        from the next seed.
+    Args: `devices`: True for drawn devices; False for single runs of the scene itself, each with the seed
+        `seed` plus its number.
     """
     table = np.empty((len(numbers), samples, 2))
     for number, row in zip(numbers, table, strict=True):

@@ -1,8 +1,8 @@
-"""The one list of what is not known exactly of a liquid ring: every input, and every error of a model.
+"""The one list of uncertain quantities of a liquid ring: every input, and every error of a model.
 
 Static intervals take both sides of each (its 2.5 and 97.5 % quantiles), drawn devices its quantiles, `fit`
-the errors of models as nuisance parameters, and rankings their names.  What an error does stands where the
-model stands; here are its distribution, what it acts on and whether devices differ in it.
+the errors of models as nuisance parameters, and rankings their names.  The effect of an error is computed by
+its model; this module has the error's distribution, the quantity it acts on and whether devices differ in it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from ringbalance.scene.uncertain import (
 Distribution: TypeAlias = Literal["normal", "lognormal", "uniform"]
 """Shape of a distribution; lognormal: a factor 1 + U at the expanded uncertainty (95 %) U."""
 Varies: TypeAlias = Literal["devices", "chambers", "not known"]
-"""Population over which a quantity varies; "not known": all devices have it alike."""
+"""Population over which a quantity varies; "not known": one unknown value common to all devices."""
 NOT_KNOWN: Final = "not known"
 _ASSUMED_INFLUENCE_U95: Final = 0.05
 """Relative expanded uncertainty (95 %) of an influence coefficient for which the scene states none."""
@@ -48,13 +48,13 @@ ASSUMED_AMPLITUDE: Final = 0.05
 FITTED: Final = "fitted"
 """Group of all inputs that were fitted together."""
 FITTED_DIRECTION: Final = "fitted together, direction"
-"""Beginning of the name of a direction of fitted inputs; a number follows."""
+"""Prefix of the name of a direction of fitted inputs; a number follows."""
 LOSS: Final = f"{MODEL}loss of the tube"
-"""Error of a flow law other than the scene's: of its velocity, or of the paper's k."""
+"""Error of a flow law other than the scene's: of the law's velocity, or of the paper's k."""
 WAVES: Final = f"{MODEL}waves"
 MOMENT: Final = f"{MODEL}moment"
 VOLUME: Final = f"{MODEL}volume"
-"""Errors of a chamber's liquid that no model holds: of its pressure and moment; by facets of its volume."""
+"""Errors of a chamber's liquid outside `MODEL_KINDS`: of pressure, of moment, and of volume by facets."""
 AMPLITUDE: Final = "rotor.initial_amplitude"
 PHASE: Final = "rotor.initial_phase"
 _PARTS: Final = ("even", "odd")
@@ -62,24 +62,24 @@ _PARTS: Final = ("even", "odd")
 
 @dataclass(frozen=True, kw_only=True)
 class ModelKind:
-    """A model that may be off."""
+    """Error of a model: affected quantity, distribution and population."""
 
     acts_on: str
     parts: tuple[str, ...] = ("",)
-    """Names of the numbers that it has; those of a random function of Re are two."""
+    """Names of the error's parts; a random function of Re has two."""
     distribution: Distribution = "normal"
     varies: Varies = "not known"
     by_fit: bool = False
-    """True if only data of a built device inform it, so that a design has no such error."""
+    """True if only data of a built device determine this error; a design has no such error."""
     applies: Callable[[Scene], bool] = lambda _: True
 
     def names(self, cause: str) -> tuple[str, ...]:
-        """Names of its numbers, such as "model: ends, even"."""
+        """Names of the parts, such as "model: ends, even"."""
         return tuple(f"{MODEL}{cause}, {part}" if part else f"{MODEL}{cause}" for part in self.parts)
 
 
 def _has_model(scene: Scene) -> bool:
-    """A prescribed k has no model."""
+    """True if a model gives k; False if the scene prescribes it."""
     return scene.tube.drag_coefficient is None
 
 
@@ -126,22 +126,22 @@ MODEL_KINDS: Final[Mapping[str, ModelKind]] = MappingProxyType(
         "bends as built": _as_built("loss of the bends", _has_bends),
     }
 )
-"""By `ErrorCause`. Each cause of k's is a random function of Re of its own range, of two numbers, as
-`physics.tube.loss.with_errors` says; "as built" gives the shape of k(u) freedom of its own.  What clears the
-crest and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`, and
-where the crest's arc ends within that of `reduced_model.tube.path`.  The start of the flow has no
-measurements to compare with: the column's inertia, a valve that does not open as fast as it closes, and to
-which side liquid runs that stands on the crest when the gas is shut, up to half of the tube.  The time L/2u
-in which the flow passes that half is taken for their expanded uncertainty (95 %)."""
+"""Model errors by `ErrorCause`. Each error of k is a random function of Re with a range of its own and two
+parts, see `physics.tube.loss.with_errors`; "as built" frees the shape of k(u).  The flow that clears the
+crest and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`, the end
+of the crest's arc within that of `reduced_model.tube.path`.  The start of the flow has no measurements to
+compare with: it depends on the column's inertia, on a valve that opens slower or faster than it closes, and
+on the side to which liquid on the crest runs when the gas is shut, up to half of the tube.  Its expanded
+uncertainty (95 %) is taken as the time L/2u in which the flow passes that half."""
 MODEL_ERRORS: Final[Mapping[str, str]] = MappingProxyType(
     {name: cause for cause, kind in MODEL_KINDS.items() for name in kind.names(cause)}
 )
-"""Cause by the name of each number, one standard deviation."""
+"""Cause by the name of each part; a part counts in standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Uncertainty:
-    """One quantity that is not known exactly."""
+    """One uncertain quantity."""
 
     name: str
     """Key of a quantity of the scene, or name of a model's error as `ModelError.named` takes it."""
@@ -151,31 +151,31 @@ class Uncertainty:
     varies: Varies
     distribution: Distribution = "normal"
     half_width: float | None = None
-    """Expanded uncertainty (95 %), SI, relative where it acts by a factor; None: that of its model."""
+    """Expanded uncertainty (95 %), SI, or relative for a factor; None: the model has its own."""
     change: Mapping[str, float] = field(default_factory=dict)
-    """Changes of the scene with one standard deviation, as `moved` takes them; empty: it is in no scene."""
+    """Changes of the scene for one standard deviation, for `moved`; empty: no scene contains the quantity."""
 
     def deviation(self, quantile: Any) -> Any:
-        """Standard deviations at quantiles; of a uniform one 1.96 lie at the end of the range."""
+        """Deviation at quantiles, in standard deviations; the ends of a uniform range lie at 1.96."""
         if self.distribution == "uniform":
             return NORMAL_95 * (2.0 * np.asarray(quantile) - 1.0)
         return ndtri(quantile)
 
     def deviation_of_normal(self, deviate: Any) -> Any:
-        """Its standard deviations where a standard normal variable has a value as likely to be exceeded."""
+        """Deviation, in standard deviations, with the exceedance probability of a standard normal deviate."""
         return self.deviation(ndtr(deviate)) if self.distribution == "uniform" else deviate
 
     def moved(self, scene: Scene, deviation: Any) -> Scene:
-        """The scene with it larger by standard deviations, as far as a device can have it."""
+        """The scene with this quantity larger by some standard deviations, within physical limits."""
         return moved(scene, {name: deviation * each for name, each in self.change.items()})
 
     def sides(self, scene: Scene) -> tuple[Scene, Scene]:
-        """The scene at its 2.5 and 97.5 % quantiles."""
+        """The scene at the 2.5 and 97.5 % quantiles of this quantity."""
         end = float(self.deviation(0.975))
         return self.moved(scene, -end), self.moved(scene, end)
 
     def document(self) -> dict[str, Any]:
-        """For JSON."""
+        """Fields for JSON, without `group` and `change`."""
         return {key: value for key, value in asdict(self).items() if key not in ("group", "change")}
 
 
@@ -186,10 +186,10 @@ def uncertainties(
     models: bool = True,
     fitted_models: bool = True,
 ) -> tuple[Uncertainty, ...]:
-    """The list for a scene: inputs, directions of those that were fitted together, errors of its models.
+    """Uncertainties of a scene: inputs, directions of jointly fitted inputs, and errors of models.
 
-    Args: `among`: inputs that count. `models`: whether errors of models count. `fitted_models`: whether those
-        do that were fitted together with inputs.
+    Args: `among`: inputs to include. `models`: True to include errors of models. `fitted_models`: True to
+        include errors of models that were fitted together with inputs.
     """
     alone = tuple(
         of_input(name, width) for name, width in independent_half_widths(scene).items() if name in among
@@ -226,8 +226,8 @@ def directions(
 ) -> tuple[Uncertainty, ...]:
     """Independent directions of the scene's fitted inputs and errors.
 
-    Args: `errors`: whether errors of models count. `turned`: orthonormal columns, other directions as
-        combinations of these.
+    Args: `errors`: True to include errors of models. `turned`: orthonormal columns that combine these
+        directions into others.
     """
     keys = [each.key for each in scene.fitted.quantities]
     which = [i for i, key in enumerate(keys) if (errors if key.startswith(MODEL) else key in among)]
@@ -247,9 +247,9 @@ def directions(
 
 
 def model_uncertainties(scene: Scene, *, built: bool = False) -> tuple[Uncertainty, ...]:
-    """Errors of the models of a design, but for those that were fitted together with inputs.
+    """Errors of a design's models, without those that were fitted together with inputs.
 
-    Args: `built`: all errors instead that data of a device which was built are fitted with.
+    Args: `built`: True for all errors that a fit to data of a built device uses.
     """
     fitted = fitted_causes(scene)
     return tuple(
@@ -285,7 +285,8 @@ def of_chamber(name: str, half_width: float | None = None) -> Uncertainty:
 
 
 def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
-    """Further uncertainties of runs of devices: an unstated rotor's, and the initial vibration's."""
+    """Further uncertainties of device runs: influence coefficient and lag angle where the scene states none,
+    amplitude and phase of the initial vibration."""
     rotor, stated = scene.rotor, {each.key for each in scene.fitted.quantities}
     stated |= {each.quantity for each in scene.uncertainty}
     assumed = {
@@ -312,18 +313,20 @@ def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
 
 
 def with_places(scene: Scene, errors: Collection[Uncertainty]) -> Scene:
-    """The scene with an entry for each cause among errors, so that scenes moved by them differ in numbers."""
+    """The scene with a zero error for each cause in `errors`: scenes moved by them differ only in numbers."""
     return moved(scene, {name: 0.0 for each in errors for name in each.change if name.startswith(MODEL)})
 
 
 def larger(changes: FloatArray) -> FloatArray:
-    """The larger change of both sides of each error, as `by_group` takes them; NaN where neither has any."""
+    """Larger change of both sides for each error, of those by `designs.changes_of`; NaN where both are."""
     return np.asarray(np.fmax(*np.abs(np.moveaxis(changes, 1, 0))))
 
 
 def by_group(errors: Sequence[Uncertainty], changes: FloatArray) -> dict[str, FloatArray]:
-    """Expanded uncertainties (95 %) by group: the larger changes of its errors, by the root of their squares'
-    sum. Args: `changes`: as of `designs.changes_of`."""
+    """Expanded uncertainties (95 %) by group: root of the sum of squares of the larger change for each error.
+
+    Args: `changes`: as of `designs.changes_of`.
+    """
     squares: dict[str, Any] = {}
     for error, change in zip(errors, larger(changes), strict=True):
         squares[error.group] = squares.get(error.group, 0.0) + np.square(change)
@@ -331,7 +334,10 @@ def by_group(errors: Sequence[Uncertainty], changes: FloatArray) -> dict[str, Fl
 
 
 def both_sides(changes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """By how much all together may lower and raise a value (95 %), of changes as `by_group` takes them."""
+    """Expanded uncertainties (95 %) downwards and upwards: root of the sum of squares over all errors.
+
+    Args: `changes`: as of `designs.changes_of`.
+    """
     finite = np.nan_to_num(changes)
     lowered, raised = np.max(np.maximum(-finite, 0.0), axis=1), np.max(np.maximum(finite, 0.0), axis=1)
     return np.sqrt(np.sum(lowered**2, axis=0)), np.sqrt(np.sum(raised**2, axis=0))

@@ -1,4 +1,4 @@
-"""Errors of a scene file: one sentence for each, all errors of a file together."""
+"""Errors of a scene file, one sentence each, reported together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WORD_CHARACTERS = 60
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """One error of a scene file, with all that is needed to put it right."""
+    """One error of a scene file, with all that is needed to correct it."""
 
     file: str
     """The scene file, as it was named."""

@@ -16,7 +16,7 @@ from ringbalance.scene.units import unit_factor
 
 NO_UNIT: Final = "1"
 MODEL: Final = "model: "
-"""Beginning of the name of an error of a model; its cause follows and, for errors of k, its part."""
+"""Prefix of a model error's name; the cause follows and, for errors of k, the part."""
 
 
 GaugeCorrection = Annotated[
@@ -51,7 +51,7 @@ class FittedQuantity:
 
     @property
     def key(self) -> str:
-        """Name of an uncertain input where keys of tables differ: "bore" of "tube.bore"."""
+        """Name of an input without its table, "bore" of "tube.bore"; full name of a model error."""
         return self.quantity if self.quantity.startswith(MODEL) else self.quantity.split(".")[1]
 
 
@@ -75,7 +75,7 @@ class Fitted:
 
     @cached_property
     def covariance(self) -> FloatArray:
-        """SI, shape (n, n)."""
+        """Covariance, SI, shape (n, n)."""
         count = len(self.quantities)
         correlations = np.array([each.correlations for each in self.quantities]).reshape(count, count)
         return np.asarray(correlations * np.outer(self.deviations, self.deviations))
@@ -101,14 +101,14 @@ class Fitted:
 
 
 _ROUND_OFF: Final = 1e-10
-"""Fraction of the largest eigenvalue of the correlations, which files have with nine digits."""
+"""Smallest eigenvalue of the correlations that counts, over the largest; files state nine digits."""
 
 
 CLEARING_ERROR: Final = "clearing of the crest"
 CAVITY_ERROR: Final = "pressure of the cavity"
 START_ERROR: Final = "start of the flow"
 CREST_ERROR: Final = "end of the crest"
-"""Causes of `ModelError` beside those of k."""
+"""Causes of `ModelError` other than errors of k."""
 ErrorCause = Literal[
     "friction correlation",
     "rotation model",
@@ -126,18 +126,17 @@ ErrorCause = Literal[
 ]
 """Cause of an error of a model: the keys of `scene.errors.MODEL_KINDS`."""
 ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")
-"""Name of one standard deviation of a cause's even part, where none is named, or of its odd part."""
+"""Name of a model error: cause and part; the even part where none is named."""
 LARGEST_ERROR: Final = 2.5
-"""Standard deviations that an error is moved to at most: beyond, a head may fall with the velocity."""
+"""Largest error, standard deviations: beyond, a head may fall with the velocity."""
 _Deviations = Annotated[float, number(Bounds(at_least=-100, at_most=100))]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelError:
-    """Error of a model itself, supposed, drawn or fitted, in standard deviations of its stated uncertainty.
+    """Assumed, drawn or fitted error of a model, in standard deviations of its stated uncertainty.
 
-    What the parts do stands with `physics.tube.loss.with_errors`; of a cause beside k the first alone
-    counts.
+    `physics.tube.loss.with_errors` defines the two parts; a cause other than of k has only `even`.
     """
 
     cause: Annotated[ErrorCause, needed("model that is off")]
@@ -148,7 +147,7 @@ class ModelError:
 
     @classmethod
     def named(cls, name: str, size: float) -> ModelError:
-        """An error by the name that fits and [fitted] give it, such as "model: ends, even".
+        """Error with a name as in fits and in [fitted], such as "model: ends, even".
 
         Args: `size`: in standard deviations. Raises: ValueError: there is no such error.
         """
@@ -158,7 +157,7 @@ class ModelError:
 
 @cache
 def error_part(name: str) -> tuple[ErrorCause, int]:
-    """Cause, and 1 for its odd part, else 0. Raises: ValueError: there is no such error."""
+    """Cause of an error by its name, and 1 for the odd part, else 0. Raises: ValueError: no such error."""
     match = ERROR_NAME.fullmatch(name)
     if match is None or match[1] not in get_args(ErrorCause):
         raise ValueError(f"{name!r} names no error of a model")

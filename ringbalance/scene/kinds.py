@@ -1,4 +1,4 @@
-"""A kind of scene file: its keys, the rules that values meet, its reader and its description."""
+"""Kinds of scene file: keys, rules for values, reader and description of each."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ class SceneKind:
     """A kind of scene file."""
 
     schema: Schema
-    """Its keys, and the record that they become."""
+    """Keys, and the record that they are read into."""
     read: _Reads
-    """Values of a document with the defaults that follow, and everything that is wrong with them."""
+    """Function that reads a document: values with derived defaults, and all errors."""
     main: tuple[tuple[str, ...], ...]
-    """Paths of the values that stand for the scene in a terminal, line by line."""
+    """Paths of the values that a terminal shows, line by line."""
     usual_units: Mapping[str, str] = field(default_factory=dict)
-    """Unit by dimension for values whose declaration names no unit to show; else the SI unit."""
+    """Displayed unit by dimension where a declaration names none; default the SI unit."""
     arrays: bool = False
-    """True if its numbers may be arrays: many designs at once, as `ringbalance.scene.designs` has them."""
+    """True if numbers may be arrays for many designs at once, see `ringbalance.scene.designs`."""
 
 
 def scene_kind(name: str) -> SceneKind:
@@ -64,15 +64,15 @@ Rule = Callable[..., Contradiction | None]
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """A rule and the values that it needs; it is left out while one of them is unknown."""
+    """A rule and the values that it needs; skipped while one of them is unknown."""
 
     rule: Rule
     needs: tuple[str, ...]
-    """Paths of the rule's arguments; the first is the one to be changed."""
+    """Paths of the rule's arguments; the error names the first."""
     when: Callable[[SceneReading], bool]
-    """Condition on a scene, without which the rule does not apply."""
+    """Condition under which the rule applies to a scene."""
     moot: tuple[Rule, ...]
-    """Rules before it whose failure makes this one pointless, so that one error does not raise others."""
+    """Earlier rules whose failure makes this one moot, so that one error does not raise others."""
 
 
 def check(
@@ -86,7 +86,7 @@ def check(
 
 
 def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[Fault]:
-    """One error for each check that fails; `checks` in order, each after those that make it pointless."""
+    """One error for each check that fails; `checks` in order, each after those that make it moot."""
     failed: set[Rule] = set()
     for each in checks:
         if not reading.known(*each.needs) or not each.when(reading) or (failed and failed & set(each.moot)):
@@ -118,7 +118,7 @@ def written(value: float, unit: str) -> str:
 
 
 def limit_above_noise(noise_key: str, unit: str) -> Rule:
-    """The rule that a limit is above the standard deviation of what is measured."""
+    """Rule that a limit is above the standard deviation of the sensor noise."""
 
     def above(limit: float, noise: float) -> Contradiction | None:
         if limit > noise:

@@ -1,6 +1,6 @@
 """Known liquids by name and temperature, with their uncertainties; a temperature without data is refused.
 
-`with_liquid` takes the liquid of a scene from them, or as given outright, or partly both.
+`with_liquid` completes a scene's liquid from them; values that the scene gives take precedence.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _ALIASES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
         "Krytox GPL 102": ("perfluorinated oil GPL 102", ("GPL 102",)),
     }
 )
-"""Name in the data file: name here, further names; the data file's own name is understood too."""
+"""Name in scenes and aliases, by the name in the data file, which is understood too."""
 COLDEST_WATER_K = 273.15
 """Lowest temperature of liquid water; it freezes below."""
 HOTTEST_WATER_K = 373.05
@@ -51,13 +51,13 @@ _OUTRIGHT = "density and kinematic_viscosity given outright"
 
 @dataclass(frozen=True, kw_only=True)
 class KnownLiquid:
-    """A liquid whose properties are held here."""
+    """A liquid with tabulated properties, or water."""
 
     name: str
     aliases: tuple[str, ...]
-    """Other names that are understood; case, spaces and dashes do not matter in any."""
+    """Other names that are understood; case, spaces and dashes do not matter."""
     temperatures: tuple[float, ...]
-    """K, rising: one for which there are data, or several between which they are interpolated."""
+    """Temperatures with data, K, rising; properties are interpolated between them."""
     density_uncertainty: float
     """Expanded uncertainty (95 %), relative."""
     viscosity_uncertainty: float
@@ -66,7 +66,7 @@ class KnownLiquid:
 
     @property
     def held(self) -> str:
-        """The temperatures for which there are data, in words."""
+        """Temperatures with data, in words."""
         first, last = (
             f"{t - _ZERO_CELSIUS_K:.4g} degC" for t in (self.temperatures[0], self.temperatures[-1])
         )
@@ -90,7 +90,7 @@ def _find_liquid(*, name: str) -> KnownLiquid | None:
 
 
 def _unknown_liquid(*, name: str) -> FieldError:
-    """The error that a liquid is not known, and which ones are; to be raised or reported."""
+    """Error for an unknown liquid, with the names of the known ones."""
     names = [each for liquid in known_liquids() for each in _names(liquid)]
     held = ", ".join(f'"{liquid.name}"' for liquid in known_liquids())
     return FieldError(
@@ -126,7 +126,7 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
         if last != inside:
             first, lower_density, lower_viscosity, lower_vapour = rows[upper - 1].tolist()
             share = (inside - first) / (last - first)
-            # Linear in 1/T rather than in T: the same share, weighted with the upper temperature over T.
+            # Fraction for interpolation in 1/T: that in T, times the upper temperature over T.
             inverse_share = share * last / inside
             density = lower_density + share * (density - lower_density)
             viscosity = lower_viscosity * math.exp(inverse_share * math.log(viscosity / lower_viscosity))
@@ -209,7 +209,7 @@ def _water_series() -> FloatArray:
 
 
 def with_liquid(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
-    """The liquid's values, as far as they can be known, what is given outright first; and what is wrong."""
+    """The scene with the liquid's values, those given in the scene first; and the errors."""
     if "liquid" in reading.broken or not reading.given("liquid"):
         return reading, ()
     liquid = _find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None
@@ -225,7 +225,7 @@ def with_liquid(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]
 
 
 def _faults(reading: SceneReading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
-    """At most one error: of the temperature of a known liquid, else of what an unknown one lacks."""
+    """At most one error: temperature of a known liquid, or values missing for an unknown one."""
     incomplete = reading.lacks(_DENSITY) or reading.lacks(_VISCOSITY)
     if liquid is not None:
         path, held = "liquid.temperature", f"{liquid.name} at {liquid.held}"

@@ -1,4 +1,4 @@
-"""From a file to a scene, or to everything that is wrong with it."""
+"""Read a file into a scene, or report all its errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LARGEST_FILE_BYTES = 2**20
 _DECIDE_NOTHING = ("requirement.", "design.", "measured.", "rotor.mass", "liquid.source")
 """Values that no result depends on."""
 CHANGED: Final = ", changed"
-"""Behind the name of a file some of whose values were changed since."""
+"""Suffix of `source` for a scene whose values were changed after reading."""
 
 
 def load_scene(path: str | PathLike[str]) -> AnyScene:
@@ -59,8 +59,8 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
 def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyScene:
     """The scene of a scene file's bytes, in SI; `file` is its name, for messages and the scene's `source`.
 
-    Args: `folder`: from which files that it names are looked for; that of `file` by default.
-    Raises: SceneError: anything in it is wrong; all of it is said at once.
+    Args: `folder`: folder of the files that the scene names; default that of `file`.
+    Raises: SceneError: all errors in the file.
     """
     try:
         document = read_toml(content.decode("utf-8-sig"))
@@ -91,12 +91,12 @@ def scene_of(
     derived: Mapping[str, Any],
     before: CheckedValues | None = None,
 ) -> AnyScene:
-    """The scene of a document as TOML has it.
+    """The scene of a document parsed from TOML.
 
-    Args: `file`: for messages. `folder`: of the mesh that it may name. `sha256`: called when all is well.
-        `derived`: values by path that this mesh gives, where they are known; empty: it is read. `before`: of
-        the scene from whose document this one was made.
-    Raises: SceneError: anything in it is wrong; all of it is said at once.
+    Args: `file`: name for messages. `folder`: folder of the mesh. `sha256`: called if there is no error.
+        `derived`: values by path already read from the mesh; empty: the mesh is read. `before`: checked
+        values of the scene whose document was changed.
+    Raises: SceneError: all errors in the document.
     """
     reading = _checked_reading(document, file=file, folder=folder, derived=derived, before=before)
     decisive = {
@@ -107,7 +107,7 @@ def scene_of(
         and not path.endswith(f".{ORIGIN}")
         and not path.startswith(_DECIDE_NOTHING)
     }
-    # What was looked up for a known liquid is no default.
+    # Properties looked up for a known liquid are not defaults.
     defaulted = tuple(
         path
         for path in reading.values
@@ -157,7 +157,10 @@ def _checked_reading(
     derived: Mapping[str, Any],
     before: CheckedValues | None,
 ) -> SceneReading:
-    """Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last."""
+    """Checked values of a document.
+
+    Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last.
+    """
     kind = _kind(document)
     tables: Mapping[str, TableRead] = before.tables if before and _kind(before.document) == kind else {}
     reading, read_faults = scene_kind(kind).read(
@@ -194,8 +197,8 @@ def _checked_reading(
 def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, Any]:
     """Values that results depend on: tolerance, uncertainties, and a record of each table.
 
-    A record's fields are named after keys, and an absent key is the default or None.  One with the values of
-    `before` is that record itself, so that comparing thousands of scenes costs little.
+    A record's fields are named after keys; an absent key has the default or None.  A table with the values of
+    `before` keeps that record, so that comparing thousands of scenes costs little.
     """
     values: dict[str, Any] = dict(reading.values)
     vibration = values.get("rotor.initial_vibration")
@@ -209,7 +212,7 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
             continue
         field_values = {field: values.get(path, absent) for field, path, absent in _fields(kind, name)}
         record = parts_before.get(name)
-        # A mesh, and what else has parts, is compared by identity alone.
+        # Anything but a float, such as a mesh, is compared by identity alone.
         if type(record) is not kind or not all(
             value is (other := getattr(record, key))
             or (type(value) is type(other) is float and value == other)
@@ -225,7 +228,7 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
         stated = values.get(f"uncertainty.{key}")
         if stated is None or key == ORIGIN:
             continue
-        # By "table.key" where [uncertainty] has a table for each table.
+        # Names are "table.key" where [uncertainty] has a subtable for each table.
         of_table = isinstance(stated, dict)
         widths = {f"{key}.{name}": each for name, each in stated.items()} if of_table else {key: stated}
         for quantity, (width, relative) in widths.items():
@@ -235,7 +238,7 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
 
 @cache
 def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
-    """Name, path and value without one there, of each field of a table's record."""
+    """Name, path and value of an absent key for each field of a table's record."""
     return tuple(
         (each.name, f"{table}.{each.name}", None if each.default is MISSING else each.default)
         for each in fields(kind)
@@ -243,7 +246,7 @@ def _fields(kind: type, table: str) -> tuple[tuple[str, str, Any], ...]:
 
 
 def _kind(document: Mapping[str, Any]) -> str:
-    """The kind of balancer that the file names, or was meant to name."""
+    """Kind of balancer: the file's word, else the closest known one, else the default."""
     word = document.get("balancer")
     if word in balancers():
         return str(word)

@@ -1,4 +1,4 @@
-"""Records of the rotor, where it stands, its sensor, the controller and the run, beside those of `models`."""
+"""Records of rotor, environment, sensor, controller, run and requirement; the others are in `models`."""
 
 import math
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ ControllerKind = Literal["target_vector", "trial", "law_based"]
 
 @dataclass(frozen=True, kw_only=True)
 class Environment:
-    """Gravity and how the shaft lies in it."""
+    """Gravity and the direction of the shaft."""
 
     shaft: Annotated[
         Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), Shown("shaft")
@@ -89,9 +89,9 @@ class Rotor:
     initial_amplitude: Annotated[
         float, Shown("vibration at the start", "um", note="zero-to-peak", dimension="length")
     ]
-    """m, zero-to-peak."""
+    """Amplitude of the initial vibration, m zero-to-peak."""
     initial_phase: Annotated[float, Shown("its phase", "deg", dimension="angle")]
-    """rad, of the vibration."""
+    """Phase of the initial vibration, rad."""
     mass: Annotated[
         PositiveMass | None,
         unused("no balance quality grade is stated", "of the rotor; for grades of ISO 21940-11 only"),
@@ -108,12 +108,12 @@ class Rotor:
 
     @property
     def initial_vibration(self) -> complex:
-        """Vibration with every pair level, V0 = v0 exp(j theta0), m zero-to-peak."""
+        """Vibration with equal fills in every pair, V0 = v0 exp(j theta0), m zero-to-peak."""
         return complex(self.initial_amplitude * np.exp(1j * self.initial_phase))
 
     @property
     def initial_unbalance(self) -> complex:
-        """Moment that the initial vibration answers to, V0/K, kg m; the disc cancels it with its negative."""
+        """Unbalance that causes the initial vibration, V0/K, kg m; the disc's moment is to oppose it."""
         return self.initial_vibration / self.influence
 
     def vibration(self, moment: npt.ArrayLike) -> ComplexArray:
@@ -139,7 +139,7 @@ class Sensor:
 
 
 _DEFAULT_LIMIT_M: Final = 0.05e-6
-"""Amplitude below which a controller rests where nothing is required of it."""
+"""Amplitude below which a controller rests where the scene has no requirement, m."""
 
 
 def required_amplitude(
@@ -150,11 +150,11 @@ def required_amplitude(
     residual: float | None,
     grade: float | None,
 ) -> float | None:
-    """Amplitude that may remain, m zero-to-peak: the smaller of the residual and of what the grade leaves.
+    """Required amplitude, m zero-to-peak: the smaller of `residual` and that of the balance grade.
 
     The latter is the influence coefficient times the permissible unbalance.
-    Args: `mass`: m, kg, without which a grade G, m/s, asks for no amplitude.
-    Returns: None where nothing is asked.
+    Args: `mass`: m, kg, without which a grade G, m/s, sets no amplitude.
+    Returns: None without a requirement.
     """
     amplitudes = [] if residual is None else [residual]
     if grade is not None and mass is not None:
@@ -202,7 +202,7 @@ class ControllerSettings:
         ),
         Shown("period", "s"),
     ]
-    # Of samples below a limit half of the time by chance, ten in a row are so once in a thousand.
+    # Ten samples in a row that are each below the limit with probability 1/2 occur once in a thousand.
     hold_time: Annotated[
         PositiveTime,
         derived(
@@ -292,7 +292,7 @@ class ControllerSettings:
 
     @property
     def assumed_influence(self) -> complex:
-        """Vibration per unbalance that the controller takes for the rotor's, m/(kg m)."""
+        """Influence coefficient that the controller assumes, as a vector, m/(kg m)."""
         return _influence(self.assumed_influence_coefficient, self.assumed_lag_angle)
 
     def offsets(self, chambers: int) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
-"""The frozen, validated, SI-only models that every other room reads.
+"""Frozen, validated, SI-only records of a liquid-ring scene, which all other packages read.
 
-`ringbalance.scene.load_scene` makes them; it turns units into SI and refuses what is impossible.  Angles are
+`ringbalance.scene.load_scene` makes them; it converts units to SI and refuses impossible values.  Angles are
 radians, positive with the rotation; amplitudes are zero-to-peak; gas pressures are gauge, vapour pressures
 absolute.  What a field's key takes and means, and its default, stand in its annotation, see `scene.keys`.
 """
@@ -140,7 +140,7 @@ class Disc:
         Shown("measured factor on lambda"),
     ] = None
     geometry: Annotated[ChamberGeometry | None, Shown("geometry of a chamber")] = None
-    """One chamber as a mesh file gives it, no key; None for the sector between plates that the keys give."""
+    """Chamber read from a mesh file, no key; None for the sector between plates that the keys describe."""
 
     @property
     def moment_factor(self) -> float:
@@ -294,17 +294,17 @@ class Tube:
 
     @property
     def area(self) -> float:
-        """S, m^2."""
+        """Cross-section S, m^2."""
         return math.pi / 4 * self.bore**2
 
     def model_error(self, cause: str) -> float:
-        """First part of a cause's errors together, in standard deviations."""
+        """Sum of the even parts of a cause's errors, in standard deviations."""
         return sum(each.even for each in self.model_errors if each.cause == cause)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gas:
-    """The driving gas; None marks a term that the scene does not ask for."""
+    """The driving gas; None marks a term that the scene does not model."""
 
     pressure: Annotated[
         GaugePressure,

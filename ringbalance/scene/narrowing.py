@@ -1,4 +1,4 @@
-"""A scene of any kind, the way to the kind that a function needs, and options in place of what it has."""
+"""Scenes of any kind, narrowing to the kind that a function needs, and options in place of scene values."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Data that a scene of any balancer keeps of its file: names, hashes, and the origin of each value.
 
-`Measured` has the measurements that it was fitted to; no result depends on it.
+`Measured` has the measurements that the scene was fitted to; no result depends on it.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Measured:
 
 
 Origin = Literal["given", "inferred", "assumed", "measured"]
-"""In the documents of the machine; inferred from other values; chosen, as nothing is known; measured."""
+"""Stated in the machine's documents; inferred from other values; chosen, as nothing is known; measured."""
 ShownOrigin = Origin | Literal["derived", "default"]
 """`Origin`, or "derived": read off the mesh that the scene names; or "default": not in the file."""
 KEY_OF_FIELD = {
@@ -118,11 +118,11 @@ class CheckedValues:
     """Values as they were read and checked: a record that differs was changed without a check."""
 
     document: Mapping[str, Any]
-    """Content of the scene file as TOML has it."""
+    """Content of the scene file, parsed from TOML."""
     folder: Path
-    """Absolute; from which a mesh is read."""
+    """Folder from which a mesh is read, absolute path."""
     parts: Mapping[str, object]
-    """Fields of the scene by name, without this one."""
+    """Fields of the scene by name, without `checked`."""
     derived: Mapping[str, Any]
     """Values that the mesh of a chamber gives, SI, by path."""
     tables: Mapping[str, Any]
@@ -203,7 +203,7 @@ class SceneFile:
 
 
 def summary_text(lines: Iterable[str]) -> str:
-    """Lines below a title."""
+    """Text of a title and of indented lines below it."""
     title, *others = lines
     return "\n".join([title, *(f"  {line}" for line in others)])
 
@@ -213,19 +213,19 @@ _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d+)\])?")
 
 
 def value_at(scene: SceneFile, path: str) -> float:
-    """One value."""
+    """Number at a path such as "tube.bore", SI."""
     return float(raw_value_at(scene, path))
 
 
 def raw_value_at(scene: SceneFile, path: str) -> Any:
-    """One value as it is, a text, a whole list, or None."""
+    """Value at a path in its own type: number, text, whole list or None."""
     table, key, entry = _placed(path)
     value = getattr(getattr(scene, table), key)
     return value if entry is None else value[entry]
 
 
 def with_values_at(scene: _SomeScene, values: Mapping[str, Any]) -> _SomeScene:
-    """A copy with values in place of its own, text and whole lists as they are; nothing is checked again.
+    """A copy with other values by path, texts and whole lists as they are; nothing is checked again.
 
     A number replaces one entry of a list, or every one where the path names none.
     """
@@ -241,7 +241,7 @@ def with_values_at(scene: _SomeScene, values: Mapping[str, Any]) -> _SomeScene:
 
 
 def moved_at(scene: _SomeScene, path: str, move: Callable[[float], float]) -> _SomeScene:
-    """A copy with one value moved; without an entry, as in "masses.friction_arm", every value of a list."""
+    """A copy with one value changed by `move`; all of a list where the path has no index."""
     table, key, entry = _placed(path)
     record = getattr(scene, table)
     value = getattr(record, key)

@@ -1,8 +1,8 @@
-"""The kinds of balancers that there are, and where the parts of each are found.
+"""Registry of the kinds of balancers and of the paths of their parts.
 
-`scene` knows no kind by itself.  The face registers each by one line, with the paths of its parts as
-"module:name", which are imported when the first such scene is met: imports keep pointing down, and a
-calibration never loads what eccentric masses need.
+`scene` contains no kind by itself.  `ringbalance/__init__.py` registers each kind with paths "module:name"
+of its parts, which are imported for the first scene of the kind: lower packages import no higher one, and a
+calibration never loads modules of eccentric masses.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ def register(name: str, *, scene: str, balancer: str) -> None:
 
 
 def register_function(name: str, *, path: str) -> None:
-    """Make a function known by its path "module:name", which is imported when it is first asked for.
+    """Register a function by its path "module:name", which is imported at first use.
 
-    It is one of a room above, or of a package that is slow to load.
+    For functions of a higher package, or of one that is slow to load.
     """
     _PATHS["function", name] = path
 

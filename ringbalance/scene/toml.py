@@ -1,6 +1,4 @@
-"""TOML read, but for keys so long that reading them takes gigabytes; and written, in a file or in a
-message.
-"""
+"""TOML reader, which refuses keys so long that reading takes gigabytes, and writer for files and messages."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from typing import Any, Final
 
 _VALUE_CHARACTERS, _LIST_ENTRIES, _NESTED_LEVELS = 60, 10, 4
 MOST_PARTS: Final = 50
-"""Parts of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for 30,000 parts."""
+"""Most parts of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for 30,000 parts."""
 _JSON: Final = json.JSONEncoder(ensure_ascii=False)
 _QUOTED: Final = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
 _LONG_KEY: Final = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
@@ -36,7 +34,7 @@ def read_toml(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class TableText:
-    """A table as it is written, from which others that have most of its values in common are written."""
+    """A written table, whose lines are reused for tables that share most of its values."""
 
     name: str
     content: Mapping[str, Any]
@@ -50,7 +48,7 @@ class TableText:
         return self._changed(self.content)
 
     def changed(self, content: Mapping[str, Any]) -> str:
-        """The text of another content; what is the same object in both is not written again."""
+        """Text of the table with other content; values that are the same objects are not written again."""
         return self._text if content is self.content else self._changed(content)
 
     def _changed(self, content: Mapping[str, Any]) -> str:
@@ -64,7 +62,7 @@ class TableText:
 def toml_bytes(document: Mapping[str, Any], written: Mapping[str, TableText] = MappingProxyType({})) -> bytes:
     """A document of texts, numbers, truth values, lists and tables, which `tomllib` reads back as it was.
 
-    Args: `written`: tables of a document that has most values in common with this one.
+    Args: `written`: tables of a document that shares most values with this one.
     """
     tables = {name: value for name, value in document.items() if isinstance(value, dict)}
     top = "".join(_line(key, value) for key, value in document.items() if key not in tables)
@@ -89,7 +87,7 @@ def _value_text(value: Any, *, indent: str = "") -> str:
         if indent and items and isinstance(value[0], dict):
             return "[\n" + "".join(f"{indent}{item},\n" for item in items) + "]"
         return "[" + ", ".join(items) + "]"
-    # JSON's escapes are TOML's, but TOML asks for one more.
+    # TOML takes JSON's escapes and requires one more.
     return _JSON.encode(value).replace("\x7f", "\\u007f")
 
 

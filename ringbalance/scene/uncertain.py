@@ -1,6 +1,6 @@
-"""Quantities whose uncertainty may be given, and how to change them, alone or along a joint distribution.
+"""Quantities whose uncertainty may be given, and changes of them, alone or along a joint distribution.
 
-With C = L L' the covariance in [fitted], a quantity y of the scene has the variance J C J' = sum
+With C = L L' the covariance in [fitted], a quantity y computed from the scene has the variance J C J' = sum
 (dy/d(column of L))^2: each column is a direction, one standard deviation long, independent of the others.
 """
 
@@ -27,11 +27,11 @@ _ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 _ASSUMED_DRAW_DOWN_UNCERTAINTY: Final = 0.3
 """Relative expanded uncertainty (95 %) of the depth at which gas enters a port, where the scene states none.
 
-The two theories of it differ by up to 18 % where the port is as wide as the liquid is deep, liquid that still
-moves needs somewhat more than liquid at rest, and no measurement of such a port is known.
+Two theories of this depth differ by up to 18 % where the port is as wide as the liquid is deep; the depth is
+somewhat larger in moving liquid than in liquid at rest; no measurement of such a port is known.
 """
 _MAY_VANISH: Final = frozenset({"roughness", "extra_loss"})
-"""Quantities of the tube that may be zero; where others would reach it, a tenth of the value counts."""
+"""Quantities of the tube that may become zero; others keep at least a tenth of their value."""
 UNCERTAIN_QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         name: table
@@ -48,9 +48,9 @@ SHAPE: Final = (*STRETCHED, "plate_thickness")
 
 
 def nominal_value(*, scene: Scene, quantity: str) -> float | None:
-    """SI value of a key of `UNCERTAIN_QUANTITIES`; None when the scene does not ask for the term.
+    """SI value of a key of `UNCERTAIN_QUANTITIES`; None when the scene does not model the term.
 
-    None too for what the mesh of a chamber cannot be stretched by.
+    None, too, for a dimension along which the mesh of a chamber cannot be stretched.
     """
     if quantity in SHAPE and quantity not in STRETCHED and scene.disc.geometry is not None:
         return None
@@ -61,7 +61,7 @@ def nominal_value(*, scene: Scene, quantity: str) -> float | None:
 def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
     """Copy a scene with one of `UNCERTAIN_QUANTITIES` changed, SI; nothing is checked again.
 
-    The mesh of a chamber is stretched with its dimension.
+    The mesh of a chamber is stretched to a changed dimension.
     Raises: ValueError: a mesh has no such dimension of its own.
     """
     table = _table_of(quantity)
@@ -76,8 +76,9 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
 
 
 def half_widths(scene: Scene) -> Mapping[str, float]:
-    """Absolute expanded uncertainties (95 %) of a scene's inputs, each by itself; the liquid's own where the
-    scene states none, and those of the joint distribution where it has the input.
+    """Absolute expanded uncertainties (95 %) of a scene's inputs, without correlations.
+
+    Those of the joint distribution come first, then stated ones, then assumed ones and the liquid's own.
     Returns: SI half-width by quantity; only those above zero.
     """
     liquid = scene.liquid
@@ -97,9 +98,9 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
 
 
 def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
-    """The scene with one of its quantities changed, as far as a device can have it.
+    """The scene with one of its quantities changed, within physical limits.
 
-    An interval that would reach zero or below reports "unknown"; a tenth of the value already shows that.
+    A quantity that cannot be zero keeps at least a tenth of its value.
     """
     value = nominal_value(scene=scene, quantity=quantity)
     if value is None:
@@ -108,7 +109,7 @@ def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
 
 
 def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
-    """The scene with several quantities `shifted`, one after the other; those that no device can have so."""
+    """The scene with several quantities `shifted` in turn; names of those that met a physical limit."""
     tube, clipped = scene.tube, []
     values: dict[str, dict[str, float]] = {}
     for quantity, change in changes.items():
@@ -119,7 +120,7 @@ def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, 
         if not math.isclose(moved, value + change):
             clipped.append(quantity)
         if table == "tube":
-            # Its radii bound each other.
+            # The tube's radii limit each other.
             tube = replace(tube, **{quantity: moved})
         elif quantity in SHAPE and scene.disc.geometry is not None:
             scene = with_value(scene=scene, quantity=quantity, value=moved)
@@ -130,7 +131,7 @@ def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, 
 
 
 def _moved_value(tube: Tube, quantity: str, value: Any, change: Any) -> Any:
-    """A quantity, changed as far as a device can have it; an array where the scene is many designs."""
+    """A changed value within physical limits; an array where the scene is many designs."""
     low: Any = 0.0 if quantity in _MAY_VANISH else 0.1 * value
     high: Any = math.inf
     if quantity == "length":
@@ -157,7 +158,7 @@ def _table_of(quantity: str) -> str:
 def without_fitted(scene: Scene) -> Scene:
     """The scene with its models as published and its inputs independent, for comparing models with models.
 
-    Corrections are those of the models that were fitted, and hold for no others.
+    Fitted corrections hold only for the models that were fitted.
     """
     return replace(scene, tube=replace(scene.tube, model_errors=()), fitted=Fitted())
 
@@ -169,7 +170,7 @@ def independent_half_widths(scene: Scene) -> Mapping[str, float]:
 
 
 def fitted_causes(scene: Scene) -> frozenset[str]:
-    """Causes of errors of models that the joint distribution holds, both parts of those of k."""
+    """Causes of model errors in the joint distribution; those of k only if it has both parts."""
     names = {each.quantity for each in scene.fitted.quantities}
     return frozenset(
         cause
@@ -188,9 +189,9 @@ def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
 
 
 def with_model_errors(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """The scene with errors of its models larger, by standard deviations, within what models allow.
+    """The scene with larger errors of its models, by standard deviations, within `LARGEST_ERROR`.
 
-    A cause keeps its place in the list, so that scenes differ in numbers alone.
+    A cause keeps its place in the list, so that scenes differ only in numbers.
     """
     sums: dict[ErrorCause, list[Any]] = {}
     for each in scene.tube.model_errors:

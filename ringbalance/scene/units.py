@@ -1,4 +1,4 @@
-"""Quantities as people write them, read into SI and written back: no guessing, one rounding.
+"""Quantities written with units, read into SI and written back: no guessing, one rounding.
 
 The written decimal times the unit's exact factor is rounded once, so "44.5 mm" and "4.45 cm" are the same
 double.  A number that another package wraps is recognised by its methods alone: with a unit, as pint has it,
@@ -40,11 +40,11 @@ class _Dimension:
     example: str
     """A quantity as one would write it."""
     units: Mapping[str, _Unit] = field(repr=False)
-    """By name; the SI unit first."""
+    """Units by name; the SI unit first."""
     smallest: float
-    """SI; a quantity that must not be zero is not smaller than this."""
+    """Least magnitude of a quantity that must not be zero, SI."""
     largest: float
-    """SI; no magnitude above this is meant seriously, and none below it overflows when squared or cubed."""
+    """Largest accepted magnitude, SI; none below it overflows when squared or cubed."""
 
     @property
     def noun(self) -> str:
@@ -90,11 +90,11 @@ DIMENSIONS: Mapping[str, _Dimension] = _dimensions()
 
 _TEXT_CHARACTERS = 60
 _READS_BACK = 1e-6
-"""Relative change of a value that is written and read again."""
+"""Relative tolerance of a value that is written and read again."""
 _TINY = 0.01
-"""In its usual unit: 0.06 s is easier read than 0.001 min."""
+"""Value in the usual unit below which SI reads easier, such as 0.06 s for 0.001 min."""
 _SAVED_CHARACTERS = 4
-"""Characters that another unit than the usual one must save."""
+"""Characters that SI must save to replace the usual unit."""
 _NUMBER = re.compile(
     r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![0-9.,])\s*(.*?)\s*", re.DOTALL
 )
@@ -103,7 +103,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]")
 _THOUSANDS = re.compile(r"\s*([+-]?[1-9][0-9]{0,2}(?:[ ,'_’][0-9]{3})+)(\.[0-9]+)?(?![0-9.,])")
 _NORMAL_LITRES = re.compile(r"[Nn](l|L|dm\^3|m\^3)/.*")
 _COUNTED = re.compile(r"(.*[a-z])[ *]?\(?([gGaA])(?:auge|bs|bsolute)?\)?", re.DOTALL)
-"""A unit of pressure, and whether it is over the ambient pressure or absolute, as in barg and bar(a)."""
+"""Unit of pressure with a mark for gauge or absolute, as in barg and bar(a)."""
 _DYNAMIC_VISCOSITIES = ("Pa*s", "mPa*s", "cP", "P")
 _SPELLINGS = MappingProxyType(
     {
@@ -164,7 +164,7 @@ def _parsed(text: object, dimension: str) -> float:
     if unit.factor != 1 or unit.offset != 0:
         top, bottom = Decimal(number).as_integer_ratio() if rough != 0 else (0, 1)
         up, down = unit.offset.numerator, unit.offset.denominator
-        # A quotient of whole numbers is rounded once, and much sooner there than one of fractions.
+        # A quotient of integers is rounded once, and computed much faster than one of fractions.
         exact = (top * down + up * bottom) * unit.factor.numerator
         value = exact / (bottom * down * unit.factor.denominator)
     value *= math.pi if unit.pi else 1.0
@@ -177,14 +177,14 @@ def _parsed(text: object, dimension: str) -> float:
 
 @lru_cache(4096)
 def _parsed_text(text: str, dimension: str) -> float:
-    """Scenes of a sweep have most of their texts in common."""
+    """SI value of a text, cached: scenes of a sweep share most of their texts."""
     return _parsed(text, dimension)
 
 
 def written_like(value: float, like: object, dimension: str) -> str:
-    """An SI value to its last bit, in the unit of the text that stands for another one.
+    """Text of an SI value to its last bit, in the unit of a similar text, such as "2 mm".
 
-    In SI where there is no such text, its unit does not give the value back, or that saves many digits.
+    In SI where there is no such text, where its unit does not return the value, or where SI saves digits.
     """
     kind = DIMENSIONS[dimension]
     plain = repr(value).removesuffix(".0")
@@ -201,7 +201,7 @@ def written_like(value: float, like: object, dimension: str) -> str:
 
 @lru_cache(1024)
 def _unit_of(text: str, dimension: str) -> str:
-    """Unit as the text writes it; empty where it is no quantity of this dimension."""
+    """Unit as spelled in a text; empty where the text is no quantity of this dimension."""
     kind = DIMENSIONS[dimension]
     try:
         unit = _split(text, kind)[1]
@@ -236,7 +236,7 @@ def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6)
 
 
 def unit_factor(unit: str) -> float:
-    """One unit in SI, its zero left out; 1 for "1", a number without unit."""
+    """Factor of a unit to SI, without its offset; 1 for "1", a number without unit."""
     if unit == "1":
         return 1.0
     entry = next(units[unit] for units in (kind.units for kind in DIMENSIONS.values()) if unit in units)
@@ -244,13 +244,13 @@ def unit_factor(unit: str) -> float:
 
 
 def shortest(value: float) -> str:
-    """The fewest digits that give a value back to 1e-6 of it."""
+    """Shortest text of a number that reads back within a relative 1e-6."""
     texts = (f"{float(f'{value:.{digits}g}'):.15g}" for digits in range(1, 16))
     return next(text for text in texts if math.isclose(float(text), value, rel_tol=_READS_BACK))
 
 
 def shortest_quantity(value: float, usual: str) -> str:
-    """An SI value to 1e-6 in its usual unit, or in that of SI where it is tiny or this saves digits."""
+    """Text of an SI value to 1e-6, in its usual unit; in SI where it is tiny or SI saves digits."""
     si = next(kind.si_unit for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
     tiny = abs(value) < _TINY * unit_factor(usual) and len(other) < len(plain)
@@ -300,7 +300,7 @@ def _respelled(text: str) -> str:
 
 @lru_cache(1024)
 def _canonical(unit: str) -> str:
-    """Spaces around operators go, a space between factors is a product, and m2 means m^2."""
+    """Standard spelling of a unit: no space around operators, * between factors, m^2 for m2."""
     tight = re.sub(r"\s*([*/()^])\s*", r"\1", unit)
     product = re.sub(r"\s+", "*", tight)
     return re.sub(r"(?<=m)(?=[23](?![0-9]))", "^", product)
@@ -326,7 +326,7 @@ def _wrong_unit(unit_text: str, kind: _Dimension) -> str:
     problem = f"{toml_text(unit)} is not a unit of {kind.noun}"
     if kind is DIMENSIONS["conductance"] and (normal := _NORMAL_LITRES.fullmatch(unit)):
         return f"{problem}: it counts gas at 0 degC and 101.325 kPa; 1 N{normal[1]} is 1.087 {normal[1]} ANR"
-    # A letter more or less is another unit: no hint but to what is spelled alike.
+    # One letter more or less is another unit: only a unit with the same letters and digits is suggested.
     alike = (each for each in kind.units if _letters(each) == _letters(unit))
     return f"{problem}{meant_text(next(alike, ''))}"
 
@@ -336,9 +336,9 @@ def _letters(unit: str) -> str:
 
 
 def counted_pressure(value: object, *, gauge: bool) -> object:
-    """A pressure without the mark of its unit, such as barg or psia, that says how it is counted.
+    """Text of a pressure without the gauge or absolute mark of its unit, as in barg or psia.
 
-    Raises: FieldError: counted in the other way.
+    Raises: FieldError: the mark contradicts `gauge`.
     """
     match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
     marked = _COUNTED.fullmatch(match[2]) if match else None
@@ -355,7 +355,7 @@ NO_UNIT: Final = "dimensionless"
 
 
 def plain_number(value: Any, unit: str) -> tuple[Any, float]:
-    """The number in a unit, and its standard deviation, zero where it has none; other values as they are.
+    """Number in a unit and its standard deviation, zero where it has none; other values unchanged.
 
     Args: `unit`: as scene files have it.
     Raises: ValueError: a quantity of another dimension.

@@ -55,23 +55,23 @@ from ringbalance.scene.draws import run_noise
 from ringbalance.scene.origins import SceneFile, with_values_at
 
 _LEAST_NOISE_FRACTION: Final = 0.01
-"""Least noise that a filter assumes, over the amplitude limit."""
+"""Smallest sensor noise that the filter assumes, as a fraction of the amplitude limit."""
 _WHIRL_DECAY_TIMES: Final = 12.0
-"""Time constants of the free whirl after which a run with eccentric masses starts to balance."""
+"""Waiting time before balancing starts, in time constants of the free whirl."""
 _MAX_GAIN_FACTOR: Final = 10.0
-"""Factor up to which a gain is tried."""
+"""Largest factor on a gain that is tried."""
 _REMEDY_DEVICES: Final = 8
-"""Devices whose runs decide which remedies are tried."""
+"""Number of devices whose runs decide which remedies are tried."""
 _SIZING_DEVICES: Final = 256
-"""Devices whose imbalance, without a run, sizes the masses."""
+"""Number of devices whose imbalances, without runs, size the masses."""
 
 
 class EccentricMassBalancer(Balancer):
     """Balancer of two masses that motors drive along one track.
 
-    A scene gives the rotor by mass, stiffness and damping, alpha = W^2/(K_B - M W^2 + j C_B W), and takes a
-    common one back as K_B = M W^2 + Re(W^2/alpha) and C_B = Im(W^2/alpha)/W, with the mass M of rotor and
-    balancer together, which alpha at one speed leaves open.
+    A scene gives mass, stiffness and damping of the rotor, hence alpha = W^2/(K_B - M W^2 + j C_B W).  A
+    rotor given by alpha at one speed W leaves the mass M of rotor and balancer open; with M known, K_B = M
+    W^2 + Re(W^2/alpha) and C_B = Im(W^2/alpha)/W.
     """
 
     energy_kind = "energy_electrical"
@@ -81,7 +81,7 @@ class EccentricMassBalancer(Balancer):
         self.scene, self._rotors = scene, rotors
 
     def settings(self) -> tuple[Setting, ...]:
-        """Gains of the drives, each at the scene's value and within its bounds."""
+        """Gains of the drives, each with the scene's value and its bounds."""
         lqr, friction = self.scene.lqr, self.scene.friction_filter
         values = {
             "lqr.state_weight": lqr.state_weight,
@@ -165,7 +165,8 @@ class EccentricMassBalancer(Balancer):
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
-        """Settled in time, at the latest when the speed changes, and what may remain where it is stated."""
+        """Demands: settled in time, at the latest when the speed changes, and the residual vibration if
+        stated."""
         scene, requirement = self.scene, self.scene.requirement
         until = (scene.steady_until or scene.run.time_limit) - scene.supervisor.start
         time = until if requirement.settling_time is None else requirement.settling_time
@@ -183,8 +184,8 @@ class EccentricMassBalancer(Balancer):
         return settles, residual
 
     def trials(self) -> tuple[Trials, ...]:
-        """Recommended gains of the drives, where the scene's have less margin: no other gain decides whether
-        masses settle."""
+        """Trials of the recommended gains of the drives, if the scene's gains have less margin; no other gain
+        decides whether masses settle."""
         changes = advised(self.scene)
         if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
             return ()
@@ -193,10 +194,10 @@ class EccentricMassBalancer(Balancer):
         return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """Parts of another size, and changes that help runs which end as those of some devices."""
+        """Parts of another size, and changes suited to the ways in which runs of some devices end."""
         nominal, sample = (self.run({}, draws) for draws in (AS_GIVEN, Draws.first(_REMEDY_DEVICES)))
         scenes = (device(self.scene, number, self._rotors).scene for number in range(_SIZING_DEVICES))
-        # Imbalance over what the masses cancel.
+        # Ratio of the imbalance to the largest that the masses cancel.
         ratios = [each.imbalance.mass * each.imbalance.radius / reach_of(each) for each in scenes]
         return tuple(remedies_of(self.scene, nominal, sample, ratios))
 
@@ -235,9 +236,10 @@ class EccentricMassBalancer(Balancer):
         )
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> EccentricMassBalancer:
-        """Masses opposite each other until the vibration is steady, with the sensor noise of both balancers.
+        """Balancer on a rotor, masses opposite each other until the vibration is steady, with the rotor's
+        noise.
 
-        A wrong assumption stays as wrong as it was. Raises: SceneError: no such rotor has these masses.
+        Errors of the assumed rotor keep their ratio. Raises: SceneError: no such rotor has these masses.
         """
         scene, before = self.scene, self.scene.rotor
         own_mass = before.mass + 2 * scene.masses.mass
@@ -316,7 +318,7 @@ class EccentricMassBalancer(Balancer):
 def _rescaled(
     scene: EccentricScene, after: EccentricRotor, rotor: CommonRotor, *, mass_ratio: float
 ) -> ImbalanceFilter:
-    """Imbalance filter on another rotor. Args: `mass_ratio`: mass with eccentric masses over that before."""
+    """Imbalance filter on another rotor. Args: `mass_ratio`: new over old mass, with eccentric masses."""
     before, keys = scene.rotor, scene.imbalance_filter
     noise = max(rotor.noise, _LEAST_NOISE_FRACTION * rotor.limit)
     louder, stiffer = noise / keys.position_noise, after.stiffness / before.stiffness

@@ -37,23 +37,23 @@ Strategy = Literal["whole", "locked"]
 CorrectionRule = Literal["measured", "trials"]
 
 _FINEST_FRACTION = 1e-5
-"""Noise that a filter assumes of exact sensors, as a fraction of the deviation that it expects at first."""
+"""Noise that a filter assumes of exact sensors, as a fraction of its initial standard deviation."""
 _FINEST_RATE_RAD_S = 1e-3
 _UNBALANCE_WALK_FRACTION = 0.01
-"""Walk of the unbalance within 1 s, as a fraction of what the noise of 1 s leaves unknown far above the
-critical speed: the filter averages over 100 s, longer than an estimation takes."""
+"""Random walk of the unbalance within 1 s, as a fraction of its standard deviation after 1 s of samples far
+above the critical speed: the filter averages over 100 s, longer than an estimation takes."""
 _VELOCITY_WALK_FRACTION = 0.03
 """Walk of the velocity likewise; its fraction is largest at the critical speed, where damping divides it."""
 _LONGEST_WAIT_S = 30.0
 
 
 def _capacity(mass: float, radius: float) -> float:
-    """Greatest static moment of the eccentric masses, kg m."""
+    """Largest static moment of the eccentric masses, kg m."""
     return 2 * mass * radius
 
 
 def _capacity_travel(mass: float, radius: float, rotor: float) -> float:
-    """Greatest static moment of the eccentric masses over the whole mass, m."""
+    """Largest static moment of the eccentric masses, divided by the total mass, m."""
     return _capacity(mass, radius) / (rotor + 2 * mass)
 
 
@@ -63,17 +63,18 @@ def _critical_velocity(travel: float, stiffness: float, rotor: float, mass: floa
 
 
 def _assumed_noise(noise: float, expected: float) -> float:
-    """Standard deviation that the filter assumes of a sensor: never so small that nothing else counts."""
+    """Standard deviation of a sensor that the filter assumes, with a lower bound for exact sensors."""
     return max(noise, _FINEST_FRACTION * expected)
 
 
 def _velocity_walk(noise: float, step: float, stiffness: float, rotor: float, mass: float) -> float:
-    """W_c^2 times the displacement that a second of samples leaves unknown, m/s in 1 s."""
+    """Random walk of the velocity within 1 s, m/s: a fraction of W_c^2 times the displacement noise of 1
+    s."""
     return _VELOCITY_WALK_FRACTION * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
 
 
 def _unbalance_walk(noise: float, step: float, rotor: float, mass: float) -> float:
-    """Whole mass times the displacement that a second of samples leaves unknown, kg m in 1 s."""
+    """Random walk of the unbalance within 1 s, kg m: a fraction of mass times displacement noise of 1 s."""
     return _UNBALANCE_WALK_FRACTION * (rotor + 2 * mass) * noise * math.sqrt(step)
 
 

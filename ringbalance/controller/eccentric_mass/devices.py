@@ -1,7 +1,7 @@
-"""Devices that a scene with eccentric masses may be: every uncertain input drawn by the device's number.
+"""Random devices of a scene with eccentric masses: every uncertain input drawn by the device's number.
 
-An input that [uncertainty] does not name has the scene's value, but for two that differ from one rotor to the
-next: the direction of the imbalance and, where nothing is stated of its size, that too.  Positive inputs are
+An input that [uncertainty] does not name has the scene's value, with two exceptions that differ from rotor to
+rotor: the direction of the imbalance, and its size if no uncertainty of it is stated.  Positive inputs are
 log-normal, so that no draw has to be clipped.
 """
 
@@ -35,18 +35,18 @@ class EccentricDevice:
     """Device drawn from a scene."""
 
     scene: EccentricScene
-    """Scene of its plant; a strategy is configured by the scene that it was drawn from."""
+    """Scene of the drawn plant; the strategy is configured by the scene before the draw."""
     inputs: Mapping[str, float]
-    """Quantile of everything that was drawn in its distribution, in (0, 1)."""
+    """Quantile of each drawn input in its distribution, in (0, 1)."""
 
 
 def device(scene: EccentricScene, number: int, rotors: Rotors | None = None) -> EccentricDevice:
-    """Draw a device by its number. Args: `rotors`: rotors that devices run on; default their own, drawn."""
+    """Draw a device by its number. Args: `rotors`: rotors of the devices; default drawn from the scene."""
     fitted, half_range = scene.fitted.quantities, scene.requirement.phase_range
     plant, inputs = scene, {}
 
     def draw(name: str) -> float:
-        """Standard normal deviate of an input over `NORMAL_95`; its quantile is noted."""
+        """Standard normal deviate of an input, divided by `NORMAL_95`; its quantile goes into `inputs`."""
         (normal,) = deviates(name, (number,), seed=scene.run.seed)
         (quantile,) = quantiles(name, (number,), seed=scene.run.seed)
         inputs[name] = float(quantile)
@@ -64,7 +64,7 @@ def device(scene: EccentricScene, number: int, rotors: Rotors | None = None) -> 
             move = partial(_scaled, exponent=math.log1p(width) * normal)
         else:
             move = partial(_moved, change=width * normal, linear=name == PHASE)
-        # Both entries of a list alike, but for those that were fitted.
+        # Both entries of a list get the same change, except those that were fitted.
         entries = [f"{name}[{i}]" for i in (0, 1)]
         alone = [path for path in entries if path not in fitted_paths]
         for path in [name] if len(alone) == 2 else alone:

@@ -1,8 +1,8 @@
-"""The law of the motors' voltages: torques of the rotor, of friction, and of the control of the masses.
+"""Drive law: motor voltages from the rotor's load, the friction and the position control of the masses.
 
-The rotor's acceleration is not measured but follows from its own equation, with the acceleration that the
-masses are about to have; friction is compensated in the sense in which the mass moves or, at rest, is meant
-to move.
+The rotor's acceleration is not measured; it follows from the rotor's equation of motion with the commanded
+acceleration of the masses.  Friction is compensated in the direction in which the mass moves or, at rest,
+should move.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.platform.compiled import in_place
 
 SMOOTHING_TIME_S: Final = 0.05
-"""Time constant of the angles and rates that arrival is judged by."""
+"""Time constant of the smoothed angles and rates by which arrival is judged."""
 SLOWEST_RATE_RAD_S: Final = 1e-3
-"""Rate below which a mass rests, however good the encoder."""
+"""Smallest rate below which a mass counts as resting, even with an exact encoder."""
 _BREAK_AWAY_SIGMA: Final = 3.0
-"""Standard deviations of a friction arm beyond its estimate with which a mass at rest is set going."""
+"""Standard deviations of the friction arm that are added to its estimate to break a resting mass away."""
 Pair = tuple[float, float]
 
 
@@ -39,11 +39,11 @@ class DriveLaw(NamedTuple):
     position_gain: float
     rate_gain: float
     breaks_away: bool
-    """True if friction is compensated so that a mass at rest breaks away; else it is not compensated."""
+    """True if friction is compensated, also for a mass at rest; False for no compensation."""
     slow: float
     """Rate below which a mass counts as resting, rad/s."""
     near: float
-    """Distance from its goal within which a resting mass is left to friction, rad."""
+    """Distance from its goal below which a resting mass gets no friction compensation, rad."""
 
     @classmethod
     def of(cls, scene: EccentricScene) -> DriveLaw:
@@ -69,7 +69,7 @@ class DriveLaw(NamedTuple):
 
 
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
-    """Rotor as configured in filter and controller; its mass includes the eccentric masses."""
+    """Rotor that filter and controller assume; its mass includes the eccentric masses."""
     assumed = scene.imbalance_filter
     mass = assumed.assumed_mass + 2 * scene.masses.mass
     return WhirlModel(mass, assumed.assumed_damping, assumed.assumed_stiffness)
@@ -82,10 +82,10 @@ def track_model(scene: EccentricScene) -> TrackModel:
 
 
 def lqr_gain(track: TrackModel, *, state_weight: float, input_weight: float) -> tuple[float, float]:
-    """Gains k_p, N m/rad, and k_d, N m s/rad, of u = -k_p (phi - phi_d) - k_d phi', of one mass by itself.
+    """Gains k_p, N m/rad, and k_d, N m s/rad, of u = -k_p (phi - phi_d) - k_d phi', for one mass alone.
 
     They minimise the integral of 0.1 q (phi - phi_d)^2 + 0.01 q phi'^2 + 0.1 r u^2, with q the state weight
-    and r the input weight, both above zero.  The spectrum of the cost factors: k_p^2 = q/r and
+    and r the input weight, both above zero.  Spectral factorisation gives k_p^2 = q/r and
     (C_add + k_d)^2 = C_add^2 + 2 (J + J_add) k_p + 0.1 q/r.
     Source: Eqs. 42 to 49 of the paper on eccentric masses, whose back-EMF in Eq. 42 lost the minus sign.
     """
@@ -116,7 +116,7 @@ def rotor_load(law: DriveLaw, motion: Motion, imbalance: complex, acceleration: 
 
     b (c_i a_y - s_i a_x) + J W' with the rotor's absolute acceleration a along its axes, from
     M a = -C_B (z' + j W z) - K_B z + theta (W^2 - j W') + b sum ((W + w_i)^2 - j (W' + w_i')) exp(j phi_i).
-    Args: `acceleration`: w_i' that the masses are about to have, rad/s^2.
+    Args: `acceleration`: commanded w_i', rad/s^2.
     Source: parts (a) of Eqs. 30 and 39 of the paper on eccentric masses, with the terms of the speed rate.
     """
     w, rate = motion.speed, motion.speed_rate
@@ -139,7 +139,7 @@ def steady_load(law: DriveLaw, motion: Motion) -> Pair:
 
 @in_place
 def _tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pair:
-    """Torque that carries each mass along with an acceleration of the track, N m."""
+    """Torque on each mass that an acceleration of the track requires, N m."""
     b, spin = law.track.moment, law.mass_inertia * motion.speed_rate
     (first, second), x, y = motion.angle, acceleration.real, acceleration.imag
     return (
@@ -152,15 +152,14 @@ def _tangential_load(law: DriveLaw, motion: Motion, acceleration: complex) -> Pa
 def friction_torque(
     law: DriveLaw, arm: float, deviation: float, speed: float, rate: float, distance: float
 ) -> float:
-    """Torque that makes up for friction, N m; zero for a resting mass that is near its goal.
+    """Torque that compensates friction, N m; zero for a resting mass near its goal.
 
-    mu b (W + w)^2 in the sense of w; at rest, where friction opposes whatever is about to move the mass, in
-    the sense of where the mass should go, and as large as friction may be: an arm that is estimated too small
-    would hold the mass where it is.
-    Args: `deviation`: standard deviation of the arm, m. `distance`: from where the mass is to where it should
-    be, rad; infinite for one that should keep going.
+    A moving mass: mu b (W + w)^2 in the direction of w.  A resting mass: towards the goal, with mu three
+    standard deviations above its estimate, since with an arm estimated too small the mass would stay held.
+    Args: `deviation`: standard deviation of the arm, m. `distance`: signed angle from mass to goal, rad;
+    infinite for a mass that should keep moving.
     Source: part (b) of Eq. 39 of the paper on eccentric masses, which prints the angle for the rate and gives
-    no torque at rest, so that a mass which friction holds stays held.
+    no torque at rest, so that a mass held by friction stays held.
     """
     if not law.breaks_away:
         return 0.0
@@ -182,5 +181,5 @@ def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> f
 
 @in_place
 def voltage_for(law: DriveLaw, torque: float) -> float:
-    """Voltage that gives a torque at standstill, as far as the supply allows, V."""
+    """Voltage for a torque at standstill, within the limit of the supply, V."""
     return min(max(torque / law.torque_per_volt, -law.maximum_voltage), law.maximum_voltage)

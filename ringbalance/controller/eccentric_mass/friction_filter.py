@@ -4,8 +4,8 @@ While a mass moves, with W the rotor's speed, w its own rate along the track and
 
     (J + J_add) w' = -C_add w - d mu b (W + w)^2 + tau,
 
-where tau is all that is known: the drive's torque less what the whirl and the rotor's speed rate ask for.
-Friction at rest is a set, not a number, so nothing is learnt from a mass that sticks.
+where tau is the known torque: that of the drive less the load by whirl and speed rate of the rotor.
+Friction at rest may take any value up to a bound, so that a sticking mass gives no information on it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class FrictionNoise(NamedTuple):
     acceleration: float
     """White noise on the mass's acceleration, rad^2/s^3."""
     arm: float
-    """Rate at which the friction arm may wander, m^2/s."""
+    """Random walk of the friction arm, variance per time, m^2/s."""
 
 
 FRICTION_FILTER: Final = np.dtype(
@@ -60,11 +60,11 @@ FRICTION_FILTER: Final = np.dtype(
 def _friction_flow(
     model: TrackModel, rate: float, arm: float, speed: float, torque: float, step: float, euler: bool
 ) -> tuple[float, float, float]:
-    """Carry a moving mass one step on, by the exponential Rosenbrock-Euler rule, which bears any step.
+    """Integrate a moving mass over one step by the exponential Rosenbrock-Euler rule, stable for any step.
 
-    Returns: w one step later, rad/s, d w/d w before, and d w/d mu, rad/(s m); the printed Jacobian carries
-        the arm once too often in d/d mu, and leaves the drive's inertia and back-EMF out.
-    Source: Eqs. 31 to 36 of the paper on eccentric masses, rederived.
+    Returns: w one step later, rad/s, its derivative by the w before, and by mu, rad/(s m).
+    Source: Eqs. 31 to 36 of the paper on eccentric masses, rederived: the printed Jacobian has a factor mu
+        too many in d/d mu, and lacks inertia and back-EMF of the drive.
     """
     direction = math.copysign(1.0, rate)
     load = direction * model.moment * (speed + rate) ** 2
@@ -88,9 +88,10 @@ def friction_step(
     step: float,
     euler: bool,
 ) -> None:
-    """Predict by the flow, its covariance by the flow's derivatives, and take in the encoder's rate.
+    """Predict estimate and covariance over one step, and correct them by the encoder's rate.
 
-    Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
+    Source: Eqs. 32 to 38 of the paper on eccentric masses, with `_friction_flow` as transition and Joseph's
+        update.
     """
     rate, by_rate, by_arm = _friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
     wander, r = noise.arm * step, noise.rate_variance
@@ -114,5 +115,5 @@ def friction_step(
 
 @in_place
 def friction_restart(estimate: Record, noise: FrictionNoise, measured_rate: float) -> None:
-    """Rate from the encoder alone, arm as estimated, of a mass that sticks or turns: no flow holds there."""
+    """Restart a mass that sticks or reverses: rate from the encoder alone, friction arm unchanged."""
     estimate.rate, estimate.rate_variance, estimate.covariance = measured_rate, noise.rate_variance, 0.0

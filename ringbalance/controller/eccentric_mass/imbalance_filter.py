@@ -5,7 +5,7 @@ turns at a constant speed W and the eccentric masses are locked to it:
 
     M (z'' + 2 j W z' - W^2 z) + C_B (z' + j W z) + K_B z = W^2 theta,    z = x + j y.
 
-With another speed rate than zero none of this holds.  The force of masses that move is, with
+This holds at a speed rate of zero only.  The force of masses that move is, with
 p = b sum exp(j phi_i), b sum [(W + phi_i')^2 - j phi_i''] exp(j phi_i) = W^2 p - 2 j W p' - p''.  With
 v = z' + p'/M in place of z' no acceleration is left, and no noise of an encoder is differentiated:
 
@@ -43,11 +43,11 @@ class WhirlModel(NamedTuple):
     """K_B, N/m."""
 
     def euler_step_limit(self, *, angular_velocity: npt.ArrayLike) -> FloatArray:
-        """Longest step at which the explicit Euler transition of the paper does not grow.
+        """Longest step at which the explicit Euler transition of the paper is stable, s.
 
         Each eigenvalue p of the whirl in the rotor's frame must keep |1 + p dt| at most 1, so
         dt = min(-2 Re p / |p|^2), with p = s - j W and s the roots of M s^2 + C_B s + K_B.
-        Returns: Longest step, s, of that shape; zero without damping.
+        Returns: Shape of the angular velocity; zero without damping.
         Source: follows from Eq. 14 of the paper on eccentric masses.
         """
         w = np.asarray(angular_velocity, dtype=np.float64)
@@ -58,19 +58,19 @@ class WhirlModel(NamedTuple):
 
 
 class FilterSettings(NamedTuple):
-    """Assumptions of the filter; noises are white and given as power per unit time."""
+    """Assumptions of the filter; process noises are white, given as variance per unit time."""
 
     model: WhirlModel
     acceleration_noise: float
     """Noise of the rotor's acceleration along each axis, m^2/s^3."""
     imbalance_noise: float
-    """Rate at which the imbalance may wander along each axis, kg^2 m^2/s."""
+    """Random walk of the imbalance along each axis, variance per time, kg^2 m^2/s."""
     start: tuple[float, float, float]
     """Standard deviations before the first sample of displacement, m, velocity, m/s, and imbalance, kg m."""
     step: float
-    """s."""
+    """Time between two samples of the filter, s."""
     laboratory: bool
-    """True if the sensor stands still, its sample turned back by the rotor's angle."""
+    """True if the sensor is fixed in space; its samples are turned back by the rotor's angle."""
     euler: bool
     """True for the paper's transition in place of the exact one."""
 
@@ -81,21 +81,21 @@ IMBALANCE_FILTER: Final = np.dtype(
         ("covariance", np.float64, (6, 6)),
         ("speed", np.float64),  # W that the matrices belong to, rad/s
         ("transition", np.float64, (6, 6)),  # to the state one step later
-        ("process", np.float64, (6, 6)),  # covariance that the process noise adds in one step
-        ("observation", np.float64, (4, 6)),  # what the sensor would show of a state
-        ("half", np.float64, (6, 6)),  # room for products
+        ("process", np.float64, (6, 6)),  # covariance of the process noise of one step
+        ("observation", np.float64, (4, 6)),  # matrix from state to noise-free sample
+        ("half", np.float64, (6, 6)),  # workspace for products
         ("cross", np.float64, (6,)),
     ]
 )
-"""The estimate, and everything that one step of the filter multiplies with."""
+"""Estimate, and the matrices of one step of the filter."""
 
 
 @compiled
 def _write_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
-    """Write the matrix that carries the state one step on, exactly: exp(A dt) in closed form.
+    """Write the exact transition over one step, exp(A dt), in closed form.
 
-    The whirl is an oscillator in the fixed frame, seen from the rotor; the imbalance adds what lies between
-    the steady whirl and where the oscillator would take it.
+    The deviation from the steady whirl is a free oscillation in the fixed frame, transformed to the rotor's
+    frame; the imbalance sets the steady whirl.
     Source: solution of Eq. 13 of the paper on eccentric masses.
     """
     mass, damping, stiffness = model
@@ -125,7 +125,7 @@ def _write_transition(model: WhirlModel, angular_velocity: float, step: float, o
 
 
 def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
-    """exp(A dt) of the filter's state, shape (6, 6)."""
+    """Exact transition exp(A dt) of the filter's state, shape (6, 6)."""
     out = np.empty((6, 6))
     _write_transition(model, angular_velocity, step, out)
     return out
@@ -140,7 +140,7 @@ def _write_identity(out: FloatArray) -> None:
 
 @in_place
 def _write_euler_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
-    """Write the paper's transition I + A dt, which keeps the steady whirl but not the way there.
+    """Write the paper's transition I + A dt, whose steady whirl is exact but whose transient is not.
 
     Source: Eq. 14 of the paper on eccentric masses.
     """
@@ -170,7 +170,7 @@ def _write_process(settings: FilterSettings, angular_velocity: float, out: Float
     for point in range(_GAUSS_POINTS.size):
         time = 0.5 * step * (1.0 + _GAUSS_POINTS[point])
         _write_transition(settings.model, angular_velocity, time, part)
-        # An element at a time, here and below: numba compiles expressions of arrays ten times as long.
+        # Element by element, here and below: numba takes ten times as long to compile array expressions.
         for i in range(6):
             for k in range(6):
                 grown[i, k] = 0.0
@@ -184,7 +184,7 @@ def _write_process(settings: FilterSettings, angular_velocity: float, out: Float
 
 @in_place
 def _sandwich(a: FloatArray, p: FloatArray, half: FloatArray) -> None:
-    """P <- A P A^T, symmetric to the last bit, by plain sums: too small for a library call to pay."""
+    """P <- A P A^T, symmetric to the last bit, in plain loops: at this size a library call does not pay."""
     for i in range(6):
         for k in range(6):
             half[i, k] = 0.0
@@ -203,10 +203,10 @@ def _sandwich(a: FloatArray, p: FloatArray, half: FloatArray) -> None:
 def set_speed(estimate: Record, settings: FilterSettings, speed: float) -> None:
     """Write the matrices at a speed, rad/s, into an element of type `IMBALANCE_FILTER`.
 
-    A laboratory sensor shows Z' = (z' + j W z) exp(j W t); turned back by the rotor's angle, which leaves the
-    noise as it is, that is z' + j W z.  A rotor-fixed sensor shows z'.
-    Source: Eq. 17 of the paper on eccentric masses, corrected: as printed it lets the imbalance into the last
-        row, where it is not seen.
+    A space-fixed sensor measures Z' = (z' + j W z) exp(j W t); turned back by the rotor's angle, which leaves
+    the noise unchanged, this is z' + j W z.  A rotor-fixed sensor measures z'.
+    Source: Eq. 17 of the paper on eccentric masses, corrected: its printed last row contains the imbalance,
+        which the velocity does not depend on.
     """
     estimate.speed = speed
     if settings.euler:
@@ -221,7 +221,7 @@ def set_speed(estimate: Record, settings: FilterSettings, speed: float) -> None:
 
 @in_place
 def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
-    """Write a state before the first sample: nothing moves; the imbalance stays as it is."""
+    """Write the state before the first sample: rotor at rest at its centre, imbalance as estimated before."""
     position, velocity, _ = settings.start
     for i in range(4):
         estimate.state[i] = 0.0
@@ -233,7 +233,7 @@ def begin_whirl(estimate: Record, settings: FilterSettings) -> None:
 
 @compiled
 def begin_filter(estimate: Record, settings: FilterSettings, speed: float) -> None:
-    """Write a state before the first sample, at a speed, rad/s: nothing moves or is out of balance.
+    """Write the state before the first sample, at a speed, rad/s: rotor at rest at its centre, no imbalance.
 
     Args: `estimate`: an element of type `IMBALANCE_FILTER`, of zeros.
     """
@@ -243,7 +243,7 @@ def begin_filter(estimate: Record, settings: FilterSettings, speed: float) -> No
 
 
 def imbalance_filter(settings: FilterSettings, *, speed: float) -> Records:
-    """Make a filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
+    """Filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
     estimate = np.zeros(1, dtype=IMBALANCE_FILTER)
     begin_filter(estimate[0], settings, speed)
     return estimate
@@ -257,9 +257,9 @@ class MassInput(NamedTuple):
     drift: complex
     """Integral of p'/M over the step, m."""
     covariance: tuple[float, float, float]
-    """Covariance that the encoders' angles give the imbalance, xx, xy and yy."""
+    """Covariance of the imbalance by encoder noise, xx, xy and yy, kg^2 m^2."""
     drift_variance: float
-    """Variance that the encoders' rates give each coordinate of the drift, m^2."""
+    """Variance of each coordinate of the drift by encoder noise, m^2."""
 
 
 def locked_masses(imbalance: complex) -> MassInput:
@@ -280,7 +280,7 @@ def mass_vector(moment: float, angle: Numbers, rate: Numbers) -> tuple[complex, 
 
 @in_place
 def encoder_covariance(moment: float, angle: Numbers, deviation: float) -> tuple[float, float, float]:
-    """Covariance of p, from encoders with this standard deviation, xx, xy and yy, kg^2 m^2."""
+    """Covariance of p by encoder noise of standard deviation `deviation`, xx, xy and yy, kg^2 m^2."""
     xx, xy, yy = 0.0, 0.0, 0.0
     for i in range(2):
         x, y = -moment * deviation * math.sin(angle[i]), moment * deviation * math.cos(angle[i])
@@ -290,7 +290,7 @@ def encoder_covariance(moment: float, angle: Numbers, deviation: float) -> tuple
 
 @in_place
 def predict(estimate: Record, masses: MassInput) -> None:
-    """Carry the estimate one step on; the drift acts half at its beginning and half at its end.
+    """Predict the estimate over one step; half of the drift acts at its beginning, half at its end.
 
     Source: Eqs. 14 and 15 of the paper on eccentric masses, with the whole force of moving masses.
     """
@@ -325,13 +325,13 @@ def predict(estimate: Record, masses: MassInput) -> None:
 
 @in_place
 def correct(estimate: Record, sample: Numbers, variance: Numbers) -> float:
-    """Take in one sample, one sensor after the other, in Joseph's form, and square its innovation.
+    """Correct the estimate by one sample, channel by channel; return the normalised innovation squared.
 
-    The latter, normalised, has a chi-square distribution of four degrees of freedom, independent of earlier
-    samples, when the model is right.
+    With a true model that square has a chi-square distribution with four degrees of freedom, independent of
+    earlier samples.
 
-    P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive whatever rounding does to the gain.
-    Args: `sample`, `variance`: x, y, x', y' and those of their sensors.
+    Joseph's form P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive despite round-off.
+    Args: `sample`, `variance`: x, y, x', y', and the noise variance of each.
     Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
     Processes with Applications to Guidance" (1968).
     """
@@ -355,7 +355,7 @@ def correct(estimate: Record, sample: Numbers, variance: Numbers) -> float:
 
 @in_place
 def _joseph(p: FloatArray, total: float, h: FloatArray, cross: FloatArray, r: float) -> None:
-    """P <- (I - k h) P (I - k h)^T + r k k^T in place; `cross` is P h^T, k that over `total`."""
+    """P <- (I - k h) P (I - k h)^T + r k k^T in place; `cross` is P h^T, k = `cross`/`total`."""
     for i in range(6):
         seen, gain = 0.0, cross[i] / total
         for k in range(6):
@@ -378,7 +378,7 @@ def imbalance_deviation(covariance: FloatArray) -> float:
 def imbalance_history(
     estimate: Records, *, samples: FloatArray, variance: FloatArray, masses: MassInput | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Run a filter over a record: predict, then take in the sample, for each.
+    """Run a filter over a record: for each sample, predict and then correct.
 
     Args: `estimate`: type `IMBALANCE_FILTER`, shape (1,), one step before the first sample; not changed.
     Returns: States, shape (n, 6), and covariances, shape (n, 6, 6), after each sample.

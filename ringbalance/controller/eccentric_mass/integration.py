@@ -1,10 +1,9 @@
-"""The plant in time: steps of fifth order, cut where a mass stops, sticks or breaks away.
+"""Time integration of the plant, with events where a mass stops, sticks or breaks away.
 
-Between such events the motion is smooth and a Runge-Kutta step of Dormand and Prince's fifth-order formula
-carries it; within the step that holds an event the event's time is found by bisection to the last digits,
-the mass is set to rest there, and the friction law gives what follows.  A step is divided until it is short
-against every rate of the plant.  While friction holds both masses at constant speed the step has a closed
-form.
+Between events the motion is smooth and integrated by the fifth-order Runge-Kutta formula of Dormand and
+Prince.  An event is located within its step by bisection to machine precision; the mass is set to rest there,
+and the friction law decides its further motion.  A step is divided until it is short compared with the time
+constants of the plant.  While friction holds both masses at constant speed the step has a closed form.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ _COUPLING: Final = np.array(
         [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
     ]
 )
-"""Weights of the earlier stages, a row for each of the six stages of the formula of order 5.
+"""Weights of the earlier stages, one row for each of the six stages.
 
 Source: Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980).
 """
@@ -62,7 +61,7 @@ _TIMES: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
 _WEIGHTS: Final = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
 """Weights of the stages in the result of order 5."""
 _LEAST_ROOT_DISTANCE: Final = 1e-6
-"""Least distance of both roots, relative: the closed form divides by it."""
+"""Smallest relative distance of the two roots: the closed form divides by their difference."""
 
 
 @compiled
@@ -76,9 +75,9 @@ def _smooth(
     work: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write the state one step later, with unchanged motions of the masses.
+    """Write the state one step later, for unchanged motions of the masses.
 
-    `work` has one row for each stage and one for the argument of the next.
+    Args: `work`: workspace, one row for each stage and one for the argument of the next.
     """
     argument = work[_STAGES]
     for stage in range(_STAGES):
@@ -105,7 +104,7 @@ def _broken(
     drive: Drive,
     motion: Motions,
 ) -> bool:
-    """Return True if a mass no longer moves, or is no longer held, as in `motion`."""
+    """Return True if the motion of a mass differs from `motion`: it has stopped or broken away."""
     if motion[0] * state[6] < 0.0 or motion[1] * state[7] < 0.0:
         return True
     held = (motion[0] == HELD and stuck[0] != LOCKED, motion[1] == HELD and stuck[1] != LOCKED)
@@ -128,7 +127,7 @@ def _first_event(
     work: FloatArray,
     out: FloatArray,
 ) -> float:
-    """Time just after the first event within a step, s; the state at that time is written."""
+    """Time just after the first event within a step, s; `out` gets the state at that time."""
     before, after = 0.0, step
     for trial in range(_BISECTIONS + 1):
         middle = 0.5 * (before + after)
@@ -158,7 +157,7 @@ def _advance(
     work: FloatArray,
     trial: FloatArray,
 ) -> None:
-    """Carry state and flags through one substep, event by event, in place."""
+    """Integrate state and flags over one substep, event by event, in place."""
     done = 0.0
     for event in range(_MAX_EVENTS):
         now = speed + drive.rate * done
@@ -173,7 +172,7 @@ def _advance(
         )
         if cut:
             done += _first_event(parameters, state, stuck, now, drive, motion, left, work, trial)
-        # An element at a time: numba compiles array assignment ten times as long.
+        # Element by element: numba takes ten times as long to compile an array assignment.
         for i in range(SIZE):
             state[i] = trial[i]
         if not cut or done >= step:
@@ -190,7 +189,7 @@ def _fastest_rate(parameters: PlantParameters, speed: float) -> float:
 
 @compiled
 def substeps(parameters: PlantParameters, speed: float, rate: float, step: float) -> int:
-    """Number of substeps that keeps each short against every rate of the plant. Returns: At least 1."""
+    """Number of substeps, at least 1, that keeps rate times substep within `MAX_RATE_PRODUCT`."""
     fastest = _fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
     return max(1, math.ceil(fastest * step / MAX_RATE_PRODUCT))
 
@@ -205,10 +204,10 @@ def plant_step(
     speed_rate: float,
     step: float,
 ) -> tuple[FloatArray, IntArray]:
-    """Carry the plant through one step, voltages held and the rotor's speed linear in time.
+    """Integrate the plant over one step, with constant voltages and the rotor's speed linear in time.
 
     Returns: State and flags at the end, as new arrays.
-    Range: the masses are points on the track; that they could touch is for the caller to prevent.
+    Range: the masses are points on the track; contact between them is not modelled.
     Source: Dormand and Prince (1980), the fifth-order formula.
     """
     after, flags = state.copy(), stuck.copy()
@@ -236,12 +235,12 @@ def _held_step(
     drive: Drive,
     step: float,
 ) -> bool:
-    """Carry the rotor through one step, in place, if both masses are certainly held; return True if so.
+    """Integrate the rotor over one step, in place, if both masses are certainly held; return True if so.
 
     The deviation d = z - z_s from the steady whirl obeys M D'' + C_B D' + K_B D = 0 for D = d exp(j W t), so
     d = d_1 exp((s_1 - j W) t) + d_2 exp((s_2 - j W) t), with s the roots of M s^2 + C_B s + K_B.  The track's
     acceleration is -W^2 z_s + s_1^2 d_1 ... + s_2^2 d_2 ...; since no root grows, the sum of the magnitudes
-    bounds what friction has to hold from now on.
+    bounds the load on friction from now on.
     """
     if drive.rate != 0.0 or speed == 0.0 or state[6] != 0.0 or state[7] != 0.0:
         return False
@@ -254,7 +253,7 @@ def _held_step(
     for i in range(2):
         moment += parameters.moment * complex(math.cos(state[4 + i]), math.sin(state[4 + i]))
     dynamic = complex(parameters.stiffness - mass * speed * speed, parameters.damping * speed)
-    # Without damping there is no steady whirl at the critical speed: friction then certainly holds nothing.
+    # Without damping there is no steady whirl at the critical speed, hence no bound on the load.
     steady = speed * speed * moment / dynamic if dynamic != 0 else complex(math.inf, 0.0)
     away, turning = complex(state[0], state[1]) - steady, complex(0.0, speed)
     velocity = complex(state[2], state[3])
@@ -323,7 +322,7 @@ def check_substeps(scene: EccentricScene) -> None:
     speed = max(abs(point.speed) for point in scene.rotor.speed_profile)
     whirl, damped = math.sqrt(plant.stiffness / plant.mass), plant.damping / plant.mass
     drive = plant.drive_damping / least
-    # Half of what the whole run may have: the other rates take their part.
+    # Half of the allowed substeps: the other rates need the rest.
     rate = 0.5 * MAX_SUBSTEPS * MAX_RATE_PRODUCT / duration
     most, lowest = "at most", "at least"
     rates = [
@@ -350,7 +349,7 @@ def check_substeps(scene: EccentricScene) -> None:
 
 
 def _substeps(scene: EccentricScene) -> float:
-    """Substeps of a whole run, from its speed at no more than 10,000 of the samples."""
+    """Number of substeps of a whole run, estimated from the speed at no more than 10,000 instants."""
     times, speeds = scene.rotor.profile
     samples = scene.samples
     instants = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
@@ -360,7 +359,7 @@ def _substeps(scene: EccentricScene) -> float:
 
 
 def intervals(scene: EccentricScene) -> Iterator[tuple[int, int]]:
-    """Yield the first sample of each interval between two reports of progress, and one past the last."""
+    """Yield first sample, and last sample plus one, of each interval between two reports of progress."""
     size = max(1, round(_INTERVAL_SUBSTEPS * scene.samples / _substeps(scene)))
     for begin in range(0, scene.samples, size):
         yield begin, min(begin + size, scene.samples)

@@ -13,8 +13,8 @@ Pair = tuple[float, float]
 
 NOT_YET: Final = -1.0
 MOVING, RELEASED, HELD = range(3)
-"""State of the drives: bringing the masses to their goal; off, as friction holds the masses; or holding them,
-because friction does not, or is not known to."""
+"""State of the drives: moving the masses to their goal; off, since friction holds the masses; or holding the
+masses, where friction is not certain to."""
 WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, CORRECTION, FINE_TUNING, REST, FAILED = range(9)
 """Stages of the strategy, with the paper's periods:
 
@@ -44,7 +44,7 @@ CAUSE_NAMES: Final = (
 
 
 class EccentricMeasurement(NamedTuple):
-    """Sample of everything that the strategy may look at."""
+    """Sample of all measured quantities."""
 
     time: float
     speed: float
@@ -56,7 +56,7 @@ class EccentricMeasurement(NamedTuple):
     position: complex
     """Displacement in the sensor's frame, m."""
     velocity: complex
-    """m/s."""
+    """Velocity in the sensor's frame, m/s."""
     angle: Pair
     """Angles of the masses, rad, not wrapped."""
     rate: Pair
@@ -64,60 +64,60 @@ class EccentricMeasurement(NamedTuple):
 
 
 _REAL: Final = (
-    "entered",  # when the stage was, s
-    "moving",  # since when the masses have been under way to the present goal, s
-    "arrived",  # since when they have been there, s; NOT_YET
-    "nearest",  # distance from the goal of the mass farther from it, rad, that was reached at `nearer`
-    "nearer",  # when the masses last came nearer by a noticeable angle, s
-    "averaging",  # from when on the vibration is averaged, s; NOT_YET while the masses move
-    "left",  # imbalance that the targets leave, kg m
+    "entered",  # time at which the present stage began, s
+    "moving",  # time at which the masses set out to the present goal, s
+    "arrived",  # time at which they arrived there, s, or NOT_YET
+    "nearest",  # largest distance of a mass from its goal, rad, at the time `nearer`
+    "nearer",  # last time at which the masses had come nearer by a noticeable angle, s
+    "averaging",  # time at which averaging of the vibration begins, s; NOT_YET while the masses move
+    "left",  # residual imbalance at the targets, kg m
     "objective",  # mean amplitude at the present goal, m; infinite before the first
     "short",  # largest distance from its goal at which friction held a mass after the last move, rad
-    "share",  # correction: of a whole step that is taken
+    "share",  # correction: fraction of the full step
     "least",  # fine tuning: objective at its best goal, m
-    "move_size",  # rad
-    "deviation",  # of the estimated imbalance, the largest in any direction, kg m
+    "move_size",  # fine tuning: travel of a mass in one move, rad
+    "deviation",  # largest standard deviation of the estimated imbalance in any direction, kg m
     "surprise",  # sum of the imbalance filter's normalised innovations squared
 )
 _WHOLE: Final = (
-    "sample",  # number of the next one
+    "sample",  # number of the next sample
     "stage",
     "cause",
     "hold",
     "averaged",  # samples in the mean
-    "saturated",  # 1 if the imbalance is more than the masses can undo
+    "saturated",  # 1 if the imbalance exceeds what the masses cancel
     "driven",  # samples of the friction stage, without its beginning
-    "stalled",  # those of them in which a mass was nearly at a standstill
-    "steps",  # of correction, taken so far
-    "move",  # of the four of fine tuning, the one that is tried now
-    "failed",  # moves in a row that were no better than staying
-    "done",  # 1 if the moves have become shorter than the search is to resolve
-    "running",  # 1 if the imbalance filter took in the last sample that was its turn
+    "stalled",  # number of `driven` with a mass nearly at standstill
+    "steps",  # number of correction steps so far
+    "move",  # fine tuning: index of the present move among the four
+    "failed",  # number of successive moves that brought no gain
+    "done",  # 1 if the moves are shorter than the resolution of the search
+    "running",  # 1 if the imbalance filter used the last sample that it was due
     "judged",  # samples in `surprise`
 )
 _COMPLEX: Final = (
     "total",  # sum of the rotor-fixed vibration in the mean, m
     "residual",  # correction: mean vibration at its best goal, m; infinite before the first mean
-    "corrected",  # imbalance for which the targets of that goal were, kg m
-    "aim",  # for which the present targets are, kg m
-    "position",  # smoothed, m, as velocity, angle and rate
+    "corrected",  # imbalance that belongs to the best goal, kg m
+    "aim",  # imbalance that belongs to the present targets, kg m
+    "position",  # smoothed displacement, m; velocity, angle and rate are smoothed as well
     "velocity",
-    "imbalance",  # as estimated, at last as the balanced rotor shows it, kg m
+    "imbalance",  # estimated imbalance, kg m; after balancing from the mean residual vibration
     "mass_vector",  # p = b sum exp(j phi_i) at the imbalance filter's last sample, kg m
-    "mass_pace",  # its time derivative
+    "mass_pace",  # time derivative of `mass_vector`, kg m/s
 )
 _PAIRS: Final = (
-    "goal",  # where the masses should be, rad, unwrapped
+    "goal",  # desired angles of the masses, rad, unwrapped
     "best_goal",  # correction: goal of the least mean vibration, rad
     "aimed",  # goal of the present step; friction may hold the masses short of it
-    "base",  # fine tuning: its best goal, rad
+    "base",  # fine tuning: best goal, rad
     "angle",
     "rate",
-    "torque",  # known torques summed over the samples since the friction filter's last step, N m
-    "motor",  # torques of the motors at standstill over the time of the friction stage, N m s
-    "back_emf",  # what their back-EMF took of these, likewise, N m s
-    "arm_doubt",  # standard deviation of the friction arms by the constants of motor and masses, m
-    "last_rate",  # as measured at that step
+    "torque",  # sum of known torques over the samples since the friction filter's last step, N m
+    "motor",  # time integral of the stall torque B_add V over the friction stage, N m s
+    "back_emf",  # time integral of the torque loss by back-EMF, N m s
+    "arm_doubt",  # standard deviation of the friction arms by uncertain constants of motor and masses, m
+    "last_rate",  # rate measured at the friction filter's last step, rad/s
     "voltage",
 )
 MEMORY: Final = np.dtype(
@@ -127,12 +127,12 @@ MEMORY: Final = np.dtype(
     + [(name, np.float64, (2,)) for name in _PAIRS]
     + [("filter", IMBALANCE_FILTER), ("friction", FRICTION_FILTER, (2,))]
 )
-"""State of the strategy, which changes from sample to sample."""
+"""State of the strategy between two samples."""
 HISTORY: Final = np.dtype(
     [
         ("state", np.float64, (8,)),  # of the plant
         ("voltage", np.float64, (2,)),  # V, from this sample on
-        ("energy", np.float64),  # electrical, taken since the start, J
+        ("energy", np.float64),  # electrical energy since the start, J
         ("stage", np.int64),
         ("cause", np.int64),
         ("hold", np.int64),
@@ -143,4 +143,4 @@ HISTORY: Final = np.dtype(
         ("friction_variance", np.float64, (2,)),  # m^2
     ]
 )
-"""Sample of a run; estimates of a filter are constant outside its stage."""
+"""One sample of a run; a filter's estimates are constant outside its stage."""

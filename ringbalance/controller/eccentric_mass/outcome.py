@@ -36,4 +36,4 @@ OF_DRIVES: Final = frozenset(
         EccentricOutcome.FRICTION_UNCERTAIN,
     }
 )
-"""Ends that drives bring about which are unstable or give more than friction takes."""
+"""Outcomes that unstable drives may cause, or drives that give more than friction takes."""

@@ -1,4 +1,4 @@
-"""The plant: rotor on its bearing, imbalance, two masses, motors, friction; in the frame that turns with it.
+"""Plant: rotor on its bearing, imbalance, two masses, motors and friction, in the rotor-fixed frame.
 
 With M = m_r + 2 m_b, b = m_b r_b, J = m_b r_b^2, U = m_im r_im, W the rotor's speed and W' its rate:
 
@@ -19,14 +19,13 @@ motor shaft, T_2 = J_2 theta_2'' + T_3 on gear B, equal power at each mesh, and 
 and the back-emf both oppose the motion.
 
 The imbalance mass is a part of m_r.  The state is [x, y, x', y', phi_1, phi_2, phi_1', phi_2'], angles not
-wrapped; beside it each mass is SLIDING, STUCK or LOCKED.  A locked mass is clamped to its track
+wrapped; in addition each mass has a flag: SLIDING, STUCK or LOCKED.  A locked mass is clamped to its track
 by a brake that no torque overcomes.
 
-Dry friction is a set-valued law: which masses are held, which slide, and which way.  A mass that slides is
-braked by mu_f b (W + phi')^2.  A mass at rest on its track is held by whatever torque it takes, up to
-mu_f b W^2; beyond that it breaks away in the direction of the torque.  Since phi'' enters both masses'
-equations, two masses at rest are looked at together: the mass matrix is positive definite, so exactly one of
-the nine combinations of held, forwards and backwards is consistent.
+Dry friction is a set-valued law.  A sliding mass is braked by mu_f b (W + phi')^2.  A mass at rest on its
+track is held by any torque up to mu_f b W^2; under a larger load it breaks away in the direction of the load.
+Since phi'' enters both masses' equations, two masses at rest are treated together: the mass matrix is
+positive definite, so exactly one of the nine combinations of held, forwards and backwards is consistent.
 
 Source: Eqs. (1) to (11) of the paper on eccentric masses, rederived; docs/eccentric-masses.md has the
 differences.
@@ -47,7 +46,7 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place
 
 Pair = tuple[float, float]
-"""Numbers of both masses."""
+"""Values of first and second mass."""
 Motions = tuple[int, int]
 
 
@@ -69,11 +68,11 @@ class PlantParameters(NamedTuple):
     inertia: float
     """J = m_b r_b^2 of one eccentric mass, kg m^2."""
     drive_inertia: float
-    """Motor and gear B reflected to phi, kg m^2."""
+    """J_add, inertia of motor and gear B reflected to phi, kg m^2."""
     drive_damping: float
-    """Back-emf reflected to phi, N m s."""
+    """C_add, damping by back-emf reflected to phi, N m s."""
     drive_gain: float
-    """Torque on a mass per motor voltage, N m/V."""
+    """B_add, torque on a mass per motor voltage, N m/V."""
     friction_arm: Pair
     """mu_f of each mass, m."""
     gear_ratio: float
@@ -83,13 +82,13 @@ class PlantParameters(NamedTuple):
     resistance: float
     """R_m, ohm."""
     maximum_voltage: float
-    """V; infinite for no limit."""
+    """Voltage limit of the supply, V; infinite for none."""
 
     def influence(self, speed: float) -> complex:
-        """Steady vibration per unbalance.
+        """Influence coefficient: steady vibration per unbalance, complex, m/(kg m).
 
         alpha = W^2 / (K_B - M W^2 + j C_B W).
-        Returns: m/(kg m), complex: the lag is minus its phase.
+        The lag is minus its phase.
         Raises: ValueError: no damping, at the critical speed.
         """
         stiffness = complex(self.stiffness - self.mass * speed**2, self.damping * speed)
@@ -98,10 +97,9 @@ class PlantParameters(NamedTuple):
         return speed**2 / stiffness
 
     def steady_whirl(self, speed: float, angles: Sequence[float]) -> complex:
-        """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track.
+        """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track, m.
 
-        alpha (U exp(j phi_m) + b sum exp(j phi_i)).
-        Returns: m, complex; its magnitude is the zero-to-peak vibration.
+        z = alpha (U exp(j phi_m) + b sum exp(j phi_i)); its magnitude is the zero-to-peak vibration.
         Raises: ValueError: no damping, at the critical speed.
         """
         masses = sum(cmath.exp(1j * angle) for angle in angles)
@@ -110,7 +108,7 @@ class PlantParameters(NamedTuple):
 
     @classmethod
     def of(cls, scene: EccentricScene) -> PlantParameters:
-        """Gather the plant's constants.
+        """Derive the plant's constants from a scene.
 
         J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2,
         B_add = K_i / R_m N_3/N_1.
@@ -140,8 +138,8 @@ class PlantParameters(NamedTuple):
 
 
 def rotor_record(scene: EccentricScene) -> dict[str, float | None]:
-    """Critical speed, rad/s, amplification factor, and the phase of what the masses leave of the unbalance
-    where they start, rad in the rotor's frame; plain numbers.
+    """Critical speed, rad/s, amplification factor, and phase of the resultant of unbalance and masses at
+    their initial angles, rad in the rotor's frame; plain numbers.
     """
     plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
     left = cmath.rect(plant.unbalance, plant.phase) + sum(cmath.rect(plant.moment, each) for each in angles)
@@ -232,7 +230,7 @@ def slips(torques: _Torques, mass: int, other_acceleration: float) -> bool:
 
 @in_place
 def _consistent(torques: _Torques, motion: Motions, loose: tuple[bool, bool]) -> bool:
-    """Return True if motions of masses at rest are consistent; a mass that already moves is not looked at."""
+    """Return True if motions of masses at rest are consistent; a mass that already moves is skipped."""
     acceleration = angular_accelerations(torques, motion)
     for i in range(2):
         if loose[i]:
@@ -260,7 +258,7 @@ def motions(torques: _Torques, state: FloatArray, stuck: IntArray) -> Motions:
             motion = (first if loose[0] else present[0], second if loose[1] else present[1])
             if _consistent(torques, motion, loose):
                 return motion
-    # Only rounding can bring us here: the torques are at their bounds.
+    # Reached by round-off only: the torques are at their bounds.
     return present
 
 
@@ -268,7 +266,7 @@ SIZE: Final = 8
 
 
 class Drive(NamedTuple):
-    """Inputs of the plant while a step lasts."""
+    """Inputs of the plant during one step."""
 
     unbalance_x: float
     """U cos phi_m, kg m."""
@@ -292,7 +290,7 @@ class _Loads(NamedTuple):
 
 @in_place
 def _limited(voltage: float, maximum: float) -> float:
-    """A voltage cut to what the supply can give, which may be infinite."""
+    """Voltage limited to the supply's maximum, which may be infinite, V."""
     return min(max(voltage, -maximum), maximum)
 
 
@@ -381,11 +379,10 @@ def stuck_flags(flag: int) -> IntArray:
 def electrical_energy(
     parameters: PlantParameters, before: FloatArray, after: FloatArray, command: FloatArray, step: float
 ) -> float:
-    """Energy that both motors take from the supply while their voltages are held.
+    """Energy that both motors take from the supply in one step of constant voltages, J.
 
     E = sum V (V h - K_m n (phi(t + h) - phi(t))) / R_m, the exact integral of V i; negative when a motor
     feeds back.
-    Returns: J.
     Source: Kirchhoff's law for the motor without inductance, Eqs. (A1) to (A3) of the paper on eccentric
     masses.
     """

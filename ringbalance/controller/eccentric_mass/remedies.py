@@ -1,8 +1,8 @@
-"""Changes of a scene with eccentric masses to try where too few devices meet the requirements.
+"""Changes of a scene with eccentric masses to try if too few devices meet the requirements.
 
-Masses and their arm are sized by the imbalances of drawn devices, which needs no run; a higher limit by the
-vibration that runs come down to; unstable gains by their loops' poles.  Further changes follow from the ends
-of runs, by factors: runs of the changed scene show which suffice.
+Masses and their radius are sized by the imbalances of random devices, without a run; a higher limit by the
+residual vibration of runs; unstable gains by their loops' poles.  Further changes, by fixed factors, follow
+from the outcomes of runs; runs of the changed scene show which changes suffice.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.origins import raw_value_at, value_at
 
 _MAX_KINDS: Final = 4
-"""Kinds of change that are tried by the ends of runs."""
+"""Number of kinds of change that are tried for the outcomes of runs."""
 _SIZE_FACTORS: Final = (1.05, 1.5)
-"""Masses to try over those that cancel the imbalance of nearly every device."""
+"""Masses to try, over the mass that cancels the imbalance of nearly every device; radii likewise."""
 _SIZING_QUANTILE: Final = 0.99
-"""Quantile of the devices' imbalances that masses are sized by."""
+"""Quantile of the devices' imbalances by which masses are sized."""
 _NOISE_FACTORS: Final = {"": (0.5, 0.25), "finer_": (0.05,)}
-"""Noises of a sensor to try over its present one; a twentieth is tried even where half helps no device."""
+"""Sensor noises to try, over the present noise; a twentieth is tried even if half helps no device."""
 _WAIT_FACTORS: Final = (0.5, 0.25, 0.125)
-"""Waits to try over the present one, before the vibration is averaged: they set the strategy's pace."""
+"""Waiting times before averaging to try, over the present one: they set the strategy's pace."""
 _LIMIT_FACTORS: Final = (1.2, 2.0)
-"""Limits to try over the largest amplitude that the drawn devices come down to."""
+"""Amplitude limits to try, over the largest residual amplitude of the random devices."""
 _BLIND: Final = frozenset(
     {
         EccentricOutcome.RISES_AGAIN,
@@ -44,7 +44,7 @@ _BLIND: Final = frozenset(
         EccentricOutcome.TIME_LIMIT,
     }
 )
-"""Ends of runs that less noise may mend."""
+"""Outcomes that less sensor noise may improve."""
 _SENSORS: Final[Mapping[str, tuple[str, ...]]] = {
     "encoder": ("sensor.encoder_noise", "sensor.encoder_rate_noise"),
     "sensor": (
@@ -54,7 +54,7 @@ _SENSORS: Final[Mapping[str, tuple[str, ...]]] = {
         "imbalance_filter.velocity_noise",
     ),
 }
-"""Noises by the part that has them; a filter assumes what its sensor has."""
+"""Noise keys by sensor, with those of the filter that assumes this noise."""
 _STRONGER: Final = ("friction_filter.speed_gain", "friction_filter.drive_speed", "motor.maximum_voltage")
 _WALKS: Final = ("friction_filter.rate_walk", "friction_filter.friction_walk")
 _BY_END: Final[Mapping[EccentricOutcome, tuple[tuple[Mapping[str, float | str], ...], ...]]] = {
@@ -84,26 +84,26 @@ _BY_END: Final[Mapping[EccentricOutcome, tuple[tuple[Mapping[str, float | str], 
     ),
     EccentricOutcome.DIVERGED: (({"lqr.state_weight": 1 / 30, "friction_filter.speed_gain": 0.25},),),
 }
-"""Kinds of change by the ends of runs, each with its sizes: factors of a value, or the new value."""
+"""Kinds of change by outcome, each with its sizes: factors on a value, or the new value."""
 
 
 def remedies_of(
     scene: EccentricScene, nominal: Outcomes, sample: Outcomes, imbalances: Sequence[float]
 ) -> Iterator[Remedy]:
-    """Yield every change by itself: larger parts, those that help such ends, less noise, another limit.
+    """Yield single changes: larger parts, changes for the outcomes of runs, less noise, another limit.
 
-    Changes of one kind follow each other with the smallest first.
+    Changes of one kind follow each other, the smallest first.
 
-    Args: `nominal`: runs of the scene's device. `sample`: runs of some drawn devices. `imbalances`: those of
-        many devices, over what the masses cancel.
+    Args: `nominal`: run of the scene's device. `sample`: runs of some random devices. `imbalances`: of many
+        devices, over the largest imbalance that the masses cancel.
     """
-    # Heavier masses, or farther out, where some devices have more imbalance than they cancel.
+    # Heavier masses, or a larger radius, if some devices have more imbalance than the masses cancel.
     needed = float(np.quantile(imbalances, _SIZING_QUANTILE))
     for code, path in (("mass", "masses.mass"), ("guide_radius", "masses.guide_radius")):
         for factor in _SIZE_FACTORS if needed > 1.0 else ():
             value = _rounded_up(factor * needed * value_at(scene, path))
             yield Remedy(code=code, changes={path: value}, continuous=True)
-    # Gains that the drives bear, and the transition that bears every step.
+    # Gains with which the drives are stable, and the transition that is stable at any step.
     stable = all(loop.stable for loop in RecommendedGains.of(scene).loops)
     if not stable:
         yield Remedy(code="gains", changes=advised(scene))
@@ -121,7 +121,7 @@ def remedies_of(
             ):
                 finer = {path: factor * value for path, value in values.items() if value > 0}
                 yield Remedy(code=prefix + code, changes=finer)
-    # A limit as low as a required residual; or as high as what runs reach, below the vibration before.
+    # A limit at the required residual; or at what runs reach, if below the vibration before balancing.
     limit, residual = scene.supervisor.limit, scene.requirement.residual
     reached = float(np.max(sample.final_amplitude))
     if residual is not None and residual < limit:
@@ -135,9 +135,9 @@ def remedies_of(
 
 
 def _by_ends(scene: EccentricScene, ended: Counter[str], *, stable: bool) -> Iterator[Remedy]:
-    """Yield changes for the commonest end first; none that sets what the scene has, or that it leaves open.
+    """Yield changes for the outcomes, the most frequent first; none of a value equal to the scene's or unset.
 
-    Args: `stable`: True if the loops of the drives are: others do not come to an end in any time.
+    Args: `stable`: True if the loops of the drives are stable; with unstable ones more time does not help.
     """
     kinds: dict[str, list[Settings]] = {}
     for end, _ in ended.most_common():
@@ -161,6 +161,6 @@ def _by_ends(scene: EccentricScene, ended: Counter[str], *, stable: bool) -> Ite
 
 
 def _rounded_up(value: float) -> float:
-    """Round up to two digits."""
+    """Round up to two significant digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return float(f"{math.ceil(value / unit * (1 - 1e-12)) * unit:.2g}")

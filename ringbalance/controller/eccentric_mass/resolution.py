@@ -1,9 +1,10 @@
-"""Uncertainty of the estimated imbalance by that of the rotor.
+"""Uncertainty of the estimated imbalance by the uncertainty of the rotor.
 
-In a steady whirl the filter finds (D_b/D)(theta + p) - p_b, with D = K_B - M W^2 + j C_B W of the rotor, D_b
-as configured and p = b sum exp(j phi_i) of the masses.  An estimation takes in the start's transient as well,
-from which a wrong bearing takes up to half as much again: so the filter is given, without noise, the whirl of
-a rotor that is one standard deviation off in one input, and the difference of its estimates counts.
+In a steady whirl the filter estimates (D_b/D)(theta + p) - p_b, with D = K_B - M W^2 + j C_B W of the rotor,
+p = b sum exp(j phi_i) of the masses, and D_b, p_b as configured.  The initial transient, which enters the
+estimation as well, increases the error by a wrong bearing by up to half.  Therefore the filter is run,
+without noise, on the whirl of a rotor with one input off by one standard deviation; the change of the
+estimate counts.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ from ringbalance.controller.eccentric_mass.settings import filter_settings, off_
 from ringbalance.scene.arrays import FloatArray
 
 _MAX_STEPS = 2_000
-"""Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""
+"""Largest number of steps of the simulated estimation; longer steps have proportionally less noise."""
 _INPUTS = ("rotor.mass", "rotor.stiffness", "rotor.damping", "masses.mass", "masses.guide_radius")
 
 
 def rotor_covariance(
     scene: EccentricScene, *, imbalance: complex, speed: float, begin: float, duration: float
 ) -> FloatArray:
-    """Covariance that the stated uncertainties of rotor and masses give an imbalance, kg^2 m^2.
+    """Covariance of an estimated imbalance by the stated uncertainties of rotor and masses, kg^2 m^2.
 
-    Args: `imbalance`: estimated, kg m. `speed`: at which it was estimated, rad/s. `begin`, `duration`: of the
-    estimation, s.
+    Args: `imbalance`: value from the filter, kg m. `speed`: speed during the estimation, rad/s. `begin`,
+    `duration`: of the estimation, s.
     Returns: Shape (2, 2), along the rotor's axes; zero without stated uncertainties, and for a rotor at rest.
     """
     covariance, plants = np.zeros((2, 2)), list(off_by_one(scene, _INPUTS))
@@ -48,7 +49,7 @@ def rotor_covariance(
     masses = locked_masses(_initial_vector(scene))
 
     def estimated(plant: EccentricScene) -> FloatArray:
-        """Imbalance that the filter estimates of this rotor, which starts from rest."""
+        """Imbalance that the filter estimates on this rotor, started from rest, kg m along both axes."""
         rotor, drive = plant.rotor, imbalance + _initial_vector(plant)
         model = WhirlModel(rotor.mass + 2 * plant.masses.mass, rotor.damping, rotor.stiffness)
         state = np.array([0.0, 0.0, 0.0, 0.0, drive.real, drive.imag])
@@ -70,6 +71,6 @@ def rotor_covariance(
 
 
 def _initial_vector(scene: EccentricScene) -> complex:
-    """p = b sum exp(j phi_i) of the masses where they start, kg m."""
+    """p = b sum exp(j phi_i) of the masses at their initial angles, kg m."""
     moment = scene.masses.mass * scene.masses.guide_radius
     return moment * sum(cmath.exp(1j * angle) for angle in scene.masses.initial_angle)

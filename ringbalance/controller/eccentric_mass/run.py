@@ -39,14 +39,14 @@ from ringbalance.scene.platform.compiled import compiled
 Seed = int | np.random.Generator | None
 """Seed of random numbers, or their generator."""
 SENSOR_NOISES = 8
-"""Random numbers that one sample takes: four of vibration, two angles, two rates."""
+"""Random numbers per sample: four of vibration, two of angles, two of rates."""
 _MAX_WHIRL = 1e3
-"""Largest displacement over the radius of the masses' track: the plant is linear in the displacement, which
-no bearing is far below this."""
+"""Largest ratio of displacement to track radius: the plant is linear in the displacement; real bearings are
+not, far below this."""
 _MAX_TURN_RAD = 1e3
-"""Largest travel of a mass within one sample: more than a hundred turns, which no sampled loop controls."""
+"""Largest travel of a mass within one sample, more than a hundred turns: no sampled loop controls that."""
 _MAX_NUMBER = 1e100
-"""Largest number in a history, whatever its unit, so that squares and products of it are finite."""
+"""Largest number in a history, in any unit: its squares and products stay finite."""
 
 
 class _Machine(NamedTuple):
@@ -83,7 +83,7 @@ class _Machine(NamedTuple):
 def _measure(
     machine: _Machine, settings: StrategySettings, state: FloatArray, time: float, numbers: FloatArray
 ) -> EccentricMeasurement:
-    """Sample that the sensors show. Args: `numbers`: standard normal, shape (8,)."""
+    """Sample of the sensors, with noise. Args: `numbers`: standard normal deviates, shape (8,)."""
     speed, speed_rate = speed_at(machine.times, machine.speeds, time)
     turn = turned(machine.times, machine.speeds, time)
     position, velocity = complex(state[0], state[1]), complex(state[2], state[3])
@@ -127,7 +127,7 @@ def _run_interval(
             voltage[0], voltage[1] = memory.voltage[0], memory.voltage[1]
         row = history[i]
         row.stage, row.cause, row.hold = memory.stage, memory.cause, memory.hold
-        # An element at a time: numba compiles array assignment ten times as long.
+        # Element by element: numba takes ten times as long to compile an array assignment.
         for k in range(8):
             row.state[k] = state[k]
         for k in range(2):
@@ -157,7 +157,7 @@ def simulate_eccentric(
     Args: `seed`: seed of numpy's default generator for the sensors' noise; default the scene's. `progress`:
     called several times a second. `settings`: constants of the strategy; default those of the scene.
     Returns: EccentricRun; its status says how the run ended and what to do next. A run that diverges ends at
-    the last sample that means anything.
+    its last valid sample.
     Raises: SceneError: a run that takes too many samples or steps.
     Source: Fig. 3 of the paper on eccentric masses.
     """
@@ -192,5 +192,5 @@ def simulate_eccentric(
 
 
 def locked_run(scene: EccentricScene) -> EccentricRun:
-    """Run the rotor with the masses clamped where they start: without balancing."""
+    """Run the rotor without balancing: masses clamped at their initial angles."""
     return simulate_eccentric(replace(scene, supervisor=replace(scene.supervisor, strategy="locked")))

@@ -42,29 +42,30 @@ from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArr
 from ringbalance.scene.uncertain import NORMAL_95
 
 _ROUNDING_FRACTION: Final = 1e-6
-"""Fraction of the limit below which a vibration is round-off."""
+"""Vibration that counts as round-off, as a fraction of the limit."""
 _FINAL_TIME_S: Final = 1.0
 """Time over which the final amplitude is averaged."""
 _NOTICEABLE_STALL_FRACTION: Final = 0.05
-"""Fraction of the friction stage with a mass nearly at a standstill that deserves a warning."""
+"""Fraction of the friction stage with a mass nearly at standstill beyond which a warning is given."""
 _WRONG_MODEL_INNOVATION: Final = 1.5
-"""Mean normalised innovation squared beyond which the filter's model is called wrong; chance alone keeps it
-within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
+"""Mean normalised innovation squared beyond which the filter's model counts as wrong; for a true model it is
+1 +- 0.1 after 100 samples, by the chi-square distribution."""
 _SATURATED_FRACTION: Final = 0.5
-"""Fraction of a run with a voltage at its limit, beyond which that is what keeps masses from their goals."""
+"""Fraction of a run with a voltage at its limit beyond which that is the reason why masses miss their
+goals."""
 _RUN_AWAY_TURNS: Final = 5.0
-"""Turns of a mass beyond which it does not come to its goal: all moves together are shorter."""
+"""Turns beyond which a mass has run away: all moves of a strategy together are shorter."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StageSpan:
-    """Stage of the strategy, as a run went through it."""
+    """Stage of the strategy in a run, with start and end."""
 
     name: str
     start: float
-    """s."""
+    """Start, s."""
     end: float
-    """s."""
+    """End, s."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -89,7 +90,7 @@ class EccentricRun(PresentedResult):
     @property
     def innovation(self) -> float | None:
         """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without
-        any."""
+        samples."""
         judged = int(self.memory["judged"])
         return float(self.memory["surprise"]) / (4 * judged) if judged else None
 
@@ -160,13 +161,13 @@ class EccentricRun(PresentedResult):
 
     @property
     def diverged(self) -> bool:
-        """True if the run ended early, at the last sample that means anything."""
+        """True if the run diverged and ended early, at its last valid sample."""
         return self.time.size < self.scene.samples
 
     @cached_property
     def left(self) -> int | None:
-        """Sample of the largest vibration above the limit after the rotor was balanced to within it; None for
-        none.
+        """Sample of the largest vibration above the limit after the rotor was balanced within it; None if it
+        stays within.
         """
         done = np.isin(self.history["cause"], (BALANCED, SPEED_CHANGED))
         within = np.flatnonzero(done & (self.amplitude <= self.limit))
@@ -177,30 +178,29 @@ class EccentricRun(PresentedResult):
 
     @cached_property
     def within_since(self) -> float | None:
-        """Recorded instant from which on the amplitude is not above the limit to the end, s; None: it ends
-        above.
-        """
+        """Time of the first sample from which on the amplitude stays within the limit, s; None if it ends
+        above."""
         above = np.flatnonzero(self.amplitude > self.limit)
         first = int(above[-1]) + 1 if above.size else 0
         return None if first == self.time.size else float(self.time[first])
 
     @cached_property
     def outcome(self) -> EccentricOutcome:
-        """SETTLED when the true amplitude stays within the limit to the end, whatever the strategy does."""
+        """Outcome; SETTLED if the true amplitude stays within the limit to the end, in any stage."""
         if self.diverged:
             return EccentricOutcome.DIVERGED
         speed, memory = self.speed, self.memory
         last_cause = cause = int(self.history["cause"][-1])
         if cause == LOCKED_MASSES:
             return EccentricOutcome.LOCKED
-        # A run that ends within a stage may show already why the stage would have failed.
+        # A run that ends within a stage may already show why the stage would have failed.
         if self.stage == IMBALANCE and abs(speed[-1]) < self.scene.supervisor.lowest_speed:
             cause = TOO_SLOW
         elif self.stage == IMBALANCE and speed.size > 1 and speed[-1] != speed[-2]:
             cause = SPEED_NOT_CONSTANT
         elif self.stage == FRICTION and memory["stalled"] > STALLED_SHARE * memory["driven"]:
             cause = STALLED
-        # The amplitude of a rotor that hardly turns proves nothing.
+        # The amplitude of a rotor that is too slow proves nothing.
         if cause != TOO_SLOW and self.within_since is not None and self.left is None:
             return EccentricOutcome.SETTLED
         if last_cause == BALANCED:
@@ -225,7 +225,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def friction_known(self) -> bool:
-        """True if the friction stage came to its end: then its drives have done what they are for."""
+        """True if the friction stage was completed, hence its drives suffice."""
         return bool(np.any(self.history["stage"] == POSITIONING))
 
     @property
@@ -260,7 +260,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def stages(self) -> tuple[StageSpan, ...]:
-        """Stages that the strategy went through, one after the other."""
+        """Stages of the strategy in order of time."""
         stage, time = self.history["stage"], self.time
         edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
         return tuple(
@@ -270,7 +270,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def targets(self) -> Targets | None:
-        """Targets for the imbalance as it was estimated; None when the run did not come to that."""
+        """Targets for the estimated imbalance; None if the run ended before the estimate."""
         if not self.friction_known:
             return None
         x, y = self.history["imbalance"][-1]
@@ -279,7 +279,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def unbalanced_amplitude(self) -> float:
-        """Steady amplitude that the masses' initial angles would give at the last speed, m."""
+        """Steady amplitude with the masses at their initial angles, at the last speed, m."""
         speed = float(self.speed[-1])
         if speed == 0:
             return 0.0
@@ -292,7 +292,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def residual_ratio(self) -> float | None:
-        """Final amplitude over that of the initial angles at this speed; None where nothing would vibrate."""
+        """Final amplitude over `unbalanced_amplitude`; None if the latter is zero."""
         unbalanced = self.unbalanced_amplitude
         return None if unbalanced < _ROUNDING_FRACTION * self.limit else self.final_amplitude / unbalanced
 
@@ -303,7 +303,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def worst_amplitude(self) -> float:
-        """Largest true vibration on the way, m."""
+        """Largest true vibration amplitude of the run, m."""
         return float(np.max(self.amplitude))
 
     @property
@@ -315,13 +315,13 @@ class EccentricRun(PresentedResult):
 
     @property
     def least_gap(self) -> float:
-        """Smallest angle between the masses on the way, rad."""
+        """Smallest angle between the masses during the run, rad."""
         first, second = self.mass_angle
         return float(np.min(np.abs(np.pi - np.mod(np.pi - (second - first), 2 * np.pi))))
 
     @property
     def run_away(self) -> float:
-        """Turns that a mass has made from where it first set out to its goal, to where it is at the end."""
+        """Largest net travel of a mass from the start of positioning to the end of the run, turns."""
         if not self.friction_known:
             return 0.0
         start = int(np.argmax(self.history["stage"] == POSITIONING))
@@ -334,7 +334,7 @@ class EccentricRun(PresentedResult):
         if self.outcome is EccentricOutcome.RISES_AGAIN:
             code, worst = "masses_not_kept", self.left
             if worst is not None:
-                # Either masses have moved, or the speed magnifies what they left.
+                # Either masses have moved, or the new speed magnifies the residual imbalance.
                 first = int(np.argmax(self.history["cause"] == BALANCED))
                 moved = np.abs(self.mass_angle[:, first : worst + 1] - self.mass_angle[:, [first]])
                 still = np.max(moved, initial=0.0) <= supervisor.arrival_angle
@@ -416,7 +416,7 @@ def _stalled_fraction(run: EccentricRun) -> float:
 
 
 def _numbers(run: EccentricRun) -> dict[str, Value]:
-    """Numbers of which a sentence takes those that it names."""
+    """Numbers that sentences refer to by name."""
     scene, worst = run.scene, run.left
     supervisor, covariance = scene.supervisor, run.history["imbalance_covariance"][-1]
     # Standard deviation of the imbalance by noise, kg m.

@@ -1,4 +1,4 @@
-"""A run with two eccentric masses as a JSON document, as a table of its history, and for a person."""
+"""Presentation of a run with two eccentric masses: JSON document, table of its history, printed rows."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 
 _DOCUMENT_INSTANTS: Final = 2500
-"""Instants in the document; a run has a hundred times as many."""
+"""Number of instants in the document; a run has about a hundred times as many samples."""
 _BAND_INSTANTS: Final = 600
 
 
 def eccentric_document(run: EccentricRun) -> dict[str, Any]:
     """Turn a run into plain numbers, lists and text, all in SI.
 
-    Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
-    the largest vibration among them.
+    Lists run along `time_s`: equally spaced instants, begin and end of each stage, and the instant of the
+    largest vibration.
     Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
     # Equally spaced samples, with the stages' edges and the largest vibration.
@@ -81,7 +81,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
 
 
 def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
-    """Columns of a table of every sample by name: rotor-fixed vectors, angles not wrapped."""
+    """Columns of every sample by name; vectors rotor-fixed, angles not wrapped."""
     history = run.history
     stages = run.stages
     stage_index = np.searchsorted([stage.start for stage in stages], run.time, side="right") - 1
@@ -160,8 +160,8 @@ def eccentric_rows(run: EccentricRun) -> Rows:
 
 
 def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
-    """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
-    one, so that no peak is lost.
+    """Smallest, median and largest amplitude of runs at equally spaced times; the amplitude of a run is its
+    maximum since the time before, so that no peak is lost.
 
     Args: `end`: last of the times, s. Returns: Plain numbers for JSON, SI; a run that ended before has its
         last value.

@@ -1,7 +1,7 @@
-"""Poles of the drives' loops as they run: a voltage held over a step, on the masses with their drives.
+"""Poles of the drives' sampled loops: voltages held over a step, on the masses with their drives.
 
-Friction, the voltage limit and the rotor's whirl are left out; the rotor gives way, which lowers a mass's
-inertia by b^2/M, and the drive law makes up for it.  A loop is stable when its poles lie within the unit
+Friction, the voltage limit and the rotor's whirl are neglected.  The rotor yields, which lowers a mass's
+inertia by b^2/M; the drive law compensates this.  A loop is stable when its poles lie within the unit
 circle.
 """
 
@@ -24,18 +24,18 @@ from ringbalance.scene.arrays import ComplexArray
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
 _TORQUE_MARGIN: Final = 1.5
-"""Torque of the speed control at standstill over the friction of the scene, at the recommended speed."""
+"""Ratio of the speed control's torque at standstill to the friction, at the recommended drive speed."""
 _SMALL_DECAY: Final = 1e-4
 _HALVINGS: Final = 50
 _SEARCH_FACTOR: Final = 1e9
-"""Largest ratio of a limit to the scene's value, or its inverse; without a limit the search ends at it."""
+"""Largest factor by which the search for a limit departs from the scene's value, up or down."""
 _Poles = Callable[[float, float, float], ComplexArray]
-"""Poles by the key's value, the hold, s, and a factor on the loop's gain."""
+"""Function from the key's value, the hold, s, and a factor on the loop's gain to the poles."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _SampledLoop:
-    """Control loop of the drives, as sampled."""
+    """Sampled control loop of the drives."""
 
     name: str
     key: str
@@ -51,9 +51,8 @@ class _SampledLoop:
     recommended: float
     """Largest value of the key that leaves a gain margin of two."""
     recommended_step: float
-    """Longest hold of the voltage that leaves this margin with the scene's own gains, s; at most the
-    scene's.
-    """
+    """Longest hold of the voltage that leaves this margin with the scene's gains, s; at most the scene's
+    hold."""
 
     @property
     def radius(self) -> float:
@@ -77,10 +76,10 @@ class RecommendedGains:
     pair: _SampledLoop
     """Loop of the angle between the masses in the friction stage: `friction_filter.pair_gain`."""
     step: float
-    """Longest hold of the voltage that leaves every loop its margin with the scene's gains, s."""
+    """Longest hold of the voltage that leaves every loop a gain margin of two with the scene's gains, s."""
     drive_speed: float
-    """Drive speed, at least the scene's, rad/s: with the lower of both speed gains it overcomes friction with
-    a margin."""
+    """Drive speed that overcomes friction with a margin, at the lower of the scene's and the recommended
+    speed gain, rad/s; at least the scene's."""
 
     @property
     def loops(self) -> tuple[_SampledLoop, _SampledLoop, _SampledLoop]:
@@ -105,7 +104,7 @@ class RecommendedGains:
             return _poles(scene, hold, 0.0, plant.drive_gain * (margin * gain), eased=True)
 
         def pair_poles(pair: float, speed: float, hold: float) -> ComplexArray:
-            # The angle between the masses gets each drive's error.
+            # Both drives act on the angle between the masses.
             return _poles(scene, hold, 2 * plant.drive_gain * pair, plant.drive_gain * speed, eased=True)
 
         regulator = _loop(
@@ -137,7 +136,7 @@ class RecommendedGains:
             hold_poles=lambda gain, hold, margin: pair_poles(margin * gain, margin * keys.speed_gain, hold),
             start=keys.pair_gain or slower,
         )
-        # The speed w where B_add gamma w is the friction's torque, with a margin.
+        # Speed w at which B_add gamma w equals the friction torque, times a margin.
         friction = max(plant.friction_arm) * plant.moment * scene.rotor.speed_profile[0].speed ** 2
         drive_speed = max(keys.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * slower))
         step = min(loop.recommended_step for loop in (regulator, speed, pair))
@@ -145,7 +144,7 @@ class RecommendedGains:
 
 
 def advised(scene: EccentricScene) -> dict[str, float]:
-    """Gains above the recommended ones, lowered, and a sufficient drive speed, by key, SI."""
+    """Changes by key, SI: gains lowered to the recommended ones, and a sufficient drive speed."""
     gains = RecommendedGains.of(scene)
     changes = {loop.key: loop.recommended for loop in gains.loops if loop.value > loop.recommended}
     if gains.drive_speed > scene.friction_filter.drive_speed:
@@ -165,7 +164,8 @@ def _loop(
     hold_poles: _Poles | None = None,
     start: float | None = None,
 ) -> _SampledLoop:
-    """Judge a loop. Args: `value_poles`, `hold_poles`: poles that limit a value, a hold; default `poles`."""
+    """Judge a loop. Args: `value_poles`: poles that limit the value; `hold_poles`: the hold; default
+    `poles`."""
     step, value_poles, hold_poles = scene.lqr.step, value_poles or poles, hold_poles or poles
 
     def hold_stable(hold: float) -> bool:
@@ -186,10 +186,10 @@ def _loop(
 def _poles(
     scene: EccentricScene, step: float, position: float, rate: float, *, eased: bool = False
 ) -> ComplexArray:
-    """Poles, largest first, of the angle between opposite masses, whose rotor gives way most.
+    """Poles, largest first, of the angle between opposite masses, where the rotor yields most.
 
-    Their inertia is J (1 - 2 b^2/(M J)). Args: `eased`: True if the drive law makes up for the rotor, which
-    it does not while the imbalance is unknown.
+    Their inertia is J (1 - 2 b^2/(M J)). Args: `eased`: True if the drive law compensates the yielding of the
+    rotor; it does not while the imbalance is unknown.
     """
     track, mass = track_model(scene), PlantParameters.of(scene).mass
     given_way = 2 * track.moment**2 / (mass * track.inertia)
@@ -217,10 +217,10 @@ def _inside(poles: ComplexArray) -> bool:
 
 
 def _largest(stable: Callable[[float], bool], start: float) -> float:
-    """Largest value that is stable, in case all smaller ones are as well.
+    """Largest stable value, provided that all smaller ones are stable.
 
-    Doubled or halved from `start` up to the limit, and bisected from then on: far below it a slow pole rounds
-    to one, and a search among such values would end anywhere.
+    Doubled or halved from `start` until the limit is bracketed, then bisected.  Values far below the limit
+    are avoided: there a slow pole rounds to one and would count as unstable.
     """
     low, factor = start, 2.0 if stable(start) else 0.5
     while start / _SEARCH_FACTOR < low < start * _SEARCH_FACTOR and stable(factor * low) == (factor > 1):
@@ -233,7 +233,7 @@ def _largest(stable: Callable[[float], bool], start: float) -> float:
 
 
 def loops_status(gains: RecommendedGains) -> str:
-    """Sentence on the margins of the loops, and on the change that gives them."""
+    """Sentence on the gain margins of the loops and the change that restores them."""
     unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
     high = [loop for loop in gains.loops if loop.value > loop.recommended]
     if not unstable and not high:
@@ -270,7 +270,7 @@ def loops_document(gains: RecommendedGains) -> dict[str, Any]:
 
 
 def loops_quantities(gains: RecommendedGains) -> tuple[Quantity, ...]:
-    """Largest values that leave a margin of two."""
+    """Largest key values that leave a gain margin of two."""
     largest = (
         Quantity(key=loop.key, name=f"{loop.key}, at most", value=loop.recommended, unit=loop.unit or "1")
         for loop in gains.loops

@@ -1,9 +1,9 @@
-"""The frozen, validated, SI-only records of a scene with two eccentric masses.
+"""Frozen, validated records of a scene with two eccentric masses, in SI units; its tables and rules.
 
 Angles are radians in the rotor's frame, positive with the rotation; amplitudes are zero-to-peak.  A walk is
-the standard deviation gathered within 1 s, so its square is a spectral density: unit^2 / s.  What a
-field's key takes and means stands in its annotation, see `ringbalance.scene.keys.declaration`.  At the end
-the tables of such a file and its rules; all is loaded for such a file only.
+the standard deviation after 1 s of a random walk, so its square is a spectral density: unit^2 / s.  The
+annotation of a field gives unit, range and meaning of its key, see `ringbalance.scene.keys.declaration`.
+Loaded for such a scene only.
 """
 
 import math
@@ -125,7 +125,7 @@ class EccentricMasses:
 
     @property
     def gap(self) -> float:
-        """Angle that one mass takes up on the track, rad."""
+        """Angle that one mass occupies on the track, rad."""
         return self.arc_length / self.guide_radius
 
 
@@ -227,14 +227,14 @@ class EccentricScene(SceneFile):
 
     @property
     def steady_until(self) -> float | None:
-        """Time at which the speed first changes, s; None: it keeps its first value to the end of the run."""
+        """Time at which the speed first changes, s; None if it is constant to the end of the run."""
         corners = pairwise(self.rotor.speed_profile)
         changes = [corner.time for corner, after in corners if corner.speed != after.speed]
         return changes[0] if changes and 0 < changes[0] < self.run.time_limit else None
 
 
 def eccentric_scene(scene: SceneFile) -> EccentricScene:
-    """Narrow a scene to one whose balancer is two eccentric masses. Raises: SceneError: it has another."""
+    """Narrow a scene to one whose balancer is two eccentric masses. Raises: SceneError: another balancer."""
     return scene_as(EccentricScene, scene)
 
 
@@ -310,7 +310,7 @@ def _profile_in_order(profile: tuple[SpeedPoint, ...]) -> Contradiction | None:
 
 
 def _step_is_multiple(step: float, base: float) -> Contradiction | None:
-    """A step is a whole multiple of the sensor's."""
+    """Each step is a whole multiple of the sensor's step."""
     times = round(step / base)
     if times >= 1 and abs(step / base - times) <= 1e-6 * times:
         return None
@@ -332,7 +332,7 @@ def _moves_in_order(stop: float, step: float) -> Contradiction | None:
 
 
 def _widths_below(names: tuple[str, ...]) -> Rule:
-    """Rule: no stated uncertainty is larger than its quantity, of those whose values follow the widths."""
+    """Rule: no stated uncertainty exceeds its quantity; its arguments are all widths, then all values."""
 
     def below(
         widths: Mapping[str, tuple[float, bool]], *values: float | tuple[float, float]
@@ -350,7 +350,7 @@ def _widths_below(names: tuple[str, ...]) -> Rule:
 
 
 def _width_checks() -> Iterator[Check]:
-    """Yield a rule for each table; an angle may be less than its uncertainty."""
+    """Yield a rule for each table; angles are exempt from it."""
     for table, key in ECCENTRIC_MASS.tables["uncertainty"].keys.items():
         if table != ORIGIN and isinstance(key.takes, Entries):
             names = tuple(name for name in key.takes.keys if name != "phase")

@@ -27,27 +27,27 @@ from ringbalance.scene.uncertain import NORMAL_95
 
 _DWELL_TIME_S = 0.2
 _LEAST_DECAY_TIMES = 2.0
-"""Decay times of the rotor that the imbalance is estimated for at least."""
+"""Shortest imbalance estimation, in decay times of the rotor."""
 _LONGEST_ESTIMATE_FRACTION = 0.5
-"""Fraction of the estimation's time limit that these may take at most."""
+"""Upper bound of the shortest imbalance estimation, as a fraction of its time limit."""
 _NOTICEABLE_FRACTION = 0.25
-"""Noticeable travel over the arrival angle."""
+"""Noticeable travel, as a fraction of the arrival angle."""
 _LEAST_DRIVE_TIME_S = 1.0
 """Shortest friction stage: long against the drive's own time constants."""
 _LONGEST_TRIAL_MOVE_S = 10.0
 _CERTAIN_SIGMA = 5.0
-"""Standard deviations of a smoothed rate beyond which a mass moves."""
+"""Standard deviations of a smoothed rate beyond which a mass counts as moving."""
 _CONSTANTS = (
     *("motor.torque_constant", "motor.back_emf_constant", "motor.resistance"),
     *("masses.mass", "masses.guide_radius"),
 )
-"""Inputs that a friction arm is as well known as."""
+"""Inputs whose uncertainty passes to the friction arms."""
 _FRICTION_ERROR_FRACTION = 0.1
-"""Fraction of the arrival angle that unknown friction may hold a mass off."""
+"""Distance from the goal at which unknown friction may hold a mass, as a fraction of the arrival angle."""
 
 
 class Gates(NamedTuple):
-    """Limits between the stages; names of [supervisor] are its keys."""
+    """Limits between the stages; fields named as keys of [supervisor] have their values."""
 
     start: float
     limit: float
@@ -60,21 +60,21 @@ class Gates(NamedTuple):
     fine_tuning_time: float
     target_error: Pair
     noticeable: float
-    """Least angle by which masses that are not held come nearer within a second, rad."""
+    """Smallest approach to the goal within 1 s of masses that are not held, rad."""
     dwell: float
-    """Time for which a mass must have arrived, s."""
+    """Time for which masses must stay at their goal to count as arrived, s."""
     imbalance_gate: float
-    """Relative standard deviation."""
+    """Relative standard deviation of the imbalance at which its estimation ends."""
     friction_gate: float
-    """Relative standard deviation."""
+    """Relative standard deviation of a friction arm at which its estimation ends."""
     constants: tuple[float, float, float]
-    """Relative variance of B_add/b, covariance of it with C_add/b, and variance of that.
+    """Relative variance of B_add/b, relative covariance of B_add/b and C_add/b, relative variance of C_add/b.
 
-    While the masses go round, B_add V = C_add w + mu b (W + w)^2 + load, and the rotor's load has the factor
-    b: a friction arm is as well known as these two, however little noise there is.
+    While the masses circulate, B_add V = C_add w + mu b (W + w)^2 + load, and the rotor's load has the factor
+    b: both ratios limit the accuracy of a friction arm, even without noise.
     """
     friction_torque: float
-    """Standard deviation of the friction torque that makes no difference to arrival, N m."""
+    """Standard deviation of the friction torque below which it does not affect arrival, N m."""
     least_estimate: float
     """Shortest time of imbalance estimation, s."""
     least_drive: float
@@ -84,17 +84,17 @@ class Gates(NamedTuple):
     tuning_step: float
     tuning_stop: float
     tuning_near: float
-    """Closest that a mass is brought to its goal, rad."""
+    """Smallest distance from its goal to which a mass can be brought, rad."""
     wait: float
     average: float
     margin: float
-    """Amplitude by which a trial or a correction must be better, m."""
+    """Reduction of the amplitude by which a trial or a correction counts as better, m."""
     move_time: float
     """Longest move of one trial, s."""
     moment: float
     """b, kg m."""
     gap: float
-    """Angle that one mass takes up, rad."""
+    """Angle that one mass occupies on the track, rad."""
     by_trials: bool
     """True if the masses are tuned by trials alone, as in the paper."""
 
@@ -103,7 +103,7 @@ class Gates(NamedTuple):
         """Derive the limits of a scene."""
         keys, tuning, whirl = scene.supervisor, scene.fine_tuning, law.whirl
         averaged = max(tuning.average / scene.sensor.step, 1.0)
-        # Until the rotor's own transient, which hangs most on the assumed bearing, has died down.
+        # Long enough for the rotor's transient, which depends most on the assumed bearing, to decay.
         least_estimate = _LONGEST_ESTIMATE_FRACTION * keys.imbalance_time
         if whirl.damping > 0:
             least_estimate = min(_LEAST_DECAY_TIMES * 2 * whirl.mass / whirl.damping, least_estimate)
@@ -146,24 +146,24 @@ class _SensorSettings(NamedTuple):
 
 
 class _FrictionSettings(NamedTuple):
-    """Constants of the friction filter and of the drive meanwhile."""
+    """Constants of the friction filter and of the drives in the friction stage."""
 
     start: Pair
     """Standard deviations of rate, rad/s, and arm, m, before the first sample."""
     noise: FrictionNoise
     track: TrackModel
-    """A mass with its drive; the inertia is less by b^2/M, as the rotor gives way."""
+    """One mass with its drive; the inertia is reduced by b^2/M, since the rotor yields."""
     least_motion: float
-    """Smoothed rate below which a mass teaches the filter nothing."""
+    """Smoothed rate below which the filter uses no sample of a mass, rad/s."""
     euler: bool
     """True for the paper's transition in place of the exponential one."""
     every: int
-    """Samples between two steps."""
+    """Samples between two steps of the friction filter."""
     drive_speed: float
     speed_gain: float
-    """gamma, V s/rad."""
+    """gamma, gain of the speed control, V s/rad."""
     pair_gain: float
-    """V/rad; zero: the paper's law."""
+    """Gain of the control of the angle between the masses, V/rad; zero for the paper's law."""
 
     @classmethod
     def of(cls, scene: EccentricScene) -> _FrictionSettings:
@@ -190,7 +190,7 @@ class StrategySettings(NamedTuple):
     """Constants of the whole strategy."""
 
     step: float
-    """Between samples, s."""
+    """Time between two samples, s."""
     laboratory: bool
     """True if the vibration is measured in the fixed frame."""
     smoothing: float
@@ -207,7 +207,7 @@ class StrategySettings(NamedTuple):
 
     @classmethod
     def of(cls, scene: EccentricScene) -> StrategySettings:
-        """Gather what the strategy needs."""
+        """Derive the constants of the strategy from a scene."""
         sensor, keys, law = scene.sensor, scene.imbalance_filter, DriveLaw.of(scene)
         every = max(round(keys.step / sensor.step), 1)
         return cls(

@@ -1,7 +1,7 @@
 """One step of the whole strategy: estimate, decide, drive.
 
-`strategy_step` changes its memory by a measurement and looks at nothing else, so that a run can be repeated,
-cut and compared.  Friction and wanted accelerations come from the last sample, so that no voltage depends on
+`strategy_step` depends on its memory and the measurement only, so that a run can be repeated, cut and
+compared.  Friction and wanted accelerations come from the last sample, so that no voltage depends on
 itself.
 """
 
@@ -46,7 +46,7 @@ from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import compiled, in_place
 
 _LARGEST_STEP_ANGLE_RAD: Final = 0.05
-"""Largest travel of a mass within a step of the imbalance filter, which takes its path as straight."""
+"""Largest travel of a mass within a step of the imbalance filter, which assumes a straight path."""
 
 
 @compiled
@@ -68,9 +68,9 @@ def begin_strategy(settings: StrategySettings, memory: Record, measurement: Ecce
 
 @compiled
 def strategy_step(settings: StrategySettings, memory: Record, measurement: EccentricMeasurement) -> None:
-    """Take in a measurement; both motors' voltages, V, are then in the memory.
+    """Process a measurement and write both motors' voltages, V, into the memory.
 
-    The same memory and measurement always give the same answer.
+    Equal memory and measurement give equal voltages.
     """
     law, count = settings.law, memory.sample
     memory.sample = count + 1
@@ -84,7 +84,7 @@ def strategy_step(settings: StrategySettings, memory: Record, measurement: Eccen
     position, velocity = measurement.position, measurement.velocity
     relative = velocity
     if settings.laboratory:
-        # Along the rotor's axes; the sensor's velocity still holds the rotor's turning.
+        # Along the rotor's axes; `velocity` is still relative to the fixed frame.
         turn = complex(math.cos(measurement.rotor_angle), -math.sin(measurement.rotor_angle))
         position, velocity = turn * position, turn * velocity
         relative = velocity - complex(0.0, measurement.speed) * position
@@ -97,7 +97,7 @@ def strategy_step(settings: StrategySettings, memory: Record, measurement: Eccen
     for i in range(2):
         memory.angle[i] += weight * (motion.angle[i] - memory.angle[i])
         memory.rate[i] += weight * (motion.rate[i] - memory.rate[i])
-    # The imbalance filter's model: a rotor that turns at constant speed, with masses it can follow.
+    # The imbalance filter's model holds for a rotor at constant speed with slow masses.
     turning = abs(motion.speed) >= settings.gates.lowest_speed and is_constant(motion)
     fastest = max(abs(memory.rate[0]), abs(memory.rate[1]))
     visible = bool(turning and fastest * settings.step * settings.filter_every <= _LARGEST_STEP_ANGLE_RAD)
@@ -110,7 +110,7 @@ def strategy_step(settings: StrategySettings, memory: Record, measurement: Eccen
     if count % settings.voltage_every == 0:
         set_pair(memory.voltage, voltage_for(law, first), voltage_for(law, second))
     if memory.stage == FRICTION:
-        # The torques that the friction filter is configured with; accelerations are its own matter.
+        # Known torques for the friction filter, without those of the masses' acceleration.
         load = rotor_load(law, motion, memory.imbalance, (0.0, 0.0))
         for i in range(2):
             motor = law.torque_per_volt * memory.voltage[i]
@@ -127,9 +127,9 @@ def _estimate_imbalance(
     sample: tuple[complex, complex],
     visible: bool,
 ) -> None:
-    """Carry out one step of the filter; after a gap in which its model did not hold the whirl starts again.
+    """Carry out one filter step; after a gap in which the model did not hold, the whirl restarts.
 
-    Args: `sample`: displacement and velocity as the sensor shows them, along the rotor's axes.
+    Args: `sample`: displacement and velocity measured by the sensor, along the rotor's axes.
     """
     if not visible:
         memory.running = 0
@@ -165,7 +165,7 @@ def _estimate_imbalance(
 
 @in_place
 def _estimate_friction(settings: StrategySettings, memory: Record, motion: Motion) -> None:
-    """Carry out one step of both masses' filters; each load holds the acceleration of the other mass."""
+    """Carry out one step of both masses' filters; each load includes the other mass's acceleration."""
     friction, (first, second) = settings.friction, motion.angle
     step = settings.step * friction.every
     lever = friction.track.moment**2 / settings.law.whirl.mass * math.cos(first - second)
@@ -173,7 +173,7 @@ def _estimate_friction(settings: StrategySettings, memory: Record, motion: Motio
     for i in range(2):
         other, rate, smooth, estimate = 1 - i, motion.rate[i], memory.rate[i], memory.friction[i]
         torque = memory.torque[i] / friction.every + lever * (motion.rate[other] - memory.last_rate[other])
-        # One noisy sample of the rate shows no motion; its mean over a while does.
+        # One noisy sample of the rate proves no motion; the smoothed rate does.
         moves = abs(smooth) > friction.least_motion and smooth * rate > 0 and abs(rate) > settings.law.slow
         if not moves or estimate.rate * rate <= 0:
             friction_restart(estimate, friction.noise, rate)
@@ -187,11 +187,11 @@ def _estimate_friction(settings: StrategySettings, memory: Record, motion: Motio
 
 @in_place
 def _motor_torques(settings: StrategySettings, memory: Record, motion: Motion) -> Pair:
-    """Torques that the motors should give at standstill, N m."""
+    """Required torques of the motors, as B_add V at standstill, N m."""
     law, friction, goal = settings.law, settings.friction, memory.goal
     (first, second), (first_rate, second_rate) = motion.angle, motion.rate
     if memory.stage == FRICTION:
-        # The paper's speed control of each mass, and a control of the 180 degrees between them.
+        # The paper's speed control of each mass, and a control that keeps them 180 degrees apart.
         error = wrapped(second - first - math.pi)
         first_volts = friction.speed_gain * (friction.drive_speed - first_rate) + friction.pair_gain * error
         second_volts = friction.speed_gain * (friction.drive_speed - second_rate) - friction.pair_gain * error
@@ -219,14 +219,14 @@ def _motor_torques(settings: StrategySettings, memory: Record, motion: Motion) -
 
 @in_place
 def _compensation(settings: StrategySettings, memory: Record, motion: Motion, mass: int) -> float:
-    """Torque that makes up for a mass's friction as estimated, N m."""
-    # A motor stronger than assumed made the arm smaller, and now gives as much more than required.
+    """Torque that compensates a mass's estimated friction, N m."""
+    # Noise only: a motor stronger than assumed makes the estimated arm smaller, but its torque larger.
     distance, deviation = memory.goal[mass] - memory.angle[mass], arm_noise(memory, mass)
     if memory.stage == FRICTION:
         # The paper's law of the pair compensates nothing.
         if settings.friction.pair_gain == 0:
             return 0.0
-        # The arm is not yet known, and the masses are driven all the same.
+        # The arm is not yet known; its estimate alone is compensated.
         distance, deviation = math.copysign(math.inf, settings.friction.drive_speed), 0.0
     arm, rate = memory.friction[mass].arm, motion.rate[mass]
     return friction_torque(settings.law, arm, deviation, motion.speed, rate, distance)

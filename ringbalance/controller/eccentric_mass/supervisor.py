@@ -1,6 +1,6 @@
 """Stages of the strategy, from the estimation of the imbalance to rest, and when each ends.
 
-Every function changes an element of type `MEMORY`; `Motion` is the sample that it is decided on.
+Functions change an element of type `MEMORY`; `Motion` is the present sample.
 """
 
 from __future__ import annotations
@@ -58,22 +58,22 @@ from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 _DRIVES_ON_LOAD: Final = 0.7
-"""Fraction of the friction that is certain beyond which the drives hold the masses."""
+"""Load beyond which the drives hold the masses, as a fraction of the certain friction."""
 _DRIVES_OFF_LOAD: Final = 0.5
-"""Fraction of the friction that is certain below which drives that hold are switched off again."""
+"""Load below which holding drives are switched off, as a fraction of the certain friction."""
 STALLED_SHARE: Final = 0.5
-"""Fraction of the friction stage with a stalled mass beyond which its failure is blamed on the drive."""
+"""Fraction of the friction stage with a stalled mass beyond which the drive is the cause of failure."""
 _STILL_TIME_S: Final = 1.0
-"""Time for which masses must have come no nearer to their goal to count as held by friction."""
+"""Time without approach to the goal after which masses count as held by friction."""
 _STEADY_RAD_S2: Final = 1e-6
-"""Speed rate that counts as none."""
+"""Speed rate below which the speed counts as constant."""
 
 
 @in_place
 def supervise(
     gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float, visible: bool
 ) -> None:
-    """Decide what to do next.
+    """Decide stage, goal and state of the drives after a sample.
 
     Args: `visible`: True if the imbalance filter's model holds now.
     Source: Fig. 3 of the paper on eccentric masses, with gates on relative uncertainty and ways out.
@@ -86,7 +86,7 @@ def supervise(
     elif memory.stage == FRICTION:
         _friction(gates, memory, motion, time)
     elif memory.stage == POSITIONING:
-        # Until the masses are at their targets, or friction holds them: the check shows what that leaves.
+        # Until the masses are at their targets or held by friction; the check shows the residual vibration.
         _watch_arrival(gates, memory, time, gates.arrival_angle)
         if _arrived(gates, memory, time) or _held(gates, memory, time):
             enter(memory, CHECK, time, NONE)
@@ -98,7 +98,7 @@ def supervise(
     elif memory.stage == CHECK:
         _check(gates, law, memory, motion, time)
     elif memory.stage == CORRECTION:
-        # Until the masses are at the corrected targets, or where friction leaves them.
+        # Until the masses are at the corrected targets or held by friction.
         _watch_arrival(gates, memory, time, gates.tuning_near)
         if _move_ended(gates, memory, time):
             enter(memory, CHECK, time, NONE)
@@ -110,7 +110,7 @@ def supervise(
 
 @in_place
 def enter(memory: Record, stage: int, time: float, cause: int) -> None:
-    """Begin a stage: the masses set out to their goal."""
+    """Begin a stage in which the masses move to their goal."""
     memory.stage, memory.entered, memory.cause = stage, time, cause
     _set_out(memory, time)
 
@@ -129,14 +129,14 @@ def _average_from(memory: Record, time: float) -> None:
 
 @in_place
 def _stay(memory: Record, stage: int, time: float, cause: int) -> None:
-    """Begin a stage with the masses where they are."""
+    """Begin a stage in which the masses keep their positions."""
     set_pair(memory.goal, memory.angle[0], memory.angle[1])
     enter(memory, stage, time, cause)
 
 
 @in_place
 def _rest_at(memory: Record, angles: Sequence[float], time: float, cause: int) -> None:
-    """Rest at these angles."""
+    """Begin the stage of rest, with these angles as goal."""
     set_pair(memory.goal, angles[0], angles[1])
     enter(memory, REST, time, cause)
 
@@ -179,13 +179,13 @@ def _imbalance(
 def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
     """Estimate both friction arms until they are precise relative to themselves, or make no difference."""
     elapsed, precise = time - memory.entered, True
-    # Once the drives have had a moment to get going.
+    # Without the time in which the drives start.
     if elapsed >= 0.5 * gates.least_drive:
         memory.driven += 1
         memory.stalled += 1 if min(abs(memory.rate[0]), abs(memory.rate[1])) < gates.stall_rate else 0
     for i in range(2):
         arm, deviation, turning = memory.friction[i].arm, arm_noise(memory, i), motion.speed + memory.rate[i]
-        # Deviation that the constants give an arm (T - C w)/(b (W + w)^2) less the rotor's load.
+        # Standard deviation by the constants of an arm (T - C w)/(b (W + w)^2) less the rotor's load.
         memory.arm_doubt[i] = 0.0
         if elapsed > 0 and turning != 0:
             motor, back = memory.motor[i] / elapsed, memory.back_emf[i] / elapsed
@@ -193,7 +193,7 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
             variance = motor * motor * of_motor - 2 * motor * back * of_both + back * back * of_back
             memory.arm_doubt[i] = math.sqrt(max(variance, 0.0)) / (gates.moment * turning * turning)
         relative = deviation <= gates.friction_gate * arm
-        # Friction does not drive: an arm well below zero contradicts the filter's model.
+        # Friction cannot drive a mass: an arm well below zero contradicts the filter's model.
         possible = arm >= -2 * arm_deviation(memory, i)
         little = deviation * gates.moment * motion.speed**2 <= gates.friction_torque
         precise = precise and possible and (relative or little)
@@ -221,9 +221,9 @@ def arm_deviation(memory: Record, mass: int) -> float:
 
 @in_place
 def _goal(gates: Gates, angle: Sequence[float], imbalance: complex) -> tuple[Pair, int, float]:
-    """Targets for an imbalance, each mass going from its angle to the one that `assign` gives it.
+    """Goal for an imbalance, rad: for each mass from its angle to the target that `assign` selects.
 
-    Returns: Goal, 1 if it is saturated, and the imbalance that it leaves, kg m.
+    Returns: Goal, 1 if saturated, and residual imbalance at the goal, kg m.
     """
     targets = target_angles(abs(imbalance), cmath.phase(imbalance), gates.moment, gates.gap)
     first, second = assign(angle[0], angle[1], targets.first, targets.second)
@@ -233,7 +233,7 @@ def _goal(gates: Gates, angle: Sequence[float], imbalance: complex) -> tuple[Pai
 
 @in_place
 def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
-    """Average the vibration once the masses are left to friction, and correct the targets by it."""
+    """Average the vibration once the masses have arrived or are held, and correct the targets by the mean."""
     _rest(gates, law, memory, motion, time)
     if memory.hold == MOVING:
         return
@@ -248,9 +248,9 @@ def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: fl
 
 @in_place
 def _learn(law: DriveLaw, memory: Record, mean: complex, influence: complex) -> None:
-    """Stay, and let the drives go by the imbalance that the mean vibration shows, U = z/alpha - p.
+    """Keep the position, and set the imbalance of the drive law from the mean vibration, U = z/alpha - p.
 
-    While the masses go from place to place an error of the filter's estimate holds them off all goals alike.
+    Not before: an error of the filter's estimate keeps the masses off all goals alike, so goals compare.
     """
     set_pair(memory.goal, memory.angle[0], memory.angle[1])
     if influence != 0:
@@ -260,7 +260,7 @@ def _learn(law: DriveLaw, memory: Record, mean: complex, influence: complex) -> 
 
 @in_place
 def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, time: float) -> None:
-    """Go on to better targets while that helps, back to the best ones, or on to what comes after."""
+    """Move to better targets while that helps, then back to the best ones, or begin the next stage."""
     done = judge_correction(memory, mean, gates.margin, memory.short > gates.tuning_near)
     memory.objective = abs(memory.residual)
     far = memory.short > gates.arrival_angle
@@ -269,13 +269,13 @@ def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, ti
     if not done and _aim_better(gates, memory, influence, far):
         enter(memory, CORRECTION, time, NONE)
     elif memory.residual != mean and not within:
-        # Back to the best targets, where the next mean is the last.
+        # Back to the best targets, for the last mean.
         aim_back(memory)
         memory.share = 0.0
         set_pair(memory.goal, memory.aimed[0], memory.aimed[1])
         enter(memory, CORRECTION, time, NONE)
     else:
-        # Content with these targets, or what is left to do from them.
+        # These targets are final: rest, failure, or fine tuning.
         memory.objective, hold = abs(mean), memory.hold
         if memory.objective <= gates.limit or memory.saturated:
             enter(memory, REST, time, BALANCED if memory.objective <= gates.limit else SATURATED)
@@ -290,13 +290,13 @@ def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, ti
 
 @in_place
 def _aim_better(gates: Gates, memory: Record, influence: complex, far: bool) -> bool:
-    """Aim at the targets for what the best ones leave. Returns: True if they are others."""
+    """Set targets that also cancel the residual at the best ones. Returns: True if they differ."""
     best, error = memory.best_goal, gates.target_error
     aim = memory.corrected + memory.share * memory.residual / influence
     (first, second), saturated, left = _goal(gates, (best[0] - error[0], best[1] - error[1]), aim)
     if max(abs(first - best[0]), abs(second - best[1])) <= gates.tuning_near:
         return False
-    # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
+    # If friction keeps the masses far off, the aim exceeds the imbalance so that they break away.
     if not far:
         memory.saturated, memory.left = saturated, left
     memory.aim, memory.steps = aim, memory.steps + 1
@@ -307,7 +307,7 @@ def _aim_better(gates: Gates, memory: Record, influence: complex, far: bool) -> 
 
 @in_place
 def _fine_tuning(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
-    """Judge each trial from where friction leaves the masses, even if not quite where they should be."""
+    """Judge each trial at the angles at which friction leaves the masses, even if not quite at the goal."""
     if not is_constant(motion):
         _rest_at(memory, memory.base, time, SPEED_CHANGED)
     elif time - memory.entered >= gates.fine_tuning_time:
@@ -343,16 +343,16 @@ def _try(gates: Gates, memory: Record, time: float) -> None:
 
 @in_place
 def _rest(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
-    """Bring the masses home; then the drives rest while friction surely holds, and hold while it does not."""
+    """Move the masses to the goal; then switch the drives off while friction certainly holds, else hold."""
     _watch_arrival(gates, memory, time, gates.tuning_near)
     if memory.hold == MOVING and _move_ended(gates, memory, time):
         memory.hold, memory.short = RELEASED, _distance(memory)
-        # Where friction has the masses is their goal from now on, if that is far short of the present one.
+        # Masses held far from their goal: the present angles become the goal.
         if memory.short > gates.arrival_angle:
             set_pair(memory.goal, memory.angle[0], memory.angle[1])
     if memory.hold == MOVING:
         return
-    # Largest fraction of the friction that is certain which holding the masses takes.
+    # Largest load on a mass at rest, as a fraction of its certain friction.
     load = 0.0
     angle = (memory.angle[0], memory.angle[1])
     quiet = Motion(motion.speed, motion.speed_rate, memory.position, memory.velocity, angle, (0.0, 0.0))
@@ -386,30 +386,30 @@ def _arrived(gates: Gates, memory: Record, time: float) -> bool:
 
 @in_place
 def _held(gates: Gates, memory: Record, time: float) -> bool:
-    """Return True if friction holds the masses: slow, and for a while no nearer to their goal."""
+    """Return True if friction holds the masses: slow, and no approach to the goal for `_STILL_TIME_S`."""
     slow = max(abs(memory.rate[0]), abs(memory.rate[1])) <= gates.arrival_rate
     return bool(slow and time - memory.nearer >= _STILL_TIME_S)
 
 
 @in_place
 def _move_ended(gates: Gates, memory: Record, time: float) -> bool:
-    """Return True if a move has come to its end, at its goal or short of it."""
+    """Return True if a move has ended, at its goal or short of it."""
     late = time - memory.moving >= gates.move_time
     return late or _arrived(gates, memory, time) or _held(gates, memory, time)
 
 
 @in_place
 def _distance(memory: Record) -> float:
-    """Distance of the mass farther from its goal, rad."""
+    """Largest distance of a mass from its goal, rad."""
     first, second = memory.angle[0] - memory.goal[0], memory.angle[1] - memory.goal[1]
     return float(max(abs(first), abs(second)))
 
 
 @in_place
 def _averaged(gates: Gates, memory: Record, motion: Motion, time: float) -> bool:
-    """Take a sample into the mean, and return True if that is long enough.
+    """Add a sample to the mean vibration; return True if it has the full averaging time.
 
-    The mean is of the rotor-fixed vector: noise averages out of that, but not out of amplitudes.
+    The mean is of the rotor-fixed vector, in which noise averages out; in amplitudes it does not.
     """
     if time >= memory.averaging:
         memory.total += motion.position

@@ -1,17 +1,17 @@
-"""Targets of the two masses, who goes to which, their correction, and the search by trial for a better place.
+"""Targets of the two masses, their assignment and correction, and the search by trial for better angles.
 
 Angles are rotor-fixed, positive with the rotation.  The masses share one circular track and cannot pass each
-other; `gap` is the angle that one of them takes up, arc length over guide radius.
+other; `gap` is the angle that one of them occupies, arc length over guide radius.
 
-Fine tuning moves both masses a little, each way, and keeps the better place.  The paper takes the best of
-four moves, even when all of them are worse than staying: near the best place that is a limit cycle as wide as
-the move.  Here staying is the fifth candidate, and when it wins, moves are halved.
+Fine tuning moves both masses a little, in four ways, and keeps the better angles.  The paper takes the best
+of four moves even if all are worse than staying, which gives a limit cycle as wide as the move near the
+optimum. Here staying is the fifth candidate; if it is best, moves are halved.
 
-Correction is a step by the influence coefficient.  With the masses at rest the mean vibration in the
-rotor's frame is z = alpha (U + p), p = b sum exp(j phi_i).  z/alpha is therefore the imbalance that is left
-over, and targets for the estimate plus z/alpha undo it.  With alpha as configured in place of the true one
-each step leaves the fraction |1 - alpha_true/alpha| of z: a stiffness known to a few per cent takes two
-steps.  A step that does not help is halved.
+Correction is a step by the influence coefficient.  With the masses at rest the mean vibration in the rotor's
+frame is z = alpha (U + p), p = b sum exp(j phi_i).  z/alpha is therefore the residual imbalance, and targets
+for the estimate plus z/alpha cancel it.  With alpha as configured in place of the true one each step leaves
+the fraction |1 - alpha_true/alpha| of z: a stiffness known to a few per cent takes two steps.  A step that
+does not help is halved.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ringbalance.scene.platform.compiled import in_place
 
 
 class Targets(NamedTuple):
-    """Angles that undo an imbalance as far as two masses can."""
+    """Angles that cancel an imbalance as far as two masses can."""
 
     first: float
     """phi_m + half_angle, rad within (-pi, pi]."""
@@ -36,23 +36,23 @@ class Targets(NamedTuple):
     half_angle: float
     """Angle of each mass from the imbalance, rad."""
     residual: float
-    """Imbalance that is left, kg m."""
+    """Residual imbalance, kg m."""
     saturated: bool
-    """True if the imbalance is more than the masses can undo, which takes them side by side."""
+    """True if the imbalance exceeds what the masses cancel; they then lie side by side."""
 
 
 @in_place
 def wrapped(angle: float) -> float:
-    """Angle of this direction within (-pi, pi], rad."""
+    """Angle wrapped into (-pi, pi], rad."""
     return math.pi - (math.pi - angle) % (2 * math.pi)
 
 
 @in_place
 def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> Targets:
-    """Angles at which the masses undo an imbalance.
+    """Angles at which the masses cancel an imbalance.
 
     phi = phi_m +- beta, beta = arccos(-U/2b), at most pi - gap/2 so that the masses do not overlap on the far
-    side of the imbalance.  Where it is cut, U - 2 b cos(gap/2) is left.
+    side of the imbalance.  At that bound the residual is U - 2 b cos(gap/2).
     Source: Eqs. 25 and 26 of the paper on eccentric masses, whose arccos lost its sign and which lets masses
     overlap.
     """
@@ -71,13 +71,13 @@ def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> 
 
 @in_place
 def assign(first: float, second: float, target_one: float, target_two: float) -> Pair:
-    """Send each mass to a target by the shortest pair of travels on which they do not meet.
+    """Assign each mass to a target by the shortest pair of travels on which the masses do not meet.
 
     The sum of squared travels is least over both assignments and all whole turns that keep the order of the
     masses on the track.  Masses that share one law of motion then never come closer than they are at the
     start or at the end.
-    Returns: Travel of each mass, rad, signed, whole turns included; of two equal ones that of the first mass
-        to the first target.
+    Returns: Travel of each mass, rad, signed, whole turns included; of two equal pairs, first mass to first
+        target.
     Source: Eqs. 27 and 28 of the paper on eccentric masses, with angles wrapped.
     """
     lead, least, best = (second - first) % (2 * math.pi), math.inf, (0.0, 0.0)
@@ -105,7 +105,7 @@ def begin_tuning(memory: Record, step: float) -> None:
 
 @in_place
 def tuning_place(memory: Record) -> Pair:
-    """Angles of both masses to go to now, rad; the best ones when the search is done."""
+    """Angles of the present trial, rad; the best angles when the search is done."""
     step = 0.0 if memory.done else memory.move_size
     first, second = MOVES[memory.move]
     return memory.base[0] + step * first, memory.base[1] + step * second
@@ -113,10 +113,10 @@ def tuning_place(memory: Record) -> Pair:
 
 @in_place
 def next_trial(memory: Record, objective: float, margin: float, stop: float) -> None:
-    """Take in the result of the present trial; a move that helped is tried again first.
+    """Process the result of the present trial; a move that helped is tried again first.
 
-    Args: `objective`: mean amplitude of the trial, m; infinite where the masses cannot lie.
-    Source: section 3.6 of the paper on eccentric masses, with staying compared and the moves halved.
+    Args: `objective`: mean amplitude of the trial, m; infinite for angles at which the masses overlap.
+    Source: section 3.6 of the paper on eccentric masses, with staying as a candidate and halved moves.
     """
     if objective < memory.least - margin:
         first, second = tuning_place(memory)
@@ -131,20 +131,20 @@ def next_trial(memory: Record, objective: float, margin: float, stop: float) -> 
 
 @in_place
 def separation(first: float, second: float) -> float:
-    """Angle between two masses, the shorter way round, within [0, pi], rad."""
+    """Smaller angle between two masses, within [0, pi], rad."""
     return abs(math.pi - (math.pi - second + first) % (2 * math.pi))
 
 
 MAX_CORRECTION_STEPS: Final = 8
 _LEAST_STEP_FRACTION: Final = 0.25
-"""Fraction of the full step down to which a step that does not help is halved."""
+"""Smallest correction step, as a fraction of the full step; steps that do not help are halved."""
 _SHOWN_MARGINS: Final = 2.0
-"""Margins of a mean that a vibration must exceed for a step to show a gain."""
+"""Smallest vibration worth a further step, in margins of the mean: a smaller one shows no gain."""
 
 
 @in_place
 def begin_correction(memory: Record) -> None:
-    """Begin with the first targets, for the imbalance as estimated; there is no mean yet."""
+    """Begin the correction with the first targets, for the estimated imbalance, without a mean vibration."""
     memory.residual, memory.share, memory.steps = complex(math.inf, 0.0), 1.0, 0
     memory.corrected, memory.aim = memory.imbalance, memory.imbalance
     set_pair(memory.best_goal, memory.goal[0], memory.goal[1])
@@ -155,9 +155,9 @@ def begin_correction(memory: Record) -> None:
 def judge_correction(memory: Record, residual: complex, margin: float, held: bool) -> bool:
     """Compare a mean vibration with that of the best goal so far, and keep the better goal.
 
-    A step that did not help is halved. Args: `held`: True if friction held a mass short of its goal. Where
-    nothing got worse a further step adds to the goal, so that the mass breaks away.
-    Returns: True if no further step is worth its time.
+    A step that did not help is halved. Args: `held`: True if friction held a mass short of its goal; if the
+    vibration did not rise, the new goal is kept, so that the next step adds to it and the mass breaks away.
+    Returns: True if the correction is complete: no gain to show, steps too small, or too many.
     """
     amplitude, best = abs(residual), abs(memory.residual)
     better = amplitude < best - margin or memory.share == 0
@@ -174,7 +174,7 @@ def judge_correction(memory: Record, residual: complex, margin: float, held: boo
 
 @in_place
 def aim_back(memory: Record) -> None:
-    """Aim at the best goal so far."""
+    """Reset aim and targets to the best goal so far."""
     memory.aim = memory.corrected
     set_pair(memory.aimed, memory.best_goal[0], memory.best_goal[1])
 
@@ -188,6 +188,6 @@ def set_pair(pair: FloatArray, first: float, second: float) -> None:
 def reach_of(scene: EccentricScene) -> float:
     """Largest imbalance that the masses cancel, kg m."""
     moment = PlantParameters.of(scene).moment
-    # The part of an imbalance beyond all reach that the masses do not leave, side by side.
+    # An imbalance beyond all reach less its residual, with the masses side by side.
     beyond = 4 * moment
     return beyond - target_angles(beyond, 0.0, moment, scene.masses.gap).residual

@@ -1,4 +1,4 @@
-"""Verification: what is claimed against what is found, and every solver against what is known of it."""
+"""Verification: the papers' claims against computed results, the solvers against known ones."""
 
 if not __name__.startswith("ringbalance."):
     raise ImportError(

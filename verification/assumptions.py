@@ -1,4 +1,4 @@
-"""Inputs that nobody gave: those that a claim rests on, and how far they may move a computed number."""
+"""Inputs neither given nor measured: those that a claim rests on, and their effect on its numbers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ringbalance.verification.evidence import Evidence
 from ringbalance.verification.papers import changed
 
 KNOWN: Final = ("given", "measured")
-"""Origins of a value that somebody vouches for: it is taken as it stands."""
+"""Origins of a value that is not varied: stated or measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Assumption:
-    """An input that a claim rests on and nobody gave."""
+    """An input that a claim rests on and that is neither given nor measured."""
 
     path: str
     origin: str
@@ -40,9 +40,9 @@ class Assumption:
 def assumptions_of(rests_on: Sequence[RestsOn], scene: Any) -> tuple[Assumption, ...]:
     """Inputs of a claim that a scene assumes, infers or leaves to a default, each with its range.
 
-    The range is the claim's own where it has one. An inferred value has that of the scene's [uncertainty];
-    one that was assumed has a documented one, or the scene's where that is wider: the tolerance of a part
-    says nothing of a part that nobody described.
+    A range that the claim states comes first. An inferred value has that of the scene's [uncertainty]; an
+    assumed one has a documented range, or the scene's where that is wider, since the tolerance of a part does
+    not apply to a part that is not specified.
     Raises: ValueError: an input without any of these.
     """
     assumptions = []

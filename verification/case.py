@@ -117,14 +117,14 @@ class _LeftOut:
 
     name: Identifier
     why: Text
-    """Following their number: "of shorter tubes, which flow leaves before it has developed"."""
+    """Text after their number, such as "of shorter tubes, which flow leaves before it has developed"."""
     taught: bool = False
-    """True if they taught a coefficient: they are no predictions at all, and not among all readings."""
+    """True if a coefficient was fitted to them: then they are no predictions and count in no total."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedQuantity:
-    """One judged number: its limit and the limit's reason stand before the result."""
+    """One judged number, with a limit and the reason for it, both set before the result."""
 
     name: Identifier
     title: Text
@@ -134,7 +134,7 @@ class JudgedQuantity:
     limit: float
     why: Text
     judges: Role = "number"
-    """A claim's number, the idea behind it, or one reading of what the paper leaves open."""
+    """Subject judged: a claim's number, the idea behind it, or one reading of an ambiguous claim."""
     correction: str = ""
     """Named correction after which a claim's number is reproduced."""
     against: str = ""
@@ -149,13 +149,13 @@ class Mutation:
     what: Text
     expect: Verdict
     scene: Mapping[str, float | Literal["absent"]] = field(default_factory=dict)
-    """Overrides of scene quantities in SI, such as "disc.plate_thickness" = 0.0; "absent" takes one away."""
+    """Overrides of scene quantities in SI, such as "disc.plate_thickness" = 0.0; "absent" removes one."""
     cost: Literal["light", "heavy"] = "light"
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Study:
-    """The function that computes a case of the program's."""
+    """Function of the program that computes a case."""
 
     of: Annotated[str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -164,7 +164,7 @@ class _Study:
 
 @dataclass(frozen=True, kw_only=True)
 class CaseDefinition:
-    """A case's text and criteria: all of it that is not computed."""
+    """Text and criteria of a case: everything that is not computed."""
 
     id: Identifier
     paper: Literal["liquid_ring", "eccentric_mass"] = "liquid_ring"
@@ -303,8 +303,8 @@ def placeholders(text: str) -> tuple[str, ...]:
 def fill(text: str, numbers: Mapping[str, float]) -> str:
     """A text with SI values put in by name.
 
-    Each is written in the unit that its placeholder names, to four significant digits unless that has a
-    format, and held to its unit by a no-break space.
+    Each is written in the unit that its placeholder names, with four significant digits unless the
+    placeholder has a format, and joined to its unit by a no-break space.
     Raises: ValueError: a number that is missing or not finite.
     """
 

@@ -1,6 +1,6 @@
 """All cases, by their folders: the program's in the order in which they are reported, and a user's own.
 
-An error in a case of a user's own is a `CaseError` in one sentence and stops no other.
+An error in a user's own case is a `CaseError` in one sentence and does not stop other cases.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def case_code(case_id: str) -> CaseCode:
 
 @lru_cache(maxsize=64)
 def load_case(case_id: str) -> CaseDefinition:
-    """The text and criteria of a case. Raises: UnknownCaseError, or CaseError: its case.toml is not one."""
+    """Text and criteria of a case. Raises: UnknownCaseError: no such id; CaseError: an invalid case.toml."""
     if case_id not in case_ids():
         raise unknown_case(case_id, case_ids())
     path = files(cases) / case_id / "case.toml"
@@ -92,7 +92,7 @@ def report_order(definition: CaseDefinition) -> tuple[bool, int, int, str]:
 
 
 def unknown_case(case_id: str, ids: Sequence[str]) -> UnknownCaseError:
-    """The error of an id that is none of `ids`, with the nearest of them."""
+    """Error for an id that is not among `ids`; its text names the nearest one."""
     # A claim may be asked for by its number alone.
     number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
     start = f"claim_{int(number[1]):02d}_" if number else None
@@ -115,7 +115,7 @@ class OwnCase:
         spec = spec_from_file_location(f"own_case_{self.folder.name}", path)
         if spec is None or spec.loader is None or not path.is_file():
             raise CaseError(f"{path}: there is no such file")
-        # The module is not entered in `sys.modules`: each run has one of its own.
+        # The module is not entered in `sys.modules`: each run loads it again.
         module = module_from_spec(spec)
         writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
         try:
@@ -140,7 +140,7 @@ class OwnCase:
 
 @dataclass(frozen=True, kw_only=True)
 class _Code:
-    """Code of a user's own case, whose functions may give plain numbers."""
+    """Code of a user's own case, whose functions may return plain numbers."""
 
     path: Path
     module: ModuleType
@@ -149,7 +149,7 @@ class _Code:
     takes_defect: bool
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
-        """Evidence of the case's functions. Raises: CaseError: they give something else, or break down."""
+        """Evidence from the case's functions. Raises: CaseError: they fail or return another type."""
         arguments = (scene, level, defect) if self.takes_defect else (scene, level)
         evidence = self._called(self.module.compute, *arguments)
         if isinstance(evidence, Mapping):
@@ -180,7 +180,7 @@ class _Code:
             raise CaseError(f"{self.path}: {_described(error, self.path)}") from error
 
     def _records(self, function: str, values: Mapping[str, Any], kind: Callable[..., Any]) -> dict[str, Any]:
-        """Records of a kind by name, plain numbers (of numpy's too) made into such."""
+        """Records of a kind by name; plain numbers, numpy's included, are converted."""
         records = {}
         for name, value in values.items():
             if type(value) is kind:
@@ -203,7 +203,7 @@ class _Code:
 
 
 def own_cases(folder: Path) -> tuple[list[OwnCase], list[CaseError]]:
-    """The cases in a folder, or the one that it is, by name; and the errors of those that cannot be read."""
+    """Cases in a folder, by name, or the case that the folder is, and the errors of unreadable ones."""
     if (folder / _TEXT).is_file():
         folders = [folder]
     else:

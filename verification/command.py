@@ -33,7 +33,7 @@ def verify(options: SimpleNamespace) -> int:
     users = {case.definition.id: case for case in user_cases}
     ids = (*program_ids(), *users)
     if unknown := [name for name in options.case_ids if name not in ids]:
-        # A case whose text cannot be read is unknown, too; its own error is reported alone.
+        # The id of an unreadable case is unknown, too: then its reading error alone is reported.
         problems: Sequence[Exception] = errors or [unknown_case(unknown[0], ids)]
         for problem in problems:
             print_error(f"ringbalance: {problem}")

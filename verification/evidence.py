@@ -24,7 +24,7 @@ CurveStyle = Literal["paper", "found", "reference", "points"]
 COVERAGE_FACTOR = 2.0
 """Half-widths at 95 % per standard uncertainty."""
 ROUND_OFF = 1e-13
-"""Relative errors below this say nothing about an order."""
+"""Relative error below which no order of convergence can be observed."""
 
 
 def from_half_width(half_width: float) -> float:
@@ -41,7 +41,8 @@ def from_range(values: Iterable[float]) -> float:
 def from_rounding(last_digit: float) -> float:
     """Standard uncertainty of a printed number from one unit of its last digit: u = last_digit/(2 sqrt(3)).
 
-    All within half a unit is equally likely. The expanded uncertainty, 0.58 of the last digit, covers that.
+    Every value within half a unit is equally likely; the expanded uncertainty, 0.58 of the last digit, covers
+    them all.
     Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
     """
     return last_digit / (2 * math.sqrt(3))
@@ -101,16 +102,16 @@ class Found:
     numerical: float = 0.0
     """u_num, standard uncertainty of the calculation."""
     input: float = 0.0
-    """u_input, standard uncertainty from the inputs of the calculation that somebody vouches for."""
+    """u_input, standard uncertainty from the given and measured inputs of the calculation."""
     reach: tuple[float, float] = (0.0, 0.0)
-    """Lowest and highest change of the number against its reference while all inputs that nobody gave pass
-    through their ranges; random effects are in `input`."""
+    """Lowest and highest change of the error S - D over the ranges of all assumed inputs; random effects are
+    in `input`."""
     corrected: float | None = None
-    """The number once the correction that the case's text names is made; None where there is none."""
+    """The number with the correction that the case's text names; None: no correction."""
     conclusive: bool = True
     """False if the sequence behind the number is not asymptotic, or a solve did not succeed."""
     reference: Reference | None = None
-    """The number that it is compared with; None where a limit alone judges it."""
+    """Number to compare with; None: judged by a limit alone."""
 
     def __post_init__(self) -> None:
         corrected = 0.0 if self.corrected is None else self.corrected
@@ -124,7 +125,7 @@ class Found:
 
     @property
     def error(self) -> float:
-        """E = S - D, the number itself where it is compared with nothing."""
+        """E = S - D; without a reference the number itself."""
         return self.value - (0.0 if self.reference is None else self.reference.value)
 
     def against(self, reference: Reference | SupportsFloat) -> Found:
@@ -143,7 +144,7 @@ class Found:
         return Deviation(error=self.value - reference.value, half_width=COVERAGE_FACTOR * u_val)
 
     def moved(self, low: float, high: float) -> Found:
-        """The number with more inputs that move it: reaches add, as an assumption is no random error."""
+        """The number with a wider reach; reaches add linearly, since an assumption is no random error."""
         return dataclasses.replace(
             self, reach=(self.reach[0] + min(low, 0.0), self.reach[1] + max(high, 0.0))
         )
@@ -179,7 +180,7 @@ class FigureAxis:
 
 @dataclass(frozen=True)
 class FigureCurve:
-    """One line of a figure, of the length of its x axis."""
+    """One curve of a figure, with a value at each point of the x axis."""
 
     name: str
     unit: str
@@ -197,7 +198,7 @@ class Series:
     x: FigureAxis
     y: Sequence[FigureCurve]
     log: bool = False
-    """Both axes logarithmic."""
+    """True if both axes are logarithmic."""
 
 
 def figure(name: str, x: tuple[str, str, npt.ArrayLike], *curves: FigureCurve, log: bool = False) -> Series:
@@ -315,8 +316,8 @@ class Evidence:
 class CaseCode(Protocol):
     """A case's computation.
 
-    Beside `compute` it may have `ends(scene)`: a shorter way to the judged numbers, or to those that assumed
-    inputs move, called at the ends of their ranges.
+    Beside `compute` it may have `ends(scene)`, called at the ends of the ranges of assumed inputs: a shorter
+    calculation of the judged numbers, or of those that depend on these inputs.
     """
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
@@ -325,7 +326,7 @@ class CaseCode(Protocol):
 
 
 class NotRunError(Exception):
-    """Reason why a case cannot be run on this scene, or not yet."""
+    """A case that cannot be run on this scene, or not yet; the text is the reason."""
 
 
 def _check(*values: float, uncertainties: Sequence[float]) -> None:

@@ -1,6 +1,6 @@
-"""Finite elements that several cases share: errors of fields, rings, mutations of the problem.
+"""Finite elements for several cases: errors of fields, totals of rings, mutations of the problem.
 
-A ring is computed once per process.  Mutations are put in from outside: the product has no parameter for
+A ring is computed once per process.  Mutations replace functions of the solver, which has no parameter for
 them.
 """
 
@@ -41,7 +41,7 @@ def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[
 def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
     """Root mean square over the liquid of a pressure's error, relative to that of the exact pressure."""
     chamber = solution.chamber
-    # More points than the solve has, or its errors at these would be taken for all.
+    # More quadrature points than the solve uses: the error at its own points alone is not representative.
     basis = Basis(chamber.mesh, chamber.mesh.elem(), intorder=8)
     true = exact(chamber.length_scale * np.asarray(basis.global_coordinates()))
     return relative_rms(np.asarray(basis.interpolate(solution.pressure)), true, basis.dx)
@@ -77,7 +77,7 @@ def ring_of(scene: Scene, fills: tuple[float, ...], *, density: float | None = N
 def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
     """One total of a ring by its name and the index of its fill.
 
-    It is not conclusive where the meshes do not converge steadily.
+    It is inconclusive where the meshes do not converge steadily.
     """
     estimate: Estimate = getattr(quantities, name)
     converges = quantities.convergence[name][index].verdict in (GridVerdict.MONOTONE, GridVerdict.ROUND_OFF)
@@ -91,7 +91,7 @@ def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
 def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Found:
     """Moment of one chamber at its largest fill times a factor, kg m, by finite elements.
 
-    Its correction is the moment of a ring of the printed radius that no plates take anything from.
+    Its corrected value is the moment of a ring of the printed radius without plates.
     """
     bare = with_plate(scene.disc, 0.0)
     liquid = scene.disc.axial_width * float(liquid_area(disc=bare, surface_radius=RING_RADIUS.value))

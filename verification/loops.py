@@ -29,7 +29,7 @@ AMPLITUDES: Final = (2e-6, 4e-6, 6e-6, 8e-6, 10e-6)
 GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""
 PERIODS: Final = (0.25, 0.5, 1.0)
-"""Between operations, s: the paper gives none; the middle one is judged and the others bound it."""
+"""Periods between operations, s; the paper gives none: the middle one is judged, the others are its range."""
 _STEPS: Final = ("first_trial", "long_step", "short_step")
 _CURVE_POINTS: Final = 400
 
@@ -107,7 +107,7 @@ def runs_with(
 
 
 def overshooting(runs: Sequence[Simulation]) -> float:
-    """Fraction of some runs that overshoot."""
+    """Fraction of the runs that overshoot."""
     return sum(run.overshoots > 0 for run in runs) / len(runs)
 
 
@@ -128,7 +128,7 @@ def settled_after(runs: Sequence[Simulation]) -> float | str:
 
 
 def worst(runs: Sequence[Simulation]) -> float:
-    """Most misadjustments in one of some runs."""
+    """Largest number of misadjustments in a run."""
     return float(max(run.misadjustments for run in runs))
 
 
@@ -158,7 +158,7 @@ def runs_table(
 
 
 def over_period(numbers: Sequence[float]) -> Found:
-    """A number at the middle one of `PERIODS`, which those at the others move."""
+    """Number at the middle one of `PERIODS`; the numbers at the others are its reach."""
     value = float(numbers[1])
     return Found(value=value).moved(min(numbers) - value, max(numbers) - value)
 

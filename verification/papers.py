@@ -1,6 +1,6 @@
-"""The two papers as the cases take them: printed numbers, scenes, and curves thin enough to draw.
+"""The two papers as the cases use them: printed numbers, scenes, and curves thinned for figures.
 
-Of the liquid ring: Pan, Wu, Gao and Mu, "Performance Analysis and Control Simulation of Pneumatic Liquid
+Liquid ring: Pan, Wu, Gao and Mu, "Performance Analysis and Control Simulation of Pneumatic Liquid
 Online Automatic Balancing System for Rotating Machinery"; each number stands with the value of one unit of
 its last digit.
 """
@@ -60,7 +60,7 @@ def at_paper_density(scene: Scene) -> Scene:
 
 
 def rounded_radius(quantity: Callable[[float], float]) -> float:
-    """Standard uncertainty that the rounding of the printed R1'min gives to a quantity of it."""
+    """Standard uncertainty of a function of R1'min from the rounding of the printed value."""
     return input_uncertainty([(quantity, RING_RADIUS.value, RING_RADIUS.uncertainty)])
 
 
@@ -101,7 +101,7 @@ def thinned(values: npt.ArrayLike) -> FloatArray:
 
 
 def envelope(values: npt.ArrayLike) -> FloatArray:
-    """Largest value in each of so many stretches, so that a thinned curve keeps its peaks."""
+    """Largest value between neighbouring points of `thinned`, so that a thinned curve keeps its peaks."""
     array = np.asarray(values, dtype=np.float64)
     return np.asarray(np.maximum.reduceat(array, _curve_indices(array.size)), dtype=np.float64)
 
@@ -122,8 +122,8 @@ def _curve_indices(size: int) -> IntArray:
 def changed(scene: EccentricScene, values: Mapping[str, Any]) -> EccentricScene:
     """The scene with some values replaced, and with the defaults that follow from them.
 
-    Unlike `SceneFile.with_values` it checks nothing: at the ends of an assumed noise, say, the limit may lie
-    below the noise. Args: `values`: by path, SI.
+    Unlike `SceneFile.with_values` it checks nothing: at the upper end of an assumed noise, for example, the
+    limit may lie below the noise. Args: `values`: by path, SI.
     """
     scene, changes = with_values_at(scene, values), set(values)
     for path in scene.defaulted:

@@ -43,7 +43,7 @@ _CODES: Final = {
     Verdict.FAILED: "case_failed",
     Verdict.NOT_RUN: "case_not_run",
 }
-"""Finding of a verdict; that of the others is "case_departs"."""
+"""Finding by verdict; all other verdicts have "case_departs"."""
 _FIGURES: Final = 6
 
 
@@ -66,7 +66,7 @@ class QuantityResult:
 
     @property
     def half_width(self) -> float | None:
-        """Half-width of the deviation that decided the quantity: 2 u_val, and the reach of assumed inputs.
+        """Half-width of the deviation that decided the quantity: 2 u_val plus the reach of assumed inputs.
 
         Zero where nothing uncertain entered; None where the case was not run.
         """
@@ -79,7 +79,7 @@ class QuantityResult:
         return reach if certain and judged_alone else deviation.half_width + reach
 
     def to_dict(self) -> Document:
-        """The quantity as its case's JSON has it."""
+        """Record of the quantity in the JSON of its case."""
         number = self.number
         reference = None if number is None else number.reference
         return {
@@ -120,7 +120,7 @@ class QuantityResult:
 
 @dataclass(frozen=True, kw_only=True)
 class MutationResult:
-    """Verdict on a case with a defect built in on purpose."""
+    """Verdict on a case with a deliberate defect."""
 
     mutation: Mutation
     verdict: Verdict
@@ -134,7 +134,7 @@ class MutationResult:
         return self.judged and self.verdict is self.mutation.expect
 
     def to_dict(self) -> Document:
-        """The mutation as its case's JSON has it."""
+        """Record of the mutation in the JSON of its case."""
         return {
             "id": self.mutation.id,
             "must_fail": self.mutation.what,
@@ -160,7 +160,7 @@ class CaseResult(Result):
     scene_sha256: str
     time_s: float = 0.0
     assumptions: tuple[Assumption, ...] = ()
-    """Inputs that nobody gave and that the verdict rests on."""
+    """Assumed inputs that the verdict rests on."""
     mutations: tuple[MutationResult, ...] = ()
 
     @property
@@ -170,7 +170,7 @@ class CaseResult(Result):
 
     @property
     def numbers(self) -> Mapping[str, float]:
-        """All numbers that the case's text may ask for.
+        """All numbers that placeholders of the case's text may name.
 
         For each quantity q: q, q_low and q_high (as far as assumed inputs move it), q_reference, q_error,
         q_relative (error over reference), q_uncertainty (95 % half-width of the deviation), q_limit; and
@@ -283,7 +283,7 @@ def kind_text(definition: CaseDefinition) -> str:
 
 
 def definition_document(definition: CaseDefinition) -> Document:
-    """A case as the list of all cases has it."""
+    """Record of a case in the list of all cases."""
     return _part(definition, _LISTED) | {"mutations": [mutation.id for mutation in definition.must_fail]}
 
 

@@ -23,7 +23,7 @@ from ringbalance.verification.verdicts import Verdict, combine
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
 DRIVEN = "eccentric_mass"
-"""The paper on eccentric masses."""
+"""Key of the paper on eccentric masses."""
 _ABOUT_A_SECTOR = (
     "it is about the sector between plates that the keys of [disc] give; this scene's chamber is imported"
 )
@@ -107,7 +107,7 @@ def _judged(
     except NotRunError as error:
         return without_evidence(str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
-        # A case that breaks down has not shown what it is there to show.
+        # A case that breaks down proves nothing.
         failed = Verdict.INCONCLUSIVE if definition.kind in ("claim", "validation") else Verdict.FAILED
         return without_evidence(f"{type(error).__name__}: {error}", failed)
     verdict = combine(
@@ -135,7 +135,7 @@ def _evidence(
     mutated: Any = scene
     if overrides:
         try:
-            # As a file would give the values, where a file may.
+            # Checked like a scene file, unless such values are not allowed in one.
             mutated = scene.with_values({k: None if v == "absent" else v for k, v in overrides.items()})
         except SceneError:
             mutated = overridden(scene, overrides)
@@ -145,7 +145,7 @@ def _evidence(
     shorter: Callable[[Any], Evidence] | None = getattr(code, "ends", None)
 
     def evidence_at(varied: Any) -> Evidence:
-        """Evidence on another scene, by the case's shorter way to it where it has one."""
+        """Evidence on another scene, by the case's `ends` where it has such a function."""
         try:
             if shorter is not None and defect is None:
                 return shorter(varied)
@@ -158,7 +158,7 @@ def _evidence(
 
 
 def scene_of(definition: CaseDefinition, scene: Scene) -> Any:
-    """Scene that a case is run on: the one at hand, the paper's disc or its rotor with eccentric masses."""
+    """Scene that a case is run on: the given one, the paper's disc, or its rotor with eccentric masses."""
     if definition.paper == DRIVEN:
         return driven_scene()
     return paper_scene() if definition.judged_on == "paper" else scene
@@ -201,8 +201,8 @@ def case_jobs(
 ) -> list[Job]:
     """Jobs that run some cases, each job's answer a tuple of results; options as of `run_case`.
 
-    First the one that takes longest when nothing is compiled yet: the eccentric masses' cases run one
-    compiled strategy, which is compiled once where one process runs them all.
+    The first job takes longest when nothing is compiled yet: the cases on eccentric masses share a compiled
+    strategy, so one process runs them all and compiles it once.
     Args: `apart`: True to make every case a job of its own.
     """
     driven = () if apart else tuple(case for case in case_ids if load_case(case).paper == DRIVEN)

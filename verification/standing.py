@@ -34,7 +34,7 @@ class _Subject:
     title: str
     assumed: str
     calibrated: str = "nothing"
-    """Parameters that were fitted to measurements, and to which; these are not judged."""
+    """Parameters fitted to measurements, with these measurements, which are not judged."""
     budgets: tuple[str, ...] = ()
     """Quantities whose uncertainty budget rests on it."""
     balancer: Literal["liquid_ring", "eccentric_mass"] = "liquid_ring"
@@ -48,7 +48,7 @@ SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
         ).items()
     }
 )
-"""By the names that cases give in `about`."""
+"""Subjects by the names that cases give in `about`."""
 
 
 def standing_rows(
@@ -109,7 +109,7 @@ def _name(case: Mapping[str, Any]) -> str:
 def _measured(case: Mapping[str, Any]) -> str:
     """Statistics of a validation: "ducts: 107 of 125 points, 97.2 % within, bias +1.1 %, ...".
 
-    Points that taught a coefficient are predictions of nothing and not counted.
+    Points to which a coefficient was fitted are no predictions and are not counted.
     """
     if case["verdict"] == "not run":
         return f"{_name(case)}: not run" + (" (a heavy case)" if case["cost"] == "heavy" else "")

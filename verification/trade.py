@@ -38,7 +38,7 @@ from ringbalance.verification.evidence import Level
 
 Record = dict[str, Any]
 Solve = Callable[[], tuple[FloatArray, ...]]
-"""Values at the points of a study, one array a quantity."""
+"""Function that returns values at the points of a study, one array per quantity."""
 
 _ENOUGH_CPU_S: Final = 0.2
 """Processor time after which a solve is not repeated, s."""
@@ -114,7 +114,7 @@ class TradeStudy(Result):
 
 
 def models_table(quantity: Record, times: Mapping[str, Sequence[Record]]) -> Table:
-    """The models of a quantity, both as `TradeStudy.to_dict` has them; times may be missing."""
+    """Table of a quantity's models from records of `TradeStudy.to_dict`; times may be missing."""
     speed = {each["model"]: each["designs_per_second"] for each in times.get(quantity["quantity"], ())}
     models, title = quantity["models"], quantity["title"][0].upper() + quantity["title"][1:]
     rows = [
@@ -135,7 +135,7 @@ def models_table(quantity: Record, times: Mapping[str, Sequence[Record]]) -> Tab
 
 
 def error_text(value: float | None) -> str:
-    """A relative error, as a percentage where it is large enough."""
+    """A relative error as text, from 0.1 % on as a percentage."""
     return percent(value, digits=2) if value is None or value >= 1e-3 else number(value, digits=2)
 
 
@@ -192,7 +192,7 @@ def _measured(
     half_widths: Sequence[float],
     status: Status,
 ) -> list[tuple[Record, list[Record]]]:
-    """Every model solved and timed, the last one being the finest: each quantity, and its models' times.
+    """Solve and time every model, the last being the finest; return each quantity with its models' times.
 
     Args: `titles`: by quantity, in the order of the values of a solve.
     """
@@ -230,7 +230,7 @@ def _measured(
 
 
 def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[str, Solve]:
-    """Wall pressure and moment; the finest finds the free surface under gravity to all orders."""
+    """Models of wall pressure and moment; the finest has the free surface under gravity to all orders."""
 
     def closed(gravity: bool) -> tuple[FloatArray, ...]:
         ring = RingValues.of(scene, fill_ratio=fills, gravity=gravity)
@@ -263,7 +263,7 @@ def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[st
 
 
 def _flow_models(scene: Scene, fills: FloatArray) -> dict[str, Solve]:
-    """Velocity at some fills under the scene's gas; the finest tabulates the loss to rounding."""
+    """Models of the velocity under the scene's gas; the finest tabulates the loss to rounding."""
 
     def velocity(law: Callable[[], FlowLaw]) -> tuple[FloatArray, ...]:
         return (law().evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure).velocity,)

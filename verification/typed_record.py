@@ -1,6 +1,6 @@
 """Dataclasses from TOML tables, checked against their annotations; all errors at once, each with its key.
 
-Understood: `str`, `float` (whole numbers too), `int`, `bool`, string enumerations, `Literal`, `X | Y`,
+Supported: `str`, `float` (whole numbers too), `int`, `bool`, string enumerations, `Literal`, `X | Y`,
 `tuple[X, ...]`, `Mapping[str, X]`, further dataclasses, `Any`, and `Annotated[str, Pattern(...)]`.
 """
 
@@ -22,7 +22,7 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True)
 class Pattern:
-    """Regular expression that a text must match as a whole, and the same in words."""
+    """Regular expression that a whole text must match, with its description in words."""
 
     expression: str
     allowed: str
@@ -40,7 +40,7 @@ def record_from(kind: type[Record], table: Mapping[str, Any]) -> Record:
     """A record of `kind` from a table.
 
     Raises: RecordError: unknown, missing or unsuitable values, all of them; or, where each value fits, the
-        objection of the record itself (a ValueError of its `__post_init__`).
+        error of the record itself (a ValueError of its `__post_init__`).
     """
     errors: list[str] = []
     result = _record(kind, table, "", errors)
@@ -98,7 +98,7 @@ def _record(kind: type, table: Any, path: str, errors: list[str]) -> Any:
 
 
 def _value(annotation: Any, value: Any, path: str, errors: list[str]) -> Any:
-    """The value as its annotation asks for it; None, and a line in `errors`, where it does not fit."""
+    """The value in its annotated type; None, and a line in `errors`, where it does not fit."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if is_dataclass(annotation):
         return _record(annotation, value, path, errors)  # type: ignore[arg-type]

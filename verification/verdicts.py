@@ -1,8 +1,7 @@
-"""Verdicts, from limits that stood before the result: first of each quantity, then of the whole case.
+"""Verdicts by limits set before the result: first on each quantity, then on the whole case.
 
 An assumed input can only weaken a verdict. A quantity is confirmed or refuted when it is so at every value
-that its assumed inputs may have; where that is not so it is inconclusive, however well the assumed values
-agree.
+that its assumed inputs may have; otherwise it is inconclusive, however well the assumed values agree.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ def judge_quantity(*, kind: Kind, metric: Metric, limit: float, number: Found) -
 
     `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val, without what assumed inputs
     add. It holds when |E| <= 2 u_val <= limit |D| (limit alone where D is zero) and no assumed input takes
-    |E| beyond limit |D|; it does not when no assumed input brings |E| within 2 u_val.  `relative`,
+    |E| beyond limit |D|; it fails when no assumed input brings |E| within 2 u_val.  `relative`,
     `absolute`: |E| against limit |D| or limit.  `at_most`, `at_least`: S against the limit, inconclusive in a
     claim when the limit lies inside S's own 95 % interval or within the reach of the assumed inputs.
     Raises: ValueError: a metric that needs a reference, without one.
@@ -111,9 +110,9 @@ def _by_bound(kind: Kind, metric: Metric, number: Found, deviation: Deviation) -
 
 
 def combine(*, kind: Kind, verdicts: Sequence[Verdict], roles: Sequence[Role] = ()) -> Verdict:
-    """Verdict of a case: that of its quantity that decides; not run when there are none.
+    """Verdict of a case: that of its deciding quantity; not run without quantities.
 
-    Readings of one claim count together, as the one that speaks most for it. A number that holds after a
+    Readings of one claim count as one, the most favourable. A number that holds after a
     correction leaves a claim confirmed with correction where its idea was judged and confirmed; otherwise it
     is refuted. Args: `roles`: of each verdict, default "number".
     Raises: ValueError: a verdict that this kind of case does not know.

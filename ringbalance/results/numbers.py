@@ -24,7 +24,7 @@ _UNSTATED_DIGITS: Final = 4
 _INPUT_ROUNDING: Final = 5e-4
 """Relative half-width of an input of three digits, the fewest that scene files have."""
 _ROUND_OFF: Final = 1e-6
-"""Relative half-width that is round-off, or of a closed form of inputs that are taken as exact."""
+"""Relative half-width up to which it is round-off, or that of a closed form of exact inputs."""
 _LOPSIDED_FRACTION: Final = 0.1
 """Difference of the two sides of an interval, over the larger, from which both are printed."""
 _TYPEWRITER: Final = str.maketrans({"\u202f": " ", "\u00a0": " ", "\u2212": "-", "µ": "u"})
@@ -40,7 +40,7 @@ def power_of_ten(exponent: int) -> str:
 
 
 def last_place(total: float) -> int:
-    """Decimal exponent of the second digit of a total uncertainty: that to which a value with it is printed.
+    """Decimal exponent of the second digit of a total uncertainty, the last digit printed of its value.
 
     Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
     Raises: ValueError: an uncertainty that is not positive.
@@ -48,7 +48,7 @@ def last_place(total: float) -> int:
     if not total > 0:
         raise ValueError("an uncertainty must be positive")
     width = Decimal(repr(float(total)))
-    # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
+    # Rounded twice: 0.0996 becomes 0.10, whose second digit has another exponent.
     return width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
 
 
@@ -67,8 +67,8 @@ def believed(value: float | None, total: float | None, *, stated: bool) -> float
 def rounded(value: float, total: float | None) -> str:
     """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
 
-    Nine digits of the value at most, and as many where the uncertainty is zero; four where it is None (see
-    `believed`). An exact zero has none.
+    The value has at most nine significant digits, nine where the uncertainty is zero, and four where it is
+    None (see `believed`); an exact zero is 0.
     """
     if total is None:
         total = 10.0 ** (Decimal(f"{value:.{_UNSTATED_DIGITS - 1}e}").adjusted() + 2 - _UNSTATED_DIGITS)
@@ -105,7 +105,7 @@ def _exact(value: float) -> Decimal:
 
 
 def number(value: float | None, *, digits: int = 4) -> str:
-    """A number to a count of significant digits; scientific when it is very large or very small.
+    """A number with `digits` significant digits, in scientific notation when very large or very small.
 
     Raises: ValueError: a value that is not finite.
     """
@@ -123,7 +123,7 @@ def number(value: float | None, *, digits: int = 4) -> str:
 
 
 def short(value: float | None, *, digits: int = 6) -> str:
-    """A prescribed number: no trailing zeros, at most so many significant digits.
+    """A prescribed number with at most `digits` significant digits and no trailing zeros.
 
     Raises: ValueError: a value that is not finite.
     """
@@ -133,7 +133,7 @@ def short(value: float | None, *, digits: int = 6) -> str:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """A number to a count of decimals, for a column that shares them.
+    """A number with a given count of decimals, for a column in which all numbers have as many.
 
     Raises: ValueError: a value that is not finite.
     """
@@ -141,14 +141,15 @@ def fixed(value: float, decimals: int) -> str:
 
 
 Width = float | tuple[float, float] | None
-"""Expanded uncertainty (95 %): on either side, or below and above, in the value's unit; None, zero: none."""
+"""Expanded uncertainty (95 %) in the value's unit, one or (below, above); None or zero: no uncertainty."""
 
 
 def measured(value: float | None, width: Width, *, digits: int = 4) -> str:
     """Value with its uncertainty, without unit: 72.043 ± 0.032, (1.20 ± 0.05) × 10⁻⁶ or 0.419 −0.003/+0.012.
 
-    All have the digits that the (larger) uncertainty supports; without one the value has `digits`.
-    Raises: ValueError: a number that is not finite, but for a side without an end, or a negative uncertainty.
+    Decimals are those that the (larger) uncertainty supports; without one the value has `digits`. One side of
+    the uncertainty may be infinite.
+    Raises: ValueError: a value or a symmetric uncertainty that is not finite, or a negative uncertainty.
     """
     below, above = width if isinstance(width, tuple) else (float(_exact(width or 0.0)),) * 2
     if min(below, above) < 0:
@@ -175,7 +176,7 @@ def measured(value: float | None, width: Width, *, digits: int = 4) -> str:
 
 
 def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) -> str:
-    """A fraction as a percentage, to a count of significant digits.
+    """A fraction as a percentage with `digits` significant digits.
 
     Raises: ValueError: a fraction that is not finite.
     """
@@ -194,12 +195,12 @@ def with_unit(text: str, unit: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class _DisplayUnit:
-    """A unit that values are shown in: shown value = SI value * factor."""
+    """Unit of display: shown value = SI value * factor."""
 
     symbol: str
     factor: float
     start: float = 0.0
-    """Smallest magnitude, SI, from which this unit is the one to show."""
+    """Smallest magnitude, SI, that is shown in this unit."""
 
 
 _Scale = tuple[str, float] | tuple[str, float, float]
@@ -228,11 +229,11 @@ SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
 
 
 def display_unit(unit: str, *values: float | None) -> _DisplayUnit:
-    """The unit that suits the largest of some SI values; for zero, and where none is known, the SI unit."""
+    """Unit that suits the largest of some SI values; the SI unit for zero and without a known value."""
     scales = SCALES.get(unit, ((unit, 1.0),))
     units = [_DisplayUnit(symbol=s, factor=f, start=start[0] if start else 0.0) for s, f, *start in scales]
     largest = max((abs(value) for value in values if value is not None), default=0.0)
-    # 0.1 MPa may arrive as 99 999.999 999: the last bits must not choose the unit.
+    # 0.1 MPa may be 99 999.999 999 Pa after rounding: the last bits must not decide the unit.
     fitting = [display for display in units if display.start <= largest * (1 + 1e-9)]
     if not largest and len(units) > 1:
         return _DisplayUnit(symbol=unit.replace("^3", "³").replace(" ", THIN_SPACE), factor=1.0)
@@ -246,7 +247,7 @@ def shown(value: float | None, unit: str, width: Width = None, *, digits: int = 
     Raises: ValueError: a value that is not finite.
     """
     sides = width if isinstance(width, tuple) else (width or 0.0, width or 0.0)
-    # A value that its own uncertainty exceeds is shown in the unit of that uncertainty.
+    # A value below its uncertainty is shown in the unit of the uncertainty.
     display = display_unit(unit, value, *(side for side in sides if math.isfinite(side)))
     if value is None:
         return MISSING
@@ -257,7 +258,7 @@ def shown(value: float | None, unit: str, width: Width = None, *, digits: int = 
 
 
 def format_given(value: float | None, unit: str, *, digits: int = 6) -> str:
-    """A prescribed SI quantity, as short as it may be, such as 0.7 MPa or 0.25.
+    """A prescribed SI quantity without trailing zeros, such as 0.7 MPa or 0.25.
 
     Raises: ValueError: a value that is not finite.
     """
@@ -266,6 +267,6 @@ def format_given(value: float | None, unit: str, *, digits: int = 6) -> str:
 
 
 def plain(text: str) -> str:
-    """A text as it is typed: "-" for the minus sign, um for µm, 10^-3 for 10⁻³, one kind of space."""
+    """A text in keyboard characters: "-" for the minus sign, um for µm, 10^-3 for 10⁻³, one kind of space."""
     powers = _POWER.sub(lambda power: "^" + power[0].translate(_TYPED_POWER), text)
     return powers.translate(_TYPEWRITER)

@@ -116,7 +116,7 @@ class Paired:
         return change / n, _NORMAL_95 * math.sqrt(differ - change**2 / n) / n
 
     def better(self, level: float) -> int | None:
-        """0 or 1, the setting under which more devices meet it; None: no difference is significant."""
+        """Index of the significantly better setting, 0 or 1; None: no significant difference at `level`."""
         if self.p_value > level:
             return None
         return 0 if self.first_alone > self.second_alone else 1

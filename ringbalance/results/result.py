@@ -37,21 +37,21 @@ _NOTEBOOK_QUANTITIES: Final = 10
 _COLUMNS: Final = ("name", "symbol", "value", "lower", "upper", "unit", "origin", "status")
 _EXTRA: Final = "this needs the package {0}: pip install {0}, or ringbalance[sweep-tables] with all of them"
 _NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
-"""A text that begins like a number, behind tags."""
+"""Beginning of a number, after any tags."""
 _FORMULA: Final = re.compile(r"(?![+-]?[\d.]+(?:e[+-]?\d+)?\Z)[=+\-@\t\r]")
 """Beginning of a formula in a spreadsheet, unless the whole text is a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Texts in rows and columns, whatever they are written to."""
+    """Texts in rows and columns, for any output."""
 
     caption: str = ""
     heads: Cells
-    """A line break divides a head."""
+    """Heads of the columns; a line break divides a head into lines."""
     rows: Sequence[Cells]
     note: str = ""
-    """Below the table."""
+    """Text below the table."""
     style: str = "narrow"
     """Class of the report's style sheet: "narrow", "dense", "words", "whole" or none."""
 
@@ -64,11 +64,11 @@ class Table:
 
 
 class _TermUsed(Protocol):
-    """A physical term as an answer lists it."""
+    """A physical term in the list of models that a result is based on."""
 
     @property
     def term(self) -> str:
-        """Its name."""
+        """Name of the term."""
 
     @property
     def model(self) -> str:
@@ -80,7 +80,7 @@ class _TermUsed(Protocol):
 
     @property
     def estimated_contribution(self) -> float | None:
-        """Relative to the result; None: unknown."""
+        """Estimated contribution relative to the result; None: unknown."""
 
 
 _MIN_CONTRIBUTION: Final = 0.1
@@ -88,7 +88,7 @@ _MIN_CONTRIBUTION: Final = 0.1
 
 
 def models_table(models_used: Iterable[_TermUsed], *, tolerance: float) -> Table:
-    """Physical terms of an answer with their models, without those far below the tolerance."""
+    """Physical terms of a result with their models, without those far below the tolerance."""
     rows = [
         (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)
         for each in models_used
@@ -100,8 +100,8 @@ def models_table(models_used: Iterable[_TermUsed], *, tolerance: float) -> Table
 def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
     """Columns of one length as comma-separated values below a line of their names; None is an empty cell.
 
-    A text that a spreadsheet would take for a formula, which a number is not, stands behind an apostrophe; a
-    carriage return, which would end the line, becomes a line feed.
+    An apostrophe precedes a text that a spreadsheet would take for a formula, numbers excepted; a carriage
+    return, which would end the line, becomes a line feed.
     """
 
     def escaped(cell: Any) -> Any:
@@ -118,7 +118,7 @@ def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
 
 
 def _findings_text(findings: Iterable[Finding], *, headline: bool) -> Group:
-    """One sentence a finding; the first may be a headline."""
+    """One sentence per finding; the first may be a headline."""
     texts = []
     for number, each in enumerate(findings):
         first = headline and number == 0
@@ -138,7 +138,7 @@ def _two_columns(rows: Iterable[tuple[str, str]]) -> RichTable:
 
 
 def _terminal_table(table: Table) -> RichTable:
-    """A table for a rich console, in the signs of a typewriter."""
+    """A table for a rich console, in keyboard characters."""
     shown = RichTable(
         title=table.caption or None,
         caption=table.note or None,
@@ -151,7 +151,7 @@ def _terminal_table(table: Table) -> RichTable:
         pad_edge=False,
     )
     for number, (head, numeric) in enumerate(zip(table.heads, table.numeric, strict=True)):
-        # A name that is cut short is no use; anything else is broken into lines.
+        # A name up to this length stays on one line; all other cells wrap.
         name = (
             number == 0 and max((len(row[0]) for row in table.rows), default=0) <= _UNBROKEN_NAME_CHARACTERS
         )
@@ -201,7 +201,7 @@ class Rows:
         tables = iter([_terminal_table(table) for table in self.tables if table.rows])
         if headline:
             return Group(_findings_text(self.findings, headline=True), numbers, *more, *tables)
-        # Where nothing is listed, the first table has the quantities.
+        # Without a list of quantities the first table shows them.
         first = [*islice(tables, 1), _two_columns(self.facts)] if self.listed == 0 else [numbers]
         sentences = _findings_text(self.findings, headline=False)
         return Group(Text(self.title, style="bold"), *first, *more, sentences, *tables)
@@ -247,7 +247,7 @@ def print_rows(rows: Rows, *, headline: bool = True) -> None:
 
 
 def extra(package: str, name: str) -> Any:
-    """A registered function of a package that need not be there. Raises: ModuleNotFoundError: it is not."""
+    """A registered function of an optional package. Raises: ModuleNotFoundError: it is not installed."""
     try:
         return registered("function", name)
     except ModuleNotFoundError as error:
@@ -313,7 +313,7 @@ class Result:
 
 @dataclass(frozen=True, kw_only=True)
 class Presentation:
-    """Functions that lay out a result; the caller that makes the result passes them, since they import it."""
+    """Functions that lay out a result, passed to the result by the caller, since they import its type."""
 
     document: Callable[[Any], dict[str, Any]]
     rows: Callable[[Any], Rows]

@@ -1,8 +1,8 @@
 """A quantity and a finding, each as one record: the parts of every output.
 
-A finding is a code with its severity, numbers, sentence, and the change of the scene that mends it.  A
+A finding is a code with its severity, numbers, sentence, and the change of the scene that corrects it.  A
 sentence stands in `sentences.toml` under its code, with its numbers in braces: {limit:m} is the value "limit"
-in the unit that suits so many metres, {share:%} a fraction as a percentage, {chamber} a text or a number.
+in the unit of length that suits it, {share:%} a fraction as a percentage, {chamber} a text or a number.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Quantity:
     symbol: str = ""
     lower: float | None = None
     upper: float | None = None
-    """Ends of the 95 % interval; None: not known, or no end on this side."""
+    """Ends of the 95 % interval; None: unknown, or unbounded on this side."""
     parts: Parts | None = None
     causes: Mapping[str, float] = field(default_factory=dict)
     """Expanded uncertainties (95 %) of the parts `input` and `model` by cause, SI: path in the scene file,
@@ -62,7 +62,7 @@ class Quantity:
     status: str = "ok"
     """ "ok" or the code of the finding that limits it."""
     digits: int = 4
-    """Significant digits of the value as text without an uncertainty."""
+    """Significant digits of the value in texts where it has no uncertainty."""
 
     @classmethod
     def of_fraction(cls, fraction: Proportion, *, key: str, name: str) -> Quantity:
@@ -93,7 +93,8 @@ class Quantity:
     def with_deviation(self, make: Callable[[float | None, float], Made]) -> Made:
         """The value with its standard deviation, such as `with_deviation(uncertainties.ufloat)`.
 
-        That of a normal distribution with as wide a 95 % interval; zero where not both ends are known.
+        The standard deviation is that of a normal distribution with a 95 % interval of this width; zero
+        unless both ends are known.
         """
         if self.lower is None or self.upper is None:
             return make(self.value, 0.0)
@@ -109,7 +110,7 @@ class Quantity:
 
 
 def around(value: float, total: float | None, *, stated: bool = True) -> tuple[float | None, float | None]:
-    """Ends of an interval as wide on both sides; none without an uncertainty that is `believed`."""
+    """Ends of a symmetric 95 % interval; (None, None) where `believed` gives no uncertainty."""
     width = believed(value, total, stated=stated)
     return (value - width, value + width) if width else (None, None)
 
@@ -189,7 +190,7 @@ def sentences() -> Mapping[str, _Sentence]:
 
 
 def series(names: Sequence[str]) -> str:
-    """Names as a sentence has them: "a, b and c"."""
+    """Names joined for a sentence: "a, b and c"."""
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
 
 

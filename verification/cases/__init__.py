@@ -11,7 +11,7 @@ from types import ModuleType
 
 
 def __getattr__(name: str) -> ModuleType:
-    """A module of this room by the name that a case.toml gives it, such as "cases.chamber"."""
+    """A module of this package by its name in a case.toml, such as "cases.chamber"."""
     if "." not in name:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return import_module(f"ringbalance.verification.{name}")

@@ -1,5 +1,5 @@
-"""Claims on how fast and how surely the two algorithms balance, and on the three gains of the target-vector
-algorithm: what they do to overshoot and settling time.
+"""Claims on the speed and reliability of the two algorithms, and on the effect of the target-vector
+algorithm's three gains on overshoot and settling time.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
     slowest = [slowest_within(scene, group) for group in runs.values()]
     rises = list(map(worst, runs.values()))
     _, bare = fig_7_readings()
-    # No longer than it takes to see whether the bound is met.
+    # Twice the bound is long enough to see whether it is met.
     brief = dataclasses.replace(bare, run=dataclasses.replace(bare.run, time_limit=2 * _PRINTED_BOUND_S))
     calibrated = [
         run_loop(loop_scene(brief, kind="target_vector", amplitude=amplitude, period=0.5), "calibrated")
@@ -216,28 +216,28 @@ _PRINTED_INTEGRAL_TIME_S: Final = 48.0
 _SMALL_INTEGRAL_TIME_S: Final = 1.2
 _INTEGRAL_TIMES_S: Final = (None, _PRINTED_INTEGRAL_TIME_S, 6.0, _SMALL_INTEGRAL_TIME_S, 0.3)
 _DERIVATIVE_TIMES_S: Final = (0.0, 0.06, 0.6, 6.0)
-"""None, the paper's 0.001 min, ten and a hundred times that."""
+"""Derivative times: none, the paper's 0.001 min, ten times and a hundred times that."""
 
 
 def proportional_gain_ends(scene: Scene) -> Evidence:
-    """The onset alone."""
+    """Onset of overshoot alone."""
     return Evidence(quantities=as_found(onset=_onset(scene)))
 
 
 def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Overshoot of the target-vector algorithm over Kp, and the rule behind it."""
+    """Overshoot of the target-vector algorithm over Kp, with the rule for its onset."""
     runs = {gain: _run(scene, gain) for gain in GAINS}
     _, bare = fig_7_readings()
     rate, calibrated = _rate(scene, paper_model(scene)), _rate(bare, BalancerModel.of(flow_law_of(bare)))
     onset = _onset(scene)
-    # The vibration along a chamber's own axis, so that a single valve answers for the overshoot.
+    # Vibration along a chamber's axis, so that a single valve causes the overshoot.
     phase = -scene.rotor.lag_angle
     run = run_loop(
         loop_scene(scene, kind="target_vector", proportional=GAINS[-1], integral_time=None, phase=phase)
     )
     measured = [sample.measurement for sample in run.samples if sample.measurement is not None]
     turn = abs(math.remainder(measured[1].phase - measured[0].phase, 2 * math.pi))
-    # With an integral part a larger gain may overshoot less, so they are tried one after the other.
+    # With an integral part a larger gain may overshoot less, so no bisection: every gain is tried in turn.
     with_integral = next(
         (
             gain
@@ -278,16 +278,16 @@ def _run(scene: Scene, gain: float, integral_time: float | None = None) -> Simul
 
 
 def _onset(scene: Scene) -> float:
-    """Smallest searched Kp at which the residual turns round, or the largest one without any, s/m.
+    """Smallest searched Kp at which the residual overshoots, else the largest searched Kp, s/m.
 
-    A larger gain never overshoots less, so halving finds what trying one after the other would.
+    A larger gain never overshoots less, so bisection finds the same Kp as a sequential search.
     """
     first = bisect_left(_SEARCHED_GAINS, True, key=lambda gain: _run(scene, gain).overshoots > 0)
     return float(_SEARCHED_GAINS[min(first, len(_SEARCHED_GAINS) - 1)])
 
 
 def _rate(scene: Scene, model: BalancerModel) -> float:
-    """Fall of the vibration per second of gas into one chamber at equal fills, m/s."""
+    """Decrease of the vibration per second of gas into one chamber at equal fills, m/s."""
     middle = model.flow.max_fill_ratio / 2
     step = 1e-3 * middle
     velocity = float(model.flow.evaluate(fill_ratio=middle, gas_pressure=scene.gas.pressure).velocity)
@@ -300,7 +300,7 @@ def _rate(scene: Scene, model: BalancerModel) -> float:
 
 def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Settling time of the target-vector algorithm over Kp."""
-    # The phase of the start makes no difference to this law.
+    # The initial phase does not affect this law.
     groups = (runs_with(scene, proportional=gain, integral_time=None, derivative_time=0.0) for gain in GAINS)
     times = np.array([[slowest_within(scene, [run]) for run in group] for group in groups])
     raised = times[: len(_RAISED_GAINS)]

@@ -27,14 +27,14 @@ from ringbalance.verification.reference.bent_tube import BentTubeFlow, Segment, 
 
 REYNOLDS: Final = 200.0
 VISCOSITY_M2_S: Final = 20e-6
-"""m^2/s: a silicone oil."""
+"""Kinematic viscosity of a silicone oil, m^2/s."""
 LEG_IN, HUMP, LEG_OUT = 3.0, 6.0, 12.0
 """Straight lengths over the bore."""
 _MESHES: Final = ((2, 2, 1.0), (2, 3, 1.5), (3, 4, 2.1))
-"""Cells around and across, and along over those of the coarsest; coarse to fine."""
+"""Cells around, cells across, and cells along over those of the coarsest mesh; coarse to fine."""
 _FORMAL_ORDER: Final = 4.0
 _DEVELOPED_BORES: Final = (5.0, 1.0)
-"""Ends of the stretch of developed flow, bores before the outlet."""
+"""Ends of the part with developed flow, bores before the outlet."""
 
 
 def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
@@ -70,7 +70,7 @@ def _solve(
         reynolds=REYNOLDS,
         rotation_reynolds=rotation,
         coriolis_factor=coriolis_factor,
-        # With less rotation the start is further from the flow.
+        # With less Coriolis force the initial guess is further from the flow.
         first_inertia=1.0 if coriolis_factor == 1.0 else 0.5,
         progress=lambda text: print(f"bent_tube_3d: {text}", file=sys.stderr, flush=True),
     )
@@ -86,7 +86,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
     )
     losses: list[float] = []
     for mesh in _MESHES if defect is None else _MESHES[1:2]:
-        # The flow of the mesh before is given up; each holds hundreds of megabytes.
+        # Only the latest flow is kept, since each takes hundreds of megabytes.
         flow = _solve(scene, mesh, rotation, 1.0 if defect is None else 0.5)
         losses.append(flow.pressure_loss(start=0.0, end=float(flow.arc_length[-1])))
     s, k = flow.arc_length, losses[-1]
@@ -95,7 +95,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
     terms = _law_terms(scene, end, rotation)
     plain = terms["friction"] + terms["rotation"]
     with_bends, explained = plain + terms["bends"], plain + terms["shift"]
-    # Gradient where flow has developed again, over that of the table.
+    # Gradient where flow has developed again, for the ratio to that of the table.
     first, last = (end - distance for distance in _DEVELOPED_BORES)
     gradient = REYNOLDS / 2 * flow.pressure_loss(start=first, end=last) / (last - first)
     ratio = rotating_friction_ratio(reynolds=REYNOLDS, rotation_reynolds=rotation)

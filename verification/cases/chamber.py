@@ -75,14 +75,14 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         return chamber_volume(disc=with_plate(disc, plate_from_radius(radius)))
 
     def from_departure(departure: float) -> float:
-        """Eqs. 18 and 19 turned round: (1 - D)^2 = (p0 - s)/(p0 + s) with s = rho omega^2 V/(2 B theta)."""
+        """Eqs. 18 and 19 solved for V: (1 - D)^2 = (p0 - s)/(p0 + s) with s = rho omega^2 V/(2 B theta)."""
         ratio = (1 - departure) ** 2
         stall = LOW_PRESSURE_PA * (1 - ratio) / (1 + ratio)
         per_volume = DENSITY_KG_M3 * scene.rotor.speed**2 / (disc.axial_width * disc.central_angle)
         return stall / per_volume / 0.5
 
     def liquid(radius: float) -> float:
-        """Twice V'_AC, which the paper reads off a radius that it has rounded."""
+        """Twice V'_AC, which the paper calculates from a rounded radius, m^3."""
         return 2 * disc.axial_width * float(liquid_area(disc=disc, surface_radius=radius))
 
     rounding = input_uncertainty([(from_departure, DEPARTURE_LOW.value, DEPARTURE_LOW.uncertainty)])
@@ -149,7 +149,7 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
 
 
 def moment_ends(scene: Scene) -> Evidence:
-    """The moment alone: Eq. 7 knows no plates."""
+    """Moment alone, since Eq. 7 leaves out the plates."""
     return Evidence(quantities={"moment": chamber_moment(at_paper_density(scene), density=DENSITY_KG_M3)})
 
 
@@ -214,7 +214,7 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
         printed = 2 * CHAMBER_MOMENT.value
     chamber = both.value / math.sqrt(2)
     angle = np.linspace(0, np.pi / 2, 91)
-    # What two pairs, each within +-U, can make exactly along a direction.
+    # Moment that two pairs, each within +-U, can make exactly along a direction.
     largest = chamber / np.maximum(np.abs(np.cos(angle)), np.abs(np.sin(angle)))
     shown = figure(
         "balancing ability against its direction",
@@ -235,7 +235,7 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
 
 
 def density(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """The moment at one and at two grams per millilitre by finite elements."""
+    """Moment at densities of one and two grams per millilitre by finite elements."""
     full, twice = (scene.disc.max_fill_ratio,), 2 * DENSITY_KG_M3
     light, dense = (ring_of(scene, full, density=each) for each in (DENSITY_KG_M3, twice))
     capacity = chamber_moment(scene, density=twice, factor=math.sqrt(2))
@@ -293,7 +293,7 @@ def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 
 def correction(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Eq. 22 with Eq. 21's mass, literally and per transferred mass, beside Eqs. 7 and 8."""
+    """Eq. 22 with Eq. 21's mass, literally and per transferred mass, compared with Eqs. 7 and 8."""
     full = scene.disc.max_fill_ratio
     mass = float(paper.correction_mass(disc=scene.disc, density=DENSITY_KG_M3, fill_ratio=full))
     arm = CHAMBER_MOMENT.value / mass if defect == "lambda_from_eq_7" else paper.PAPER_LAMBDA_M

@@ -1,5 +1,5 @@
-"""The eccentric-mass paper's runs: positioning, fine tuning and run-up (Figs. 7 to 9) and their bound, and
-what it estimates: the imbalance (Fig. 4) and the friction arms (Fig. 5).
+"""The eccentric-mass paper's runs: positioning, fine tuning and run-up (Figs. 7 to 9) with their bound, and
+its estimates: the imbalance (Fig. 4) and the friction arms (Fig. 5).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
 
 @lru_cache(maxsize=1)
 def _locked(scene: EccentricScene) -> EccentricRun:
-    """Run with locked masses; no sensor is looked at, so that one run serves every noise of the position."""
+    """Run with locked masses; it uses no sensor, so one run serves every position noise."""
     return simulate_eccentric(changed(scene, {"supervisor.strategy": "locked"}))
 
 
@@ -104,7 +104,7 @@ class _Balanced(NamedTuple):
     runs: Mapping[str, EccentricRun]
     """Runs by their names in a figure."""
     before: FloatArray
-    """Steady amplitude of each run before anything is moved, m."""
+    """Steady amplitude of each run before the masses move, m."""
     positioned: FloatArray
     """Mean amplitude in the last second of the check, m; infinite without one."""
     after: FloatArray
@@ -112,7 +112,7 @@ class _Balanced(NamedTuple):
 
 
 def _balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> _Balanced:
-    """Balance the two imbalances of the paper's Fig. 7."""
+    """Balance the two imbalances of the paper's Fig. 7, one run each."""
     constant = at_constant_speed(scene, time_limit=time_limit)
     runs = {
         f"imbalance at {phase:.0f} degrees": simulate_eccentric(
@@ -136,7 +136,7 @@ def _balanced_at_constant_speed(scene: EccentricScene, *, time_limit: float) -> 
 
 
 def _off_target(scene: EccentricScene) -> EccentricScene:
-    """The scene with masses that stop 10 degrees off their targets, then trials alone, as in Fig. 8."""
+    """The scene with masses that stop 10 degrees off their targets, then with trials alone, as in Fig. 8."""
     error = (_TARGET_ERROR_RAD, _TARGET_ERROR_RAD)
     return changed(scene, {"supervisor.target_error": error, "supervisor.correction": "trials"})
 
@@ -283,7 +283,7 @@ class _FigureFour(NamedTuple):
     true: FloatArray
     """True imbalances along the rotor's axes, kg m, shape (phases, 2)."""
     estimate: FloatArray
-    """Estimates with honest covariances, kg m, shape (phases, n, 2)."""
+    """Estimates with the true noise covariances, kg m, shape (phases, n, 2)."""
     covariance_norm: FloatArray
     """Largest singular value of P, shape (phases, n)."""
     honest_time: tuple[float, ...]
@@ -291,22 +291,22 @@ class _FigureFour(NamedTuple):
     scales: FloatArray
     """Assumed over true sensor noise, shape (scales,)."""
     scaled_time: FloatArray
-    """Time of the first phase under each scale, s, shape (scales,); infinite where it is never reached."""
+    """Convergence time of the first phase at each scale, s, shape (scales,); infinite without convergence."""
 
 
 def imbalance_ends(scene: EccentricScene) -> Evidence:
-    """Convergence with honest covariances alone."""
+    """Convergence times with the true noise covariances alone."""
     return Evidence(quantities=_judged(_figure_four(scene, scales=(1.0,))))
 
 
 def _judged(estimates: _FigureFour, time: float | None = None) -> dict[str, Found]:
-    """Args: `time`: of convergence, s; default that with honest covariances."""
+    """Judged quantities. Args: `time`: of convergence, s; default that with the true noise covariances."""
     norm, slowest = estimates.covariance_norm, max(estimates.honest_time) if time is None else time
     return as_found(honest=min(slowest, estimates.time[-1]), covariance=np.max(norm[:, -1] / norm[:, 0]))
 
 
 def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Convergence of the estimates of four imbalances, and the covariances that take the printed time."""
+    """Convergence of the estimates of four imbalances, and the covariances that give the printed time."""
     estimates = _figure_four(scene)
     reached = np.isfinite(estimates.scaled_time)
     scales, times = estimates.scales[reached], estimates.scaled_time[reached]
@@ -318,7 +318,7 @@ def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) ->
         FigureCurve("printed", "s", np.full(times.shape, _PRINTED_TIME_S), style="paper"),
         log=True,
     )
-    # The figure's own four curves, as distances from the truth over the imbalance.
+    # The four curves of the figure, as distances from the true imbalance over its magnitude.
     error = np.linalg.norm(estimates.estimate - estimates.true[:, None, :], axis=2)
     relative = error / np.linalg.norm(estimates.true, axis=1)[:, None]
     shown = estimates.time <= 0.5
@@ -371,7 +371,7 @@ def _estimate_imbalance(
 
 
 def _figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _NOISE_RATIOS) -> _FigureFour:
-    """Estimates of the four imbalances of the paper's Fig. 4, and of one under dishonest covariances."""
+    """Estimates of the four imbalances of the paper's Fig. 4, and of one with scaled noise covariances."""
     turned = [changed(scene, {"imbalance.phase": math.radians(phase)}) for phase in _FIG_4_PHASES_DEG]
     records = [_imbalance_record(rotor, duration=_RECORD_S) for rotor in turned]
     pairs = list(zip(turned, records, strict=True))
@@ -438,5 +438,5 @@ def friction_time(run: EccentricRun, arm: float) -> float:
 
 
 def _begun(run: EccentricRun) -> float:
-    """Beginning of the friction stage, s; minus infinity without one, so that nothing counts as found."""
+    """Beginning of the friction stage, s; without one minus infinity, so that nothing has converged."""
     return next((stage.start for stage in run.stages if stage.name == "friction estimation"), -math.inf)

@@ -1,4 +1,4 @@
-"""The eccentric-mass paper's positioning: its effort (Fig. 6), where masses rest, how near they come."""
+"""The eccentric-mass paper's positioning: effort (Fig. 6), resting positions, and distances of the masses."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _COMPENSATED: Final = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.
 _START_RAD: Final = 1.0
 """First distance of a mass from its target."""
 _LOST_RAD: Final = 10.0
-"""Distance from which on a mass does not come back."""
+"""Distance beyond which a mass does not return to its target."""
 _NEARLY_COMPENSATED: Final = 0.98
 """Fraction of the friction arm that is compensated where a mass comes to rest."""
 _CASES: Final = 20_000
 _SEED: Final = 20_200_627
 _INSTANTS: Final = 201
 _PACE_RATIO: Final = 2.0
-"""Pace of one mass over that of the other, where these differ."""
+"""Rate of approach of the first mass over that of the second, where these differ."""
 _ROUND_OFF_RAD: Final = 1e-9
 
 
@@ -47,7 +47,7 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     """Effort of positioning over weights and speed, and its growth by each friction compensation.
 
     The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are
-    not in it: what the regulator has to do is the move itself and the friction that compensation leaves.
+    not in it: the regulator's torque is that of the move itself and of the friction not compensated.
     """
     efforts = _efforts(scene, step=_STEP_S[level])
     grown = {name: growth(each) for name, each in efforts.items()}
@@ -75,9 +75,9 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
 
 
 def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Growth of the same efforts with q/r and with the mass ratio."""
+    """Growth of the effort with q/r and with the mass ratio."""
     efforts = _efforts(scene, step=_STEP_S[level])
-    # The largest over the smallest q/r, and the larger over the smaller mass ratio.
+    # Effort at the largest q/r over that at the smallest, and likewise for the mass ratios.
     over_weight = {name: each[:, -1] / each[:, 0] for name, each in efforts.items()}
     over_mass = {name: each[0] / each[1] for name, each in efforts.items()}
     exact, short = ("exact", "short") if defect is None else ("without", "without")
@@ -132,10 +132,10 @@ def _move(
     duration: float,
     printed: bool,
 ) -> tuple[float, float]:
-    """Two masses on their ways to their targets, rad, the whirl's loads compensated.
+    """Move two masses to their targets from distances in rad, the whirl's loads compensated.
 
-    Returns: Integral of the norm of the regulator's torques, N m s; distance of the first mass from its
-        target in the end, rad, or where it has gone far away.
+    Returns: Integral of the norm of the regulator's torques, N m s; final distance of the first mass from its
+        target, rad, or the distance at which the run stops because the mass is lost.
     Source: Eqs. 40 and 55 of the paper on eccentric masses.
     """
     angle, rate, torque = np.array([-first, -second]), np.zeros(2), np.zeros(2)
@@ -158,7 +158,7 @@ def _move(
 
 @compiled
 def _printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float, rate: float) -> float:
-    """Friction's torque by the paper, N m: the angle stands for the rate, and a resting mass gets none.
+    """Friction torque by the paper, N m: with the angle in place of the rate, and none for a resting mass.
 
     Source: part (b) of Eq. 39 of the paper on eccentric masses.
     """
@@ -168,7 +168,7 @@ def _printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float,
 
 @compiled
 def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float, step: float) -> float:
-    """Rate one step later under dry friction; a mass that would turn round within the step rests first."""
+    """Rate one step later under dry friction; a mass that would reverse within the step rests first."""
     most = arm * law.track.moment * (speed + rate) ** 2
     if rate == 0:
         if abs(net) <= most:
@@ -206,9 +206,9 @@ def stability(scene: EccentricScene, level: Level, defect: str | None = None) ->
 
 
 def collision(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Random masses on the way to targets that are assigned by the paper's rule.
+    """Random masses on their ways to targets assigned by the paper's rule.
 
-    Judged is the fraction in which they come nearer on the way than at both ends of it.
+    The fraction of cases in which they come nearer on the way than at both of its ends is judged.
     Source: Eqs. 26 to 28 of the paper on eccentric masses.
     """
     random = np.random.default_rng(_SEED)

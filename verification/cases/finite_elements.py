@@ -45,7 +45,7 @@ _QUANTITIES: Final = {
 """Totals of a ring by their names in the case."""
 _CHAMBERS: Final = (4, 6, 8, 10)
 _ROUND_OFF: Final = 1e-13
-"""Relative errors below this are the exact value's own rounding."""
+"""Relative error below which it is rounding of the exact value."""
 _RANDOM_DISCS: Final = 240
 _SEED: Final = 20
 _WIDTHS: Final = {None: 1.0, "half_widths_quartered": 0.25, "half_widths_padded": 100.0}
@@ -55,7 +55,7 @@ _MUTATIONS: Final[Mapping[str | None, Mapping[str, float]]] = {
     "liquid_lost": {"leak": 1e-6},
 }
 _FEW: Final = Size(points=40, sweep=2, fineness=1.0)
-"""Enough for a mutation to show."""
+"""Size of a study in which a mutation shows."""
 _WORKERS: Final = 2
 
 
@@ -144,7 +144,7 @@ def _published_examples() -> dict[str, _Example]:
 
 
 def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Grid convergence judged on sequences that were made from their limit."""
+    """Grid convergence judged on constructed sequences with known limits."""
     h = _MESH_SIZES
     monotone, oscillatory = (GridVerdict.MONOTONE,), (GridVerdict.OSCILLATORY,)
     # Values on meshes of size 1, 2 and 4, with the verdicts that they allow.
@@ -223,17 +223,17 @@ class _Fared(NamedTuple):
     """Statistics of the half-widths of one quantity over all samples."""
 
     share: float
-    """Fraction of the samples whose half-width holds the exact value."""
+    """Fraction of the samples with the exact value within the half-width."""
     tightness: float
     """Median of |error| over half-width, samples at round-off left out."""
     judged: int
-    """Samples not at round-off."""
+    """Number of samples not at round-off."""
     worst: float
     """Largest |error| over half-width."""
 
 
 def _fared(ratios: FloatArray) -> _Fared:
-    """Args: `ratios`: |error| over half-width; nan where the error is at round-off, and so within it."""
+    """Statistics of ratios |error| over half-width; nan: error at round-off, which counts as within."""
     judged = ratios[~np.isnan(ratios)]
     share = 1 - float(np.mean(ratios > 1))
     if not judged.size:

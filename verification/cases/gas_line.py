@@ -128,7 +128,7 @@ def _angles(disc: Disc) -> FloatArray:
 
 
 def _hole(disc: Disc, best: float) -> ComplexArray:
-    """Points of the hole, m: the one that an imported chamber has, or the safest point of the centre line."""
+    """Points of the hole, m: that of an imported chamber, or the safest point of the centre line."""
     facets = {} if disc.geometry is None else disc.geometry.boundaries
     if disc.geometry is None or _HOLE not in facets:
         return _on_centre_line(best)
@@ -169,13 +169,13 @@ def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
 
 
 def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points: int) -> _Cells:
-    """Cells that hold what lies in each column along the shaft, at the middle of it."""
+    """Cells, each with the volume of a column along the shaft, at the centroid of the column."""
     # Gauss points of all cells across the shaft, m, and the volume at each, m^3.
     body = tetrahedra(geometry)
     line, weights = gauss(points)
     u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [line], indexing="ij"))
     weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights], indexing="ij")], axis=0)
-    # A cube drawn to a corner: its Jacobian is (1 - v)(1 - w)^2.
+    # A cube collapsed to a tetrahedron: its Jacobian is (1 - v)(1 - w)^2.
     second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
     local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
     corners = body.nodes[body.cells]
@@ -201,7 +201,10 @@ def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points
 
 
 def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:
-    """Fraction of the chamber below a level. Args: `height`: of the cells above it, (states, cells)."""
+    """Fraction of the chamber that holds liquid.
+
+    Args: `height`: distance of the cells from the surface, m, positive in the liquid, shape (states, cells).
+    """
     inside = np.clip(0.5 + height / cells.width, 0.0, 1.0)
     return np.asarray(inside @ cells.share, dtype=np.float64)
 
@@ -243,7 +246,7 @@ def _outside(scene: Scene, radius: float, a: float) -> FloatArray:
     """Totals of the sector between plates less a cylinder of a radius along x, outside a surface at a.
 
     Volume, m^3, moment along x, kg m, and lambda, twice the mean of x over the surface, m. By quadrature over
-    y = radius sin(angle), which takes the root at the cylinder's sides away; no mesh.
+    y = radius sin(angle), which removes the root at the cylinder's sides; no mesh.
     """
     disc, alpha = scene.disc, float(half_angle(disc=scene.disc, radius=a))
 

@@ -1,4 +1,4 @@
-"""Claims on the gas pressure: the least that starts a flow, and the reach with a denser liquid."""
+"""Claims on the gas pressure: the least that starts a flow, and the moment reached with a denser liquid."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from ringbalance.verification.reference.chambers import exact_moment, wall_press
 
 _SCAN_POINTS: Final = 101
 _GAIN_STANDARD_UNCERTAINTY: Final = 1e-6
-"""The fill at which the flow ends is located to a millionth of the largest."""
+"""Standard uncertainty of the gain: the fill at which the flow ends is located to 1e-6 of the largest."""
 _REFINEMENTS: Final = 3
-"""Scans for the fill at which the flow ends, each a hundred times finer; a figure needs one less."""
+"""Number of scans for the fill at which the flow ends, each 100 times finer; a figure needs one less."""
 
 
 def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -76,16 +76,16 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
 
 
 def denser_liquid_ends(scene: Scene) -> Evidence:
-    """The gains alone."""
+    """Gains in moment alone."""
     laws = [_law(scene, density) for density in (scene.liquid.density, 2 * scene.liquid.density)]
     return Evidence(quantities=as_found(gain=_gain(scene, laws), gain_raised=_gain(scene, laws, raised=2)))
 
 
 def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Gain in ability at one gas pressure with a liquid of twice the density."""
+    """Gain in balancing moment at one gas pressure with a liquid of twice the density."""
     light, full = scene.liquid.density, scene.disc.max_fill_ratio
     dense = light if defect == "weightless" else 2 * light
-    # What the gas has to overcome when the driven chamber is empty: the wall pressure of a full opposite one.
+    # Back pressure when the driven chamber is empty: the wall pressure of a full opposite one.
     stalls = [found_of(ring_of(scene, (full,), density=d), "wall_pressure", 0).value for d in (light, dense)]
     laws = [_law(scene, density) for density in (light, dense)]
     reach = [_reach(law, scene.gas.pressure) for law in laws]
@@ -133,7 +133,7 @@ def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evid
 
 
 def _gain(scene: Scene, laws: Sequence[FlowLaw], *, raised: int = 1, full: bool = False) -> float:
-    """Ability on hand with the second law's liquid of twice the density, over that with the first law's.
+    """Balancing moment reached with the second law and twice the density, over that with the first law.
 
     Args: `raised`: factor of the gas pressure under the second law. `full`: True if its tube stays full.
     Raises: NotRunError: the gas does not start the flow of the scene's own liquid.
@@ -150,7 +150,7 @@ def _gain(scene: Scene, laws: Sequence[FlowLaw], *, raised: int = 1, full: bool 
 
 
 def _law(scene: Scene, density: float, *, degassed: bool = False) -> FlowLaw:
-    """Args: `degassed`: True if the liquid holds no gas, so that its cavity is at vapour pressure."""
+    """Flow law. Args: `degassed`: True if the liquid holds no gas: its cavity is at vapour pressure."""
     liquid = dataclasses.replace(scene.liquid, density=density)
     if degassed:
         liquid = dataclasses.replace(liquid, dissolved_gas="none")

@@ -1,21 +1,21 @@
-"""k of the tube by the library `fluids` alone: what a designer without this program would add up.
+"""k of the tube by the library `fluids` alone, as a designer without this program would calculate it.
 
 k = f L/d + K_entrance + sum of K_bend + extra + (K_exit - 1), each part by every method of `fluids` in its
 range, the tube at rest. The library knows no rotation, and no laminar loss of an entrance or a bend.
 
-A method's range is what its source claims. It is held to that by rules that stood before the numbers:
+A method is used within the range that its source claims, by rules set before the results:
 
-* friction: the range that `fluids` states, and in it at most 5 % from Colebrook's equation, for which all of
-  them are made to stand;
+* friction: the range that `fluids` states, and in it at most 5 % from Colebrook's equation, which all of
+  them approximate;
 * bends: the angles, radii and Re of the source. Crane's are multiples of the friction of commercial steel
   pipes, from 15 mm on. Miller's chart begins at Re = 1e4, Ito's measurements at 2e4; Swamee's formula knows
   no Re. So nothing but the program's own formula follows Re below 1e4, and nothing is judged there;
 * an entrance that projects: the methods that need the thickness of the wall, which no scene gives, are asked
   for a thin edge and for a twentieth of the bore.
 
-What the program itself calculates with is shown among the methods; it is judged by the others alone, by the
-middle between the smallest and the largest, all between being equally likely. A comparison wider than its
-limit would say nothing. Limits: of friction 15 %, what a chart of it claims on a real wall and half as much
+The program's own methods are shown among them, but it is judged by the others alone: by the middle between
+the smallest and the largest, all between being equally likely. A comparison with an uncertainty above its
+limit proves nothing. Limits: of friction 15 %, what a chart of it claims on a real wall and half as much
 again; of bends 75 %, half the spread of handbooks and the program's own quarter; of k 25 %, in which an exit
 counted twice could not hide where k is below 4.
 """
@@ -66,7 +66,7 @@ _BENDS: Final[Mapping[str, tuple[float, float, float, float, float]]] = {
     "Ito": (2e4, 45.0, 180.0, 1.0, 50.0),
     "Swamee": (0.0, 0.0, 180.0, 1.0, math.inf),
 }
-"""Smallest Re, angles in degrees from and to, r/d from and to; those of Crane's are for steel pipes alone."""
+"""Smallest Re, angles in degrees from and to, r/d from and to; Crane's are for steel pipes alone."""
 _PROGRAM_METHODS: Final = {
     "friction": ("Churchill_1977",),
     "bends": ("Rennels",),
@@ -212,7 +212,7 @@ def _half_width(tube: Tube, state: TubeState, *causes: str) -> FloatArray:
 
 
 def _worst(tube: Tube, state: TubeState, library: list[Parts], part: str = "") -> Found:
-    """The program's number where it departs most from the library's, in units of what both leave open."""
+    """The program's number with the largest departure from the library's, over their joint uncertainty."""
     values = state.terms[part] if part else state.k
     widths = _half_width(tube, state, *_CAUSES.get(part, ()))
     names = (part,) if part else ()

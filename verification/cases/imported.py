@@ -44,7 +44,7 @@ _SIZES: Final = (1.0, 2.0, 4.0)
 _ARC_ORDER: Final = 4.0
 """Order of the area that an arc of quadratic edges encloses."""
 _MANUFACTURED: Final = ("force_off_by_a_percent", "force_across_dropped", "surface_pressure_shifted")
-"""Mutations of the manufactured problem; the others are those of the physical one."""
+"""Mutations of the manufactured problem; all others are of the physical one."""
 _LEVELS: Final = {"light": (3, 6, 12), "heavy": (4, 8, 16, 24)}
 """Radial cells; half of them lie in the liquid."""
 _FILL: Final = 0.4
@@ -83,7 +83,7 @@ def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     numbers = {}
     for name, values in zip(("volume", "moment", "lever"), np.transpose(by_walls), strict=True):
         study = gci(values=values.tolist(), sizes=_SIZES, formal_order=_ARC_ORDER)
-        # The error of a table of integrals, besides.
+        # Plus the error of a table of integrals.
         numbers[name] = Found.within(values[0], study.uncertainty + 1e-8 * abs(values[0]))
     numbers["wall_pressure"] = Found.within(
         ring.wall_pressure.value, ring.wall_pressure.uncertainty, conclusive=ring.status.ok
@@ -218,7 +218,7 @@ def round_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evid
 def _round_chamber_errors(
     disc: Disc, cells: int, kind: CellKind, defect: str | None
 ) -> tuple[float, float, float]:
-    """Largest errors of volume and moment, of the lever arm, and of both first ones under gravity."""
+    """Largest errors of volume and moment, of the lever arm, and of volume and moment under gravity."""
     true = _Round(
         centre=(disc.outer_radius + disc.inner_radius) / 2,
         radius=(disc.outer_radius - disc.inner_radius) / 2,
@@ -250,7 +250,7 @@ def _round_chamber_errors(
             walls = replace(walls, centre=np.zeros(2))
         result = integrals(walls, radii**2)[[0, 1, 2, 4, 5, 6]]
         expected = true.outside(radii**2, centre)
-        # As the quotient of the ratios, where a coarse mesh has no surface left to divide by.
+        # Difference of the ratios to the exact values: a coarse mesh may have no surface to divide by.
         lever = (result[4] * expected[3] - expected[4] * result[3]) / (expected[4] * expected[3])
         return float(np.max(np.abs(result - expected)[:3].T / full)), float(np.max(np.abs(lever)))
 

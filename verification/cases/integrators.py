@@ -1,10 +1,10 @@
 """One operation under a flow law by the program's march and by Eq. 20's segments.
 
-Exact are the closed form of the paper's law, and for any other one the time t = (V/S) int dx/u to a fill x.
+Exact references are the closed form of the paper's law, and for other laws t = (V/S) int dx/u to a fill x.
 Near a stall u goes like the square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one
 segment takes d to d - kappa sqrt(d). The exact flow stalls after tau = 2 sqrt(d)/((S/V) c). A segment stays
 on its side of the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the
-last ones are too long. What steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most. A
+last ones are too long. One that steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most. A
 full tube would let it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) where
 sqrt(d) < kappa/4, and the steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that
 every start is drawn into it.
@@ -44,7 +44,7 @@ from ringbalance.verification.evidence import (
 _LONG_FRACTION: Final = 0.9
 """Fraction of the time until the chamber is empty or the flow stalls, where no scheme has its order."""
 _SHORT_FRACTION: Final = 0.1
-"""Fraction of the long operation that a controller's usual command lasts."""
+"""Duration of a controller's usual command over that of the long operation."""
 _COUNTS: Final = (4, 8, 16, 32, 64, 128, 256, 512)
 _INSTANTS: Final = 200
 _ABOVE_STALL: Final = 1.8
@@ -54,11 +54,11 @@ _KINK: Final = 0.6
 """Fill, in units of the largest, below which the kinked law slows down."""
 _SEGMENTS: Final = (8, 16, 32, 64, 128)
 _PHASES: Final = np.linspace(1.0, 1.3, 31)
-"""Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
+"""Durations over the time to the stall; with each the segments meet the stall at other positions."""
 _STARTS: Final = (0.02, 0.05, 0.1)
 _BISECTIONS: Final = 40
 _STALL_TIMES: Final = 5
-"""Times to the stall after which a tube that stays full is in its cycle."""
+"""Number of times to the stall after which a tube that stays full is in its cycle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +128,7 @@ class _Operation:
         return x
 
     def marched(self, tube: Tube, time: FloatArray) -> tuple[FloatArray, float | None]:
-        """Fills by the march that every run takes, the law alone at work, and when the flow ended, s."""
+        """Fills by the integrator of all runs, under the law alone, and the time when the flow ended, s."""
         dynamics = Dynamics(
             law=self.law,
             tube=tube,
@@ -151,7 +151,7 @@ class _Operation:
 
 
 def _moved(operation: _Operation, duration: float, count: int | None = None) -> float:
-    """Fill ratio given away, by so many segments, or exactly."""
+    """Fill ratio transferred, by `count` segments; None: exactly."""
     if count is None:
         return operation.fill - float(operation.exact(duration))
     return operation.fill - operation.by_segments(duration, count)
@@ -280,7 +280,7 @@ class _KinkedLaw:
 def _stall_study(
     operation: _Operation, law: PaperLaw, *, spoiled: bool = False
 ) -> tuple[dict[str, float], float, Series]:
-    """Run the segments into the stall; `spoiled`: with the derivation's rate off by a tenth on purpose.
+    """Run the segments into the stall; `spoiled`: with the derivation's rate wrong by a tenth.
 
     Returns: The runs compared with the derivation; the length of a segment that steps over by a thousandth of
         the fill at the most, s; and both over the number of segments.
@@ -306,11 +306,11 @@ def _stall_study(
         for _ in range(_STALL_TIMES * count):
             distance -= per_root * end / count * math.copysign(math.sqrt(abs(distance)), distance)
         cycle[index] = abs(distance)
-    # Durations differ a little between the runs of one count, so each is compared with its own bound.
+    # Durations differ between the runs of one count, so each run has its own bound.
     share = over / (bound[:, None] * _PHASES**2)
     judged = {
         "overshoot_share": share.max(),
-        # At the number of segments where it is least: the bound is met, not only kept.
+        # Least over the numbers of segments: the bound is reached, not only respected.
         "overshoot_reach": share.max(axis=1).min(),
         "cycle_error": np.max(np.abs(cycle / bound - 1)),
         "limit_error": max(abs(_longest(operation, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),

@@ -33,12 +33,12 @@ from ringbalance.verification.validation.comparison import (
 _LAMINAR_TO_RE: Final = 1800.0
 _TURBULENT_FROM_RE: Final = 4000.0
 _CRITICAL_RE: Final = 2300.0
-"""Reynolds number up to which McKeon's readings go on as in laminar flow."""
+"""Reynolds number up to which McKeon's readings follow laminar flow."""
 _SMOOTH: Final = ("stanton_pannell_1914", "stanton_pannell_1914_oil", "huebscher_1947_round", "senecal_1951")
 _FULLY_ROUGH: Final = 70.0
 """ks+ above which the wall is fully rough."""
 CALIBRATING: Final = (*(f"tube {number} (bore)" for number in range(1, 6)), "cut (bore)")
-"""Points of Eisenklam that gave the bore of their tube, and are not judged."""
+"""Points of Eisenklam to which the bore of their tube was fitted, not judged."""
 _DEVELOPED: Final = 0.0125
 """L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""
 _CONTRADICTED_PA: Final = 1.5e5
@@ -56,14 +56,14 @@ _WASHER_KG_M: Final = 12.4e-6
 _WASHER_UNCERTAINTY_KG_M: Final = 0.5e-6
 """Expanded uncertainty (95 %) of a washer's unbalance, kg m."""
 _TAUGHT_COUNTS: Final = (0, 1, 2)
-"""Numbers of washers that gave the coefficient."""
+"""Numbers of washers in the runs to which the coefficient was fitted."""
 _PREDICTED_COUNTS: Final = (3, 4)
 
 
 def smooth_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Friction in smooth tubes, laminar to turbulent.
 
-    McKeon's readings below Re 4000 are not judged: the laminar ones their own authors found up to 14 % high.
+    McKeon's readings below Re 4000 are not judged: their authors report laminar ones up to 14 % high.
     """
     points = friction(*map(measurements, _SMOOTH), _mckeon(_TURBULENT_FROM_RE, np.inf), mutation=defect)
     left_out = {
@@ -155,7 +155,7 @@ def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 def laminar_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Pressure over whole tubes in laminar flow.
 
-    Not judged are points that taught a bore, that contradict others, or whose flow could not develop.
+    Points to which a bore was fitted, that contradict others, or with undeveloped flow are not judged.
     """
     data = measurements("eisenklam_1958")
     reynolds, slenderness = tube_numbers(data)
@@ -178,7 +178,7 @@ def laminar_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evid
 
 
 def rotating_duct(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Friction in a square duct that rotates, laminar flow being free to fluctuate."""
+    """Friction in a rotating square duct, with laminar flow that may fluctuate."""
     square, points = _CELLS[level].system(), (*_SQUARE, _FAST)
     s, re = (np.array([point[i] for point in points]) for i in (0, 1))
     slower = 1.0 if defect is None else 0.9
@@ -217,7 +217,7 @@ def _mean_gradient(system: FlowSystem, point: tuple[float, ...], rotation: float
 
 
 def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Vibration of a rotor with known unbalances: what small ones teach, compared with larger ones."""
+    """Vibration of a rotor with known unbalances: larger ones predicted from a fit to small ones."""
     run = measurements("rodrigues_2011")
     readings = {count: _readings(run, "plain", count) for count in range(5)}
     amplitudes = [float(np.mean(reading)) for reading in readings.values()]
@@ -239,12 +239,12 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     standard_uncertainty = kappa * _WASHER_UNCERTAINTY_KG_M / 2
     quantities = {}
     for count in _PREDICTED_COUNTS:
-        # The mean over all speeds; u_D of the scatter over these and of the washers on the disc.
+        # Mean over all speeds; u_D from the scatter over the speeds and from the washers on the disc.
         mean, scatter = amplitudes[count], float(np.std(readings[count], ddof=1))
         washers = mean * _WASHER_UNCERTAINTY_KG_M / (2 * _WASHER_KG_M * math.sqrt(count))
         quantities[f"washers_{count}"] = Found(
             value=float(predicted[count]),
-            # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
+            # The coefficient was fitted to two washers: their error, sqrt(2) of one's, counts n/2 times.
             input=standard_uncertainty * count / math.sqrt(2),
             reference=Reference(value=mean, uncertainty=math.hypot(washers, scatter)),
         )

@@ -7,18 +7,18 @@ w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force 
 
     inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
 
-asks for, with velocities given all round.
+asks for, with velocities given on the whole boundary.
 
-How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.  A small
+Laminar flow in a rotating tube becomes developed at the rate at which disturbances decay along it.  A small
 steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial velocity over U and
 mu = lambda Re, its equations in the section are quadratic in mu, pressure and diffusion along the tube
 included:
 
     [A0 + mu A1 + mu^2 A2] q = 0
 
-A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and continuity along
-the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda itself.  Modes are those
-that are mirror images of themselves in the plane across the rotation axis.
+A0 is the section's own Jacobian; A1 is convection by the axial velocity, with pressure and continuity along
+the tube; A2 is diffusion along it.  At Re = 0 velocities are over U throughout and mu is lambda itself.  The
+modes are those that are their own mirror images in the plane normal to the rotation axis.
 """
 
 from __future__ import annotations
@@ -103,9 +103,9 @@ _MESHES: Final = {
     ),
 }
 _SHIFTS: Final = (1.0, 0.35, 0.12)
-"""Shifts over the expected rate, about which modes are looked for."""
+"""Shifts over the expected rate, around which modes are searched."""
 _EIGENVALUE_TOLERANCE: Final = 1e-8
-"""Rates are distinct from 1e-4 of the expected one on."""
+"""Tolerance of eigenvalues, far below the 1e-4 of the expected rate by which distinct rates differ."""
 _NOT_A_MODE: Final = 0.03
 """Rate over the expected one below which only the flow rate and the pressure level are modes, at zero."""
 _MAX_RESIDUAL: Final = 1e-6
@@ -239,7 +239,7 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
     rates = _slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12)
     exact = _CREEPING_PER_DIAMETER / (2 if defect == "radius_for_bore" else 1)
     fast = [_decay_length(fine, 0.0, speed * rotation) ** -1 * rotation**0.5 for rotation in _FAST]
-    # The limit is approached as R^(-1/4), which two rates take off.
+    # The departure from the limit goes as R^(-1/4) and is eliminated with two rates.
     step = (_FAST[1] / _FAST[0]) ** 0.25
     points = _POINTS[level]
     lengths = [_decay_length(coarse, *point) for point in points]
@@ -362,7 +362,7 @@ _RE_STEP: Final = 1.01
 
 
 def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Exact where laminar, without a jump, one velocity a head."""
+    """Check the blend: exact where laminar, continuous, one velocity per head."""
 
     def friction_of(reynolds: FloatArray) -> FloatArray:
         f = friction_factor(reynolds=reynolds, relative_roughness=0.0)

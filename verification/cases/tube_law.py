@@ -1,4 +1,4 @@
-"""Claims on k and on what Eqs. 13 to 18 take for granted of the tube, by the program's own tube law.
+"""Claims on k and on the assumptions of Eqs. 13 to 18 about the tube, by the program's own tube law.
 
 A velocity is the one that a full tube takes by itself under a head, and k is taken there.
 """
@@ -39,19 +39,19 @@ from ringbalance.verification.papers import fig_7_readings
 from ringbalance.verification.reference.chambers import wall_pressure_of
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
-"""In units of the scene's."""
+"""Gas pressures over the scene's."""
 _FILLS: Final = np.linspace(0.02, 1.0, 50)
-"""In units of the largest."""
+"""Fills over the largest."""
 _MIN_HEAD: Final = 0.05
-"""Smallest head in units of the gas pressure's: below it lies a stall."""
+"""Smallest head over that of the gas pressure; below it the flow is close to its stall."""
 _PRINTED_K: Final = Reference(
     value=PAPER_DRAG_COEFFICIENT, uncertainty=from_half_width(0.1 * PAPER_DRAG_COEFFICIENT)
 )
-"""About 50."""
+"""Printed k, "about 50": within 10 %."""
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
-"""In units of the scene's."""
+"""Bores over the scene's."""
 _MIN_BORE_RATIO: Final = 0.1
-"""Smallest bore searched for k = 50, in units of the scene's."""
+"""Smallest bore searched for k = 50, over the scene's."""
 _WARM_K: Final = 333.15
 _OIL: Final = "silicone oil 100 cSt"
 _OIL_TABLE_K: Final = 298.15
@@ -63,7 +63,7 @@ _FIGURE_VELOCITIES: Final = (1e-4, 3000.0, 401)
 def _driving_heads(scene: Scene, shares: npt.ArrayLike) -> tuple[float, ...]:
     """Heads between two chambers, H = [p0 + p_wall(x) - p_wall(x_max - x)]/rho, m^2/s^2.
 
-    At least a twentieth of the gas pressure's own, short of a stall.
+    No less than a twentieth of that of the gas pressure, so that the flow does not stall.
     Args: `shares`: fills of the driven chamber in units of the largest.
     """
     share, gas = np.asarray(shares, dtype=np.float64), scene.gas.pressure
@@ -84,7 +84,7 @@ def _under_gas(scene: Scene) -> TubeLoss:
 
 
 def bernoulli_ends(scene: Scene) -> Evidence:
-    """Effects of one k and of a full tube; the exit's share is the same at all values."""
+    """Effects of one k and of a full tube; the exit's effect does not depend on assumed inputs."""
     heads = _driving_heads(scene, [0.5, 0.0, 0.25, 0.75, 1.0])
     runs = _running(scene, heads)
     k, half_width = float(runs.k.value[0]), float(runs.k.uncertainty[0])
@@ -95,7 +95,7 @@ def bernoulli_ends(scene: Scene) -> Evidence:
 
 
 def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """The three things that Eqs. 13 to 18 take for granted: one k, '+1', and a tube that runs full."""
+    """The three assumptions of Eqs. 13 to 18: one k, '+1', and a tube that runs full."""
     middle = _running(scene, _driving_heads(scene, [0.5]))
     k, exit_loss = float(middle.k.value[0]), float(middle.terms.get("exit", np.zeros(1))[0])
     law, (_, bare) = flow_law_of(scene), fig_7_readings()

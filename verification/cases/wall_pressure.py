@@ -1,4 +1,4 @@
-"""Claims on the pressure at the outer wall and the velocity's fall under it."""
+"""Claims on the pressure at the outer wall and the fall of the velocity that it causes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from ringbalance.verification.reference.chambers import (
 
 _FILLS_OF_MAX: Final = np.array([0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
 _JUDGED: Final = {"thin": 0, "half": 2, "full": 5}
-"""Judged fills, by their positions among these."""
+"""Judged fills by name, as indices of `_FILLS_OF_MAX`."""
 _SPEED_RATIOS: Final = (0.1, 0.2, 0.5, 1.0)
 """Speeds of the table over the scene's."""
 _PRESSURES: Final = {"low": LOW_PRESSURE_PA, "high": HIGH_PRESSURE_PA}
@@ -71,7 +71,7 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
     by_eq_12 = _eq_12(scene, disc, x)
     shortfall = 1 - by_eq_12 / ring.wall_pressure.value
     without_plates = _eq_12(scene, bare, x)
-    # What Eq. 12 gives for a volume is its pressure in a ring that no plates take anything from.
+    # Eq. 12 gives for a volume the pressure of a ring without plates.
     same_volume = x * chamber_volume(disc=disc) / chamber_volume(disc=bare)
     corrected = wall_pressure_of(scene, same_volume, disc=bare)
     unplated = dataclasses.replace(scene, disc=bare)
@@ -164,12 +164,12 @@ def _gravity_table(scene: Scene) -> CaseTable:
 
 
 def velocity_departure_ends(scene: Scene) -> Evidence:
-    """The falls under the true wall pressure: Eq. 19's arithmetic knows no plates."""
+    """Velocity falls under the true wall pressure; Eq. 19's arithmetic leaves out the plates."""
     return Evidence(quantities=_departures(at_paper_density(scene)))
 
 
 def velocity_departure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """The fall under the true wall pressure, by Eq. 19's own arithmetic, and by the calibrated law."""
+    """Velocity fall under the true wall pressure, by Eq. 19's arithmetic, and by the calibrated law."""
     printed_scene = at_paper_density(scene)
     physics = _departures(printed_scene)
     if defect == "eq_12_used":
@@ -219,7 +219,7 @@ def velocity_departure(scene: Scene, level: Level, defect: str | None = None) ->
 
 
 def _departures(scene: Scene) -> dict[str, Found]:
-    """Falls with the true wall pressure of a full chamber; corrected, with Eq. 12's at the printed radius."""
+    """Falls with a full chamber's true wall pressure; corrected: with Eq. 12's at the printed radius."""
     full = _full_pressure(scene)
     return {
         f"departure_{name}": Found(

@@ -21,17 +21,17 @@ from ringbalance.scene.changes import document_of
 from ringbalance.scene.models import Scene
 
 Point = Mapping[str, float]
-"""Values by axis, in the axis' unit."""
+"""Values in the units of the axes, by axis."""
 Changes = Mapping[str, Any]
-"""By path, as `SceneFile.with_values` takes them."""
+"""Values by path, for `SceneFile.with_values`."""
 _MAX_PERIODS: Final = 20
-"""Periods of the controller that a point's closed loop may take."""
+"""Number of controller periods in the time limit of a point's closed loop."""
 _GAS_TIME_S: Final = 0.2
-"""Time beyond those, s: a short period with long valve-open times is no reason for hundreds of operations."""
+"""Time limit beyond these periods, s, so that long valve-open times need no higher number of periods."""
 _ON_SHAFT_FROM: Final = 0.5
-"""Value of the axis "place" from which the gas pressure is one on the shaft."""
+"""Value of the axis "place" from which the gas pressure is that on the shaft."""
 _USUAL_FRACTION: Final = 0.75
-"""Fraction of the coordinates in the usual range; else all but a few points would be refused."""
+"""Fraction of the coordinates in the usual range; with fewer, most points would be refused."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +91,10 @@ AXES: Final = (
 def scene_at(scene: Scene, point: Point) -> Scene:
     """The scene with some axes set, checked as a file is.
 
-    What hangs on a value follows it: four chambers for any central angle, bends that the bore can take, a
-    tube that reaches over the crest; then a rotor that suits what the disc can balance: one that carries less
-    liquid is put on a lighter rotor, whose influence coefficient is larger, so that all liquid of a pair
-    makes the same vibration, and limit, gain and noise mean what they meant before.
+    Dependent values follow: four chambers for any central angle, bends that the bore allows, a tube that
+    reaches over the crest, and a rotor matched to the disc: a disc with less liquid has a lighter rotor, with
+    a larger influence coefficient, so that all liquid of a pair makes the same vibration, and limit, gain and
+    noise keep their meaning.
     Raises: SceneError: no scene can have these values.
     """
     rotor, control = scene.rotor, scene.controller
@@ -120,7 +120,7 @@ def scene_at(scene: Scene, point: Point) -> Scene:
 
 
 def _capacity(scene: Scene) -> float:
-    """Vibration that all liquid of a pair in one chamber balances, m."""
+    """Vibration that a pair balances with all its liquid in one chamber, m."""
     a = surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)
     moment = (
         scene.liquid.density * scene.disc.axial_width * liquid_first_moment(disc=scene.disc, surface_radius=a)

@@ -1,4 +1,4 @@
-"""One point at the extremes: the whole way from a scene file to a closed loop, and what must hold on it."""
+"""One point at the extremes: from scene file to closed loop, with the invariants that must hold."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from ringbalance.verification.extremes.axes import Point, scene_at
 from ringbalance.verification.reference.chambers import exact_wall_pressure
 
 ROUND_OFF: Final = 1e-12
-"""Relative: what floating point may take from a conserved or monotone quantity."""
+"""Relative change of a conserved or monotone quantity that counts as rounding."""
 WIDE_RATIO: Final = 1.0
-"""Half-width over value from which on an answer is no more than an order of magnitude."""
+"""Half-width over value from which on a result is only an order of magnitude."""
 
 _MAX_PLAIN_VELOCITY_M_S: Final = 0.33 * 1480.0
-"""A third of the speed of sound in water at 20 degC, m/s; beyond, no answer stands without a reservation."""
+"""A third of the speed of sound in water at 20 degC, m/s; beyond, every answer needs a reservation."""
 _MAX_PLAIN_PRESSURE_PA: Final = 0.05 * 2.2e9
-"""A twentieth of the bulk modulus of water at 20 degC, Pa; likewise."""
+"""A twentieth of the bulk modulus of water at 20 degC, Pa; beyond, every answer needs a reservation."""
 
 
 class Ending(StrEnum):
@@ -45,7 +45,7 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class PointJudgement:
-    """Outcome of one point, and what was wrong with it."""
+    """Outcome of one point, with the invariants that it violates."""
 
     ending: Ending
     text: str
@@ -66,17 +66,17 @@ class PointJudgement:
 
     @classmethod
     def of_record(cls, record: dict[str, Any]) -> Self:
-        """Read plain data that `judged` gave and a file stores."""
+        """Read a record of `judged` from a file."""
         ending, violations = Ending(record["ending"]), tuple(record["violations"])
         return cls(**record | {"ending": ending, "violations": violations})
 
 
 def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float = 0.0) -> dict[str, Any]:
-    """Take a scene at a point through calibration and closed loop, and look for anything that should not be.
+    """Take a scene at a point through calibration and closed loop, and check all invariants.
 
     An exception other than a scene's error counts as broken, whatever it is.
-    Args: `width_factor`: of every half-width of the chamber; other than 1 only to show that the judgement
-        notices. `leak`: fraction of the liquid that is lost by the end of a run, likewise.
+    Args: `width_factor`: of every half-width of the chamber; other than 1 only as a mutation. `leak`:
+        fraction of the liquid that is lost by the end of a run; above 0 only as a mutation.
     Returns: The judgement as plain data.
     """
     try:
@@ -90,11 +90,11 @@ def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float
             for fault in error.faults
             if not (fault.key and fault.problem)
         ]
-        # By its name alone: the path of the file is nothing of the scene's.
+        # With the scene's name instead of its path, which depends on the machine.
         text = str(error).replace(scene.file, scene.source)
         return asdict(PointJudgement(ending=Ending.REFUSED, text=text, violations=tuple(unclear)))
     except Exception as error:
-        # Whatever it is: finding it is what this is for.
+        # Any other exception is an error of the program, which this study looks for.
         text = f"{type(error).__name__}: {error}"
         return asdict(PointJudgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",)))
     chamber, k = calibration.chamber, calibration.tube.k
@@ -145,7 +145,7 @@ def _worst_ratio(calibration: Calibration, width_factor: float) -> float:
 
 
 def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]:
-    """Violations by numbers that are not finite or not monotone where physics is, or exceed half-widths."""
+    """Violations: numbers not finite, not monotone where physics is, or with errors above half-widths."""
     try:
         json.dumps(calibration_document(calibration), allow_nan=False)
     except ValueError:
@@ -170,7 +170,7 @@ def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]
 
 
 def _absurd(calibration: Calibration) -> Iterator[str]:
-    """Violations by velocities and pressures at which the liquid is nothing like one of a single density."""
+    """Violations: velocities and pressures at which the liquid cannot be taken as incompressible."""
     if not calibration.chamber.status.ok:
         return
     law, gas = calibration.flow_law, calibration.scene.gas.pressure
@@ -202,7 +202,7 @@ def _law_faults(calibration: Calibration) -> Iterator[str]:
 
 
 def _loop_faults(scene: Scene, run: Simulation, leak: float) -> Iterator[str]:
-    """Violations by a run without a closing text, with lost liquid or with fills out of bounds."""
+    """Violations: a run without a closing text, lost liquid, or fills out of bounds."""
     try:
         json.dumps(simulation_document(run), allow_nan=False)
     except ValueError:

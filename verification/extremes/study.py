@@ -30,7 +30,7 @@ from ringbalance.verification.extremes.axes import AXES, InputAxis, Point, desig
 from ringbalance.verification.extremes.point import Ending, PointJudgement, judged
 
 Progress = Callable[[str, int, int], None]
-"""Called with the name of the present work, the points done of it and their number."""
+"""Function of the name of the current step, the number of its points done, and their total."""
 Record = dict[str, Any]
 
 _SEED: Final = 1
@@ -44,7 +44,7 @@ class Size:
     points: int
     """Points of the designed set."""
     sweep: int
-    """First values on each axis."""
+    """Number of first values on each axis."""
     fineness: float
     """Fraction of an axis within which a change of the ending is located."""
 
@@ -66,7 +66,7 @@ class AxisSweep:
 
     @property
     def values(self) -> list[float]:
-        """In the axis' unit."""
+        """Values in the unit of the axis."""
         return [float(self.axis.at(share)) for share in self.shares]
 
     @property
@@ -75,7 +75,7 @@ class AxisSweep:
         return [{self.axis.name: value} for value in self.values]
 
     def middles(self, fineness: float) -> list[float]:
-        """Fractions half-way between neighbours that end differently, further apart than that."""
+        """Fractions half-way between neighbours with different endings, further apart than `fineness`."""
         shares, ends = self.shares.tolist(), list(map(_outcome, self.judgements))
         return [
             (shares[i] + shares[i + 1]) / 2
@@ -92,7 +92,7 @@ class AxisSweep:
         )
 
     def spans(self) -> list[Record]:
-        """The stretches along which points end alike, from one end of the axis to the other.
+        """Intervals with one ending, from one end of the axis to the other.
 
         Each with its first and last value in the axis' unit, the endings of its points and loops, and the
         program's message at the end towards the nearest answer.
@@ -158,7 +158,7 @@ class Extremes(Result):
         return self.judgements + tuple(each for sweep in self.sweeps for each in sweep.judgements)
 
     def broken(self) -> int:
-        """Number of points, of all looked at, at which anything was not as it should be."""
+        """Number of points, of the designed set and the sweeps, that count as broken."""
         return sum(bool(each.violations) for each in self.everything)
 
     def to_dict(self) -> Record:
@@ -183,7 +183,7 @@ class Extremes(Result):
         }
 
     def axes_table(self) -> dict[str, list[Any]]:
-        """The stretches of all axes as columns."""
+        """Intervals of all axes as columns."""
         spans = [(sweep.axis, span) for sweep in self.sweeps for span in sweep.spans()]
         keys = {"from": "low", "to": "high", "ending": "ending", "loop": "loop", "said": "text"}
         return {
@@ -232,7 +232,7 @@ class Extremes(Result):
 
 
 def axis_rows(columns: Record) -> list[Cells]:
-    """The stretches of every axis: its title (at its first), stretch, answer, loop and message."""
+    """Intervals of every axis: title (in the first row), interval, answer, loop and message."""
     rows: list[Cells] = []
     before = ""
     names = ("axis", "from", "to", "unit", "ending", "loop", "said")
@@ -245,7 +245,7 @@ def axis_rows(columns: Record) -> list[Cells]:
                 stretch if unit == "1" else f"{stretch} {unit.replace('^2', '²')}",
                 str(ending).removesuffix(" with a message"),
                 str(loop).replace("_", " "),
-                # The first line of a message, without the name of a file that nobody has.
+                # First line of the message, without the name of the scene file, which does not exist.
                 str(message).split("\n")[0].split(".toml: ", 1)[-1],
             )
         )

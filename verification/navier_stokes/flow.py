@@ -22,7 +22,7 @@ from skfem.helpers import dot, grad
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 _QUADRATURE_ORDER = 6
-"""Exact for two quadratic functions and a quadratic coefficient on straight cells."""
+"""Order that integrates two quadratic functions and a quadratic coefficient exactly on straight cells."""
 
 _mass = BilinearForm(lambda u, v, w: w.factor * u * v)
 _load = LinearForm(lambda v, w: w.factor * v)
@@ -59,13 +59,13 @@ class FlowSystem:
     velocity: Any
     """Scalar quadratic basis of one velocity component; its `dx` carries the weight r in (x, r)."""
     pressure: Any
-    """Scalar linear basis, weighted likewise."""
+    """Scalar linear basis of the pressure, with the same weight."""
     components: int
     """Velocity components; those beyond the mesh's dimension are normal to it."""
     enclosed: bool
-    """No boundary fixes the pressure level: it is pinned, and its mean set to zero."""
+    """True if no boundary fixes the pressure level: it is pinned at a node, and its mean set to zero."""
     free: IntArray
-    """Unknowns that are solved for."""
+    """Indices of the unknowns that are solved for."""
     fixed_values: FloatArray
     """Full vector with the boundary values, zero elsewhere."""
     source: FloatArray
@@ -79,7 +79,7 @@ class FlowSystem:
     mass: Any
     """Mass matrix of one component."""
     gradient: Any
-    """Velocity rows of the pressure's term; its transpose is continuity."""
+    """Pressure gradient in the velocity rows; its transpose is continuity."""
 
     @classmethod
     def of(
@@ -190,7 +190,7 @@ class FlowSystem:
         return _mass.assemble(self.velocity, self.pressure, factor=1.0)
 
     def of_all(self, velocity_block: Any) -> Any:
-        """A matrix of the velocity unknowns among all unknowns."""
+        """A matrix of the velocity unknowns, with empty rows and columns for the pressure."""
         nothing = sparse.csr_matrix((self.pressure.N,) * 2)
         return sparse.block_diag([velocity_block, nothing], format="csr")
 

@@ -37,7 +37,7 @@ _SECTION: Final = SectionMesh(around=6, across=9, wall_ratio=15.0)
 _WINDOWS: Final = {"entrance": (-2.5, 5.0, 2.5), "exit": (-2.0, 8.0, 2.5)}
 """Least and largest x, and largest r, that are drawn."""
 _FLOW_THROUGH: Final = 1 / 8
-"""Stream function at the tube's wall: integral of u_x r dr over the radius, in U d^2."""
+"""Stream function at the tube's wall, over U d^2: integral of u_x r dr from the axis to the wall."""
 
 _squared_slope = BilinearForm(lambda u, v, w: w.weight * dot(grad(u), grad(v)))
 _slope_along = LinearForm(lambda v, w: w.weight * dot(w.across, grad(v)))
@@ -67,7 +67,7 @@ class FlowField:
 
 
 def section_field(*, reynolds: float, rotation_reynolds: float) -> FlowField:
-    """Developed laminar flow over the whole section of a tube that turns about an axis across it.
+    """Developed laminar flow over the whole section of a tube that turns about an axis normal to it.
 
     Beyond R Re = 1e6 or R = 1e4 it is the nearest flow of the same R/Re, its status OUT_OF_RANGE.
     Args: `reynolds`: above zero. `rotation_reynolds`: zero or more.
@@ -98,7 +98,7 @@ def section_field(*, reynolds: float, rotation_reynolds: float) -> FlowField:
     psi = _potential(system, in_plane[::-1] * [[[-1.0]], [[1.0]]], {0.0: edge})
 
     def both(*fields: tuple[FloatArray, float]) -> FloatArray:
-        """Fields of the half and of its image, each with the sign of its image."""
+        """Fields of the half and of its mirror image, each field with the sign of its image."""
         return np.stack([np.concatenate([values, sign * values[off]]) for values, sign in fields])
 
     return FlowField(
@@ -137,8 +137,8 @@ def end_field(end: End, *, reynolds: float) -> FlowField:
     in_window = np.flatnonzero((x > low) & (x < high) & (r < radius))
     used, triangles = np.unique(_triangles(system, in_window), return_inverse=True)
     u, v = system.at_points(flow.velocity)[0]
-    # Weighted so that the fit is of the velocity, whose every component is a derivative of psi over r; one r
-    # is in the weights already.
+    # The weight makes this a fit of the velocity, each component of which is a derivative of psi over r; the
+    # quadrature weights contain one factor r.
     r = system.points[1]
     boundary_values = {0.0: system.boundary_nodes("axis"), _FLOW_THROUGH: system.boundary_nodes("wall")}
     psi = _potential(system, np.stack([-r * v, r * u]), boundary_values, r**-2)
@@ -153,7 +153,7 @@ def end_field(end: End, *, reynolds: float) -> FlowField:
 
 
 def _entrance_system(cells: EndMesh) -> FlowSystem:
-    """An entrance fed by a sink's flow: let in freely so near, liquid at high Re makes the solve unstable."""
+    """An entrance with a sink's velocity on its far sides: free inflow so near is unstable at high Re."""
 
     def sink_velocity(component: int, points: FloatArray) -> FloatArray:
         """Velocity of a half-space that drains U pi d^2/4 at the origin."""
@@ -176,7 +176,7 @@ def _potential(
     boundary_values: dict[float, IntArray],
     weight: FloatArray | float = 1.0,
 ) -> FloatArray:
-    """Nodal psi, prescribed at the nodes of each boundary value, whose weighted gradient is nearest."""
+    """Nodal psi with given boundary values, its gradient fitted to `gradient` by weighted least squares."""
     basis: Any = system.velocity
     psi = np.zeros(basis.N)
     for value, nodes in boundary_values.items():

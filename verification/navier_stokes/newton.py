@@ -1,11 +1,11 @@
-"""Flows by Newton's method with the exact Jacobian, and followed along a parameter.
+"""Flows by Newton's method with the exact Jacobian, and by continuation in a parameter.
 
 The prescribed flow rate borders the matrix by one row and column, solved with a second right-hand side: a
 dense row inside the matrix would ruin the sparse factors.  Eliminating along the diagonal keeps these three
 to four times sparser than partial pivoting does, because fill-in gives the pressure block its diagonal in
 time.  It is not safe by construction, so every solve checks its residual, refines it, and falls back on
 partial pivoting when that does not help.
-A path is followed with a secant predictor, and steps that recover from failure.
+Continuation uses a secant predictor and repeats a failed step with half its length.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
 
 _GOOD, _USABLE = 1e-12, 1e-8
-"""Relative residuals: of a solution that is as good as it gets, and of one that will do."""
+"""Relative residuals: below the first no refinement, above the second a retry with pivoting."""
 _MAX_REFINEMENTS = 3
 
 
@@ -63,10 +63,10 @@ class Factors:
 
 @dataclass(frozen=True, kw_only=True)
 class NewtonSettings:
-    """Criteria by which Newton's method stops, and keeps its factors."""
+    """Criteria by which Newton's method stops, and reuses its factors."""
 
     tolerance: float = 1e-9
-    """Largest change of a velocity over the largest velocity at which it has converged."""
+    """Largest change of a velocity over the largest velocity, below which the flow has converged."""
     max_iterations: int = 20
     keep_factors_below: float = 1e-3
     """Relative change below which the next step reuses the factors: the contraction is then at least that."""
@@ -74,7 +74,7 @@ class NewtonSettings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlowSolution:
-    """Velocity and pressure of a flow, with how the solve ended."""
+    """Velocity and pressure of a flow, with the status of its solve."""
 
     vector: FloatArray
     """Full vector of unknowns; a start for a neighbouring solve."""
@@ -97,7 +97,7 @@ class FlowSolution:
         status: Status | None = None,
         statistics: Statistics | None = None,
     ) -> Self:
-        """A flow by its full vector."""
+        """A flow from its full vector of unknowns."""
         velocity, pressure = system.split(vector)
         return cls(
             vector=vector,
@@ -194,7 +194,7 @@ class _Equations:
         if self.inertia != 0.0:
             residual += self.inertia * system.convection_vector(state.vector)
         if system.enclosed:
-            # A boundary flow that does not close in the discrete sense is spread evenly instead of
+            # A discrete boundary flow that does not sum to zero is spread evenly instead of
             # becoming a point source at the pinned node.
             mass = residual[-system.mean_load.size :]
             mass -= mass.sum() / system.mean_load.sum() * system.mean_load
@@ -211,7 +211,7 @@ def _iterate(
     """Advance the flow by Newton steps until they are small. Returns: The problem, empty without one."""
     system, free, factors, contracting, update = equations.system, equations.system.free, None, True, np.inf
     for _ in range(settings.max_iterations):
-        # Contracting: well below the step before, so that old factors may serve once more.
+        # Contracting: well below the step before, so that the old factors are good for another step.
         keep = equations.inertia == 0.0 or (update < settings.keep_factors_below and contracting)
         change = np.zeros_like(state.vector)
         try:
@@ -296,7 +296,7 @@ def follow(
         while at != target and step >= rule.smallest:
             remaining = abs(target - at)
             length = min(step, remaining)
-            # A sliver left over would make the secant through it worthless.
+            # A very short last step would spoil the secant through it.
             length = remaining if remaining - length < 0.1 * length else length
             parameter = target if length == remaining else at + length * (1 if target > at else -1)
             predicted = flow
@@ -325,7 +325,7 @@ def follow(
 
 
 def flow_at(*, solve: Solve, parameter: float, first: float) -> FlowSolution:
-    """Flow at a parameter, followed from where a start from rest converges. Raises: ArithmeticError: none."""
+    """Flow at a parameter, by continuation from a start from rest. Raises: ArithmeticError: not found."""
     flow = solve(min(parameter, _EASY), None)
     status = flow.status
     if parameter > _EASY and status.ok:

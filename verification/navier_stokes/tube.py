@@ -1,4 +1,4 @@
-"""Laminar flow in a tube: meshes, its section that rotates about an axis across it, and its two ends.
+"""Laminar flow in a tube: meshes, the section rotating about an axis normal to the tube, and both ends.
 
 **Fully developed flow in the rotating section.** Half of the section, circular or rectangular, lengths over
 the bore or hydraulic diameter d, velocities over the mean velocity U. With x along the tube, z along the
@@ -13,7 +13,7 @@ Kl = R Re and S = R/Re; at Re = 0 (S infinite) the problem is linear.
 
 **Meshes** are put together from patches of structured nodes. A patch is an array of nodes, shape (2 m + 1,
 2 n + 1, 2): every second node is a vertex, the others are the mid-nodes of a quadratic mesh and lie on the
-true geometry. Patches that share nodes are glued; boundaries are named by the places of their facets.
+true geometry. Patches that share nodes are glued; boundaries are named by the positions of their facets.
 
 **Entrance from a reservoir and exit into one**, axisymmetric. The tube ends flush in a plane wall with a
 sharp edge. Lengths over the bore d, velocities over the mean velocity U, pressure over mu U/d:
@@ -22,7 +22,7 @@ sharp edge. Lengths over the bore d, velocities over the mean velocity U, pressu
 
 Far away in the reservoir the surface is free of force at zero pressure (its side lets liquid through at
 right angles only, where a jet leaves the tube); deep inside the tube the flow is developed, so that p is a
-straight line of slope -32 there. With that line carried on to the tube's end,
+straight line of slope -32 there. With that line extrapolated to the tube's end,
 
     K_ent  = 2 (p_reservoir - p_end)/(rho U^2)      (it contains the leaving stream's kinetic factor 2)
     K_exit = 2 (p_end - p_reservoir)/(rho U^2)
@@ -66,7 +66,7 @@ class _HalfSection(ABC):
 
     @abstractmethod
     def mesh(self) -> Any:
-        """Its mesh."""
+        """Quadratic mesh of the half section."""
 
     def system(self) -> FlowSystem:
         """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
@@ -82,7 +82,7 @@ class SectionMesh(_HalfSection):
     """Cells of the half section: a core of 2 n x n cells inside a ring of 4 n cells around."""
 
     around: int = 6
-    """n."""
+    """n, a quarter of the cells around."""
     across: int = 12
     """Cells of the ring between core and wall."""
     wall_ratio: float = 12.0
@@ -116,7 +116,7 @@ class DuctMesh(_HalfSection):
     """Cells of the half section of a rectangular duct, refined towards its walls."""
 
     aspect_ratio: float = 1.0
-    """Across the axis of rotation over along it."""
+    """Extent across the axis of rotation over that along it."""
     across_axis: int = 12
     """Cells across the axis of rotation, an even number."""
     along_axis: int = 8
@@ -176,9 +176,9 @@ def section_coefficients(*, kl: float, s: float, inertia: float = 1.0) -> Coeffi
 
 
 def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> FloatArray:
-    """Developed flow in time, from the flow without inertia and a disturbance of one per cent.
+    """March developed flow in time, from the flow without inertia with a disturbance of one per cent.
 
-    It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
+    It finds the unsteady flow where the steady one is unstable; the flow does not vary along the tube.
     Second-order backward differences, convection extrapolated from two steps:
 
         (3 u - 4 u' + u'')/(2 dt) + inertia (2 N' - N'') + rotation C u = -grad p + viscosity lap u + G e
@@ -221,7 +221,7 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
 def developed_section(
     *, system: FlowSystem, kl: float, s: float, settings: NewtonSettings | None = None
 ) -> FlowSolution:
-    """Developed flow at any Kl, followed from a small one. Raises: ArithmeticError: it was not found."""
+    """Developed flow at any Kl, by continuation from a small one. Raises: ArithmeticError: not found."""
 
     def solve(a: float, start: FlowSolution | None) -> FlowSolution:
         scaled = _KL_SCALE * float(np.expm1(a))
@@ -248,7 +248,7 @@ _GLUE = 0.7548776662e9
 def ruled(*, inner: FloatArray, outer: FloatArray, blend: FloatArray) -> FloatArray:
     """Patch between two curves of nodes, at j = 0 and at j = 2 n, joined by straight lines.
 
-    Args: `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
+    Args: `blend`: fraction of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
     """
     share = blend[None, :, None]
     return np.asarray((1 - share) * inner[:, None, :] + share * outer[:, None, :])
@@ -296,7 +296,7 @@ def patch_mesh(patches: Sequence[FloatArray], **named: Test) -> Any:
 
 
 def named_facets(mesh: Any, named: Mapping[str, Test]) -> dict[str, IntArray]:
-    """Outer facets by the test that their middles pass; "wall" has those that pass none."""
+    """Boundary facets by the test that their middles pass; "wall" has those that pass none."""
     outside = mesh.boundary_facets()
     middle = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
     masks = {name: test(middle) for name, test in named.items()}
@@ -320,7 +320,7 @@ class EndMesh:
     tube: float = 300.0
     """Length of tube."""
     longest_cell: float = 0.15
-    """Share of a line's length that no cell exceeds, at two cells per fold."""
+    """Longest cell over the length of its line, at two cells per fold."""
     tube_cell: float = 6.0
     """Longest cell along the tube, at two cells per fold."""
     jet_cell: float = 6.0
@@ -354,7 +354,7 @@ class EndMesh:
         conditions += [Dirichlet(boundary=name, component=1) for name in ("deep", "wall", "axis")]
         conditions.append(Dirichlet(boundary="wall", component=0))
         if end == "exit":
-            # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
+            # The jet draws liquid in through the side; free to flow along it, this is unstable near Re 1950.
             conditions.append(Dirichlet(boundary="side", component=0))
         return FlowSystem.of(mesh=self.mesh(end=end), conditions=conditions, axisymmetric=True)
 

@@ -65,7 +65,7 @@ class Segment:
     """Angle by which the path turns to the left, rad."""
     cells: int = 4
     ratio: float = 1.0
-    """Last cell over first cell."""
+    """Length of the last cell over that of the first."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -201,10 +201,10 @@ class BentTubeFlow:
             cells: of the half section.
             reynolds: Re = U d/nu, above zero.
             rotation_reynolds: R = omega d^2/nu, zero or more, counter-clockwise about e_z.
-            coriolis_factor: on the Coriolis force in the tube, not on the inflow; other than 1 only to see
-                that a wrong one is noticed.
-            first_inertia: share of the inertia to start with; bends at rest need less, such as 0.2.
-            progress: called with a short text on the present work.
+            coriolis_factor: on the Coriolis force in the tube, not on the inflow; other than 1 only as a
+                mutation.
+            first_inertia: fraction of the inertia to start with; bends at rest need less, such as 0.2.
+            progress: called with a short text on the current step.
         Returns: The flow; its solution's status says NOT_CONVERGED when Newton's method failed.
         Raises: ValueError: a Reynolds number out of its bounds, or an impossible path.
         Raises: ArithmeticError: the developed flow was not found.
@@ -310,7 +310,7 @@ def _mean_pressure(tube: _SweptTube, section: FlowSystem, solution: FlowSolution
 
 
 def _energy_flux(tube: _SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
-    """Integral of |u|^2 times the velocity along the path, over the section, at the stations."""
+    """Integral of |u|^2 times the velocity along the path over the section, at the stations."""
     at = np.flatnonzero(tube.half_station % 2 == 0)
     speeds = np.zeros((tube.arc_length[::2].size, 4, section.velocity.N))
     tangent = tube.direction[:, tube.half_station[at]]

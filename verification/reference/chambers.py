@@ -1,4 +1,4 @@
-"""Chambers known exactly: totals by quadrature, meshes with nodes on the true walls, and waves.
+"""Exact solutions of chambers: totals by quadrature, meshes with nodes on the true walls, and waves.
 
 Waves in a chamber without plates by cosines of the angle: a reference that shares no step with the meshes.
 
@@ -92,7 +92,7 @@ def exact_totals(scene: Scene) -> dict[str, float]:
 
 
 def whole_ring_pressure(scene: Scene) -> float:
-    """Wall pressure at the largest fill with all of the ring as one rectangular element, Pa: a mistake.
+    """Wall pressure at the largest fill with the ring as one rectangular element, Pa: a deliberate error.
 
     Centrifugal force of a ring of unit angle over its outer face, integral of rho omega^2 r^2 dr / R2.
     """
@@ -121,7 +121,7 @@ def block_chamber(
     *,
     kind: CellKind = "hexahedron27",
 ) -> ChamberGeometry:
-    """A mapped block of hexahedra, each of which may be cut into six tetrahedra.
+    """A mapped block of hexahedra, or of the six tetrahedra into which each is cut.
 
     Args:
         mapping: from the unit cube, shape (..., 3), to coordinates, m; the first coordinate goes outward.
@@ -158,7 +158,7 @@ def block_chamber(
 def disc_chamber(
     disc: Disc, cells: tuple[int, int, int], *, kind: CellKind = "hexahedron27"
 ) -> ChamberGeometry:
-    """The built-in chamber of a disc, plates and all."""
+    """The built-in chamber of a disc, plates included, as a mesh."""
     t = disc.plate_thickness
     faces = [float(np.sqrt(radius**2 - t**2)) for radius in (disc.inner_radius, disc.outer_radius)]
 
@@ -177,7 +177,7 @@ _TERMS = 160
 
 @dataclass(frozen=True, kw_only=True)
 class CosineWaves:
-    """The free surface's condition on cosines; lengths in outer radii, times in 1/omega."""
+    """Free-surface condition tested with cosines; lengths in outer radii, times in 1/omega."""
 
     central_angle: float
     """theta, rad."""
@@ -215,7 +215,7 @@ class CosineWaves:
         return np.asarray(np.sort(real[real > 0])[:modes], dtype=np.float64)
 
     def amplification(self, *, frequency_ratio: float) -> float:
-        """Swing of the first moment under G = r exp(i angle), over that of a surface that follows at once."""
+        """Swing of the first moment under G = r exp(i angle), over that of a quasi-static surface."""
         load = _load(self)
         swing, still = (
             _potential(self, frequency_ratio, load, still=still) * self.wavenumber for still in (False, True)
@@ -227,10 +227,10 @@ class CosineWaves:
         return size(swing) / size(still)
 
     def pressure_amplification(self, *, frequency_ratio: float, depth: float) -> float:
-        """Swing of the mean wall pressure under the same forcing, over that of such a surface.
+        """Swing of the mean wall pressure under this forcing, over that of a quasi-static surface.
 
-        Cosines have no mean, so phi has the same one, none, on wall and surface, and p' is left with the
-        difference of G and with 2 psi at the surface: p'/rho = G + c - i s phi - 2 psi.
+        The mean of every cosine is zero, so that of phi is zero on wall and surface, and p' has only the
+        difference of G and 2 psi at the surface: p'/rho = G + c - i s phi - 2 psi.
         """
         half, radius = self.central_angle / 2, np.exp(-depth)
         drive = (1 - radius) * np.sin(half) / half
@@ -253,7 +253,7 @@ def _load(waves: CosineWaves) -> ComplexArray:
 def _potential(
     waves: CosineWaves, frequency_ratio: float, load: ComplexArray, *, still: bool
 ) -> ComplexArray:
-    """Coefficients B of the forced waves or of a surface that follows at once."""
+    """Coefficients B of the forced waves, or of a quasi-static surface if `still`."""
     s = frequency_ratio
     inertia = 0.0 if still else s**2 * waves.mass + 2j * s * waves.mixed
     return np.asarray(np.linalg.solve(inertia - waves.spring, -1j * s * load), dtype=np.complex128)

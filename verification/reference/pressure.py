@@ -1,11 +1,11 @@
-"""Pressures known exactly, and finite elements compared with them over several levels.
+"""Exact pressures, and finite elements compared with them over several levels.
 
 The quasi-static ring under gravity, whose surface is a circle about -g/omega^2, or a paraboloid about the
 shaft:
 
 p = rho omega^2 (|r + g/omega^2|^2 - c^2)/2 across the shaft, p = rho (omega^2 (r^2 - c^2)/2 - g z) along it;
 c from the liquid's volume, by quadrature of the closed-form area.  And a manufactured pressure, in closed
-form, whose right-hand sides are put into the solver.
+form, with right-hand sides for the solver.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from ringbalance.verification.finite_elements import field_error, mutated_force,
 
 _RING_GAUSS_POINTS: Final = 60
 _MAX_TILT: Final = 0.1
-"""Largest g/(omega^2 R1): a surface so tilted that a concentric one would be visibly wrong."""
+"""Largest g/(omega^2 R1): the tilt is large enough to expose a concentric surface as wrong."""
 _MAX_GAP_FRACTION: Final = 0.3
 """Fraction of the gaps between surface and walls that the tilt may take."""
 _DIRECTION_RAD: Final = 0.6
-"""Angle of gravity from the chamber's centre line: no axis of symmetry."""
+"""Angle of gravity from the chamber's centre line, off every axis of symmetry."""
 _GRAVITY: Final = 9.80665
 _GRAVITY_FLIPPED: Final = "gravity_sign_flipped"
 _FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
@@ -66,7 +66,7 @@ _FILL_OF_MAX: Final = 0.8
 
 @dataclass(frozen=True, kw_only=True)
 class _ExactRing:
-    """The free surface and the pressure below it, exactly."""
+    """Exact free surface, and exact pressure in the liquid."""
 
     density: float
     """rho, kg/m^3."""
@@ -106,7 +106,7 @@ def _exact_ring(
     transverse: tuple[float, float] = (0.0, 0.0),
     axial: float = 0.0,
 ) -> _ExactRing:
-    """The ring that holds a fill ratio under gravity, m/s^2.
+    """The ring of a fill ratio under gravity, m/s^2.
 
     Args: `transverse`: across the shaft in the chamber's axes. `axial`: along the negative z axis.
     Raises: ValueError: gravity so strong that no closed ring holds the liquid.
@@ -147,9 +147,9 @@ def _exact_ring(
 def gravity_study(
     scene: Scene, level: Level, defect: str | None, *, shaft: Shaft, levels: Mapping[Level, Sequence[int]]
 ) -> Evidence:
-    """Find the free surface on ever finer meshes; compare it with the exact one.
+    """Solve for the free surface on ever finer meshes, and compare it with the exact one.
 
-    Gravity points across the chamber of a horizontal shaft, on flat meshes, and along a vertical one.
+    Gravity acts across a horizontal shaft, on two-dimensional meshes, or along a vertical one.
     Args: `levels`: of `refined_cells`.
     Raises: ValueError: a search or solve that failed on some level.
     """
@@ -205,7 +205,7 @@ def _listed(cells: Sequence[Sequence[int]]) -> str:
 
 
 def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft) -> RotatingLiquid:
-    """Liquid that turns so slowly that gravity tilts its surface far, yet leaves the ring closed.
+    """Liquid that turns slowly enough for gravity to tilt its surface far, yet with a closed ring.
 
     Gravity has two components across a horizontal shaft, at no angle of symmetry, three along a vertical one.
     """
@@ -323,9 +323,9 @@ def manufactured_study(
 def _solutions(
     disc: Disc, problem: PressureProblem, cells: Sequence[tuple[int, ...]], *, straight: bool
 ) -> list[PressureSolution]:
-    """Solutions on ever finer meshes, with nodes within cells on straight lines between corners or not.
+    """Solutions on ever finer meshes, with curved cells or, if `straight`, with straight sides.
 
-    A wrong wall integral is seen against the true arc, so straight sides show in it.
+    Straight sides make the wall integral differ from that over the true arc.
     """
     radius = float(surface_radius(disc=disc, fill_ratio=_FILL_OF_MAX * disc.max_fill_ratio))
     solutions = []

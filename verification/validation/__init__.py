@@ -1,4 +1,4 @@
-"""Measurements by others, and how far a model is from them.
+"""Published measurements, and their differences from the model.
 
 A data set is a CSV file in `data/`. Its first lines, marked #, are TOML: where the numbers come from, how
 uncertain they are, and what they support. A new experiment is such a file, and a case of kind `validation`

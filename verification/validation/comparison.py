@@ -24,13 +24,13 @@ from ringbalance.verification.evidence import Evidence, FigureCurve, Level, Seri
 from ringbalance.verification.verdicts import Verdict
 
 PROMISED: Final = 0.93
-"""Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""
+"""Fraction of the points that must lie within both 95 % uncertainties: 0.95 less a small-sample margin."""
 MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(
     {None: 1.0, "ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
 )
-"""Factors on what is predicted; every comparison with measurements must notice the last two."""
+"""Factors on the prediction; every comparison with measurements must detect the last two."""
 _MIN_POINTS: Final = 2
-"""Points of a user's file from which a scatter can be had."""
+"""Least number of points of a user's file, from which a scatter can be calculated."""
 _MIN_SERIES: Final = 3
 
 
@@ -41,15 +41,15 @@ class _ModelStatistics:
     points: int
     series: int
     bias: float
-    """Geometric mean of predicted over measured, less one: above zero where the model reads high."""
+    """Geometric mean of predicted over measured, less one: positive where the model predicts too high."""
     bias_uncertainty: float
-    """Expanded (95 %)."""
+    """Expanded uncertainty (95 %) of the bias."""
     standard_deviation: float
     """Scatter of the model alone, less the measurements' own."""
     share_within: float
     """Fraction of the points with a deviation within both 95 % uncertainties, the stated one and U_D."""
     width_needed: float
-    """Factor on both uncertainties at which they hold 95 % of the points."""
+    """Factor on both uncertainties with which 95 % of the points lie within them."""
 
     def numbers(self) -> dict[str, float]:
         """Numbers for a case's text, by the names of `_ModelStatistics`."""
@@ -77,7 +77,7 @@ class Predictions:
 
     @property
     def used(self) -> FloatArray:
-        """Size of each deviation over what both uncertainties allow."""
+        """Magnitude of each deviation over the root sum of squares of both uncertainties."""
         allowed = np.hypot(self.stated, self.uncertainty * self.measured)
         return np.asarray(np.abs(self.predicted - self.measured) / allowed)
 
@@ -97,7 +97,7 @@ class Predictions:
 
         bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the
         scatter.  The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of
-        the n means of the series; from fewer than three series to U_D.
+        the n means of the series; with fewer than three series, to U_D.
         Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
         """
         ratio, names = np.log(self.predicted / self.measured), np.unique(self.series)
@@ -120,7 +120,7 @@ class Predictions:
 
     @property
     def verdict(self) -> Verdict:
-        """Confirmed where both uncertainties hold the promised fraction of the points."""
+        """Confirmed where at least the fraction `PROMISED` of the points lies within both uncertainties."""
         return Verdict.CONFIRMED if self.share_within >= PROMISED else Verdict.REFUTED
 
     def over_reynolds(self, of: str) -> Series:
@@ -192,10 +192,10 @@ def friction(*sets: Observations, mutation: str | None = None) -> Predictions:
 def with_left_out(
     judged: Predictions, left_out: Mapping[str, Predictions] = MappingProxyType({}), *, taught: int = 0
 ) -> dict[str, float]:
-    """Numbers of the readings that a case leaves out, and of all readings together.
+    """Statistics of the readings that a case leaves out, and of all readings together.
 
-    Args: `left_out`: readings that are not judged, by name. `taught`: number of readings that taught a
-        coefficient, which are no predictions and count in nothing but `taught_points`.
+    Args: `left_out`: readings that are not judged, by name. `taught`: number of readings to which a
+        coefficient was fitted: no predictions, and counted in `taught_points` alone.
     Returns: `<name>_points`, `<name>_within` and `<name>_bias` of each, `all_points`, `all_within`.
     """
     numbers = {"taught_points": float(taught)} if taught else {}

@@ -1,5 +1,5 @@
-"""Many scenes at once: axes along which keys vary, rows of answers, what is kept of them, and who computes.
+"""Sweeps over many scenes, and the search for a design.
 
-`axes.py` makes points, `static.py` and `runs.py` answer them, `store.py` keeps the answers, `work.py` deals
-them out, `sweep.py` puts it together.
+`axes.py` makes points; `static.py` and `runs.py` compute their results; `store.py` stores them; `work.py`
+distributes the work; `sweep.py` combines all of it.  `designing.py` is the search.
 """

@@ -1,8 +1,8 @@
 """Axes of a sweep: keys of a scene over a range or a list, several together, or whole tables of a CSV.
 
 An axis is written KEY=VALUES, where VALUES is a range `LOW:HIGH:COUNT`, even steps, or `LOW:HIGH:COUNT:log`;
-a list `A,B,C`; or, for the name of a table, a CSV file whose columns are keys of it and whose rows are things
-to choose from.  Keys that move together stand in one axis: `tube.bore=1mm,2mm,tube.length=0.3m,0.4m`.
+a list `A,B,C`; or, for the name of a table, a CSV file whose columns are keys of that table and whose rows
+are alternatives.  Keys that vary together form one axis: `tube.bore=1mm,2mm,tube.length=0.3m,0.4m`.
 A sample needs no COUNT.
 """
 
@@ -37,9 +37,9 @@ Point = Mapping[str, Any]
 MAX_POINTS: Final = 1_000_000
 _SAMPLES: Final = ("sobol", "latin")
 _OFTEN_WRONG_DIMENSIONS: Final = frozenset({"length", "pressure"})
-"""Dimensions whose numbers are often thought of in a unit a thousand or a million times as large or small."""
+"""Dimensions whose numbers are often entered in a unit other than SI, such as mm or bar."""
 _FAR_FACTOR: Final = 100.0
-"""Ratio to a scene's value beyond which no sweep over it lies as a whole."""
+"""Ratio of all values of a sweep to the scene's value beyond which they count as in a wrong unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,33 +49,33 @@ class Range:
     low: float
     high: float
     count: int | None = None
-    """Number of even steps; None: for a sample alone."""
+    """Number of evenly spaced values; None: usable in a sample only."""
     log: bool = False
     """True if the steps are even in the logarithm."""
 
     def at(self, share: FloatArray) -> FloatArray:
-        """Values at fractions of the way from one end to the other; the ends exactly."""
+        """Values at fractions of the range, in [0, 1]; exact at both ends."""
         low, high = (math.log(end) if self.log else end for end in (self.low, self.high))
         value = low + share * (high - low)
         inner = np.exp(value) if self.log else value
         return np.where(share == 0, self.low, np.where(share == 1, self.high, inner))
 
     def share(self, value: float) -> float:
-        """Fraction of the way from one end to the other at a value, or at the end next to it."""
+        """Fraction of the range at a value, clipped to [0, 1]."""
         low, high, at = (math.log(each) if self.log else each for each in (self.low, self.high, value))
         return min(max((at - low) / (high - low), 0.0), 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepAxis:
-    """Keys that move together."""
+    """Keys that vary together."""
 
     ranges: Mapping[str, Range]
     """Ranges by path; empty for a list."""
     choices: tuple[Point, ...] = ()
-    """Values of a list, one after the other."""
+    """Values of a list, in its order."""
     names: tuple[str, ...] = ()
-    """Names of the rows of a CSV file that names them."""
+    """Names of the rows of a CSV file; empty if it has no names."""
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -84,21 +84,21 @@ class SweepAxis:
 
     @property
     def head(self) -> str:
-        """Key that stands for the axis: such as "gas.name" where its rows have names, else its first key."""
+        """Key that represents the axis: such as "gas.name" if its rows have names, else its first key."""
         return f"{self.paths[0].partition('.')[0]}.{NAME}" if self.names else self.paths[0]
 
     def name_of(self, point: Point) -> str:
-        """Name of the row that a point has; empty without."""
+        """Name of the row with the values of a point; empty if there is none."""
         return self._name_by_values.get(tuple(map(point.get, self.paths)), "")
 
     @cached_property
     def _name_by_values(self) -> Mapping[tuple[Any, ...], str]:
         rows = [tuple(map(each.get, self.paths)) for each in self.choices]
-        # Of rows with equal values the first one names them.
+        # Rows with equal values have the name of the first.
         return dict(reversed([*zip(rows, self.names, strict=False)]))
 
     def grid(self) -> tuple[Point, ...]:
-        """Every value of the axis. Raises: SceneError: a range without the number of its steps."""
+        """Every value of the axis. Raises: SceneError: a range without COUNT."""
         if not self.ranges:
             return self.choices
         counts = {each.count for each in self.ranges.values()}
@@ -118,7 +118,7 @@ class SweepAxis:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """Axes, and the way to take points from them."""
+    """Axes, with the rule that takes points from them: grid or sample."""
 
     axes: tuple[SweepAxis, ...]
     sample: str = ""
@@ -131,13 +131,13 @@ class Plan:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lengths of the axes of a grid; of a sample its number of points alone."""
+        """Lengths of the axes of a grid; for a sample, its number of points."""
         return (len(self.points()),) if self.sample else tuple(len(axis.grid()) for axis in self.axes)
 
     def points(self) -> tuple[Point, ...]:
-        """All points; those of a grid with the last axis fastest.
+        """All points; in a grid the last axis varies fastest.
 
-        Raises: SceneError: no axis or too many points, or a sample that is none.
+        Raises: SceneError: no axis, too many points, or an invalid sample.
         """
         if not self.axes:
             raise _fault("", "nothing varies", 'at least one axis, such as "tube.bore=0.5mm:2mm:30"')
@@ -165,7 +165,7 @@ def _merged(parts: Sequence[Point]) -> Point:
 
 
 def _sample_size(sample: str) -> tuple[str, int]:
-    """Kind and number of points of a sample. Raises: SceneError: no sample."""
+    """Kind and number of points of a sample. Raises: SceneError: an invalid sample."""
     kind, _, text = sample.partition(":")
     if kind not in _SAMPLES or not text.isdecimal() or not 1 <= int(text) <= MAX_POINTS:
         allowed = f"one of {', '.join(f'{each}:N' for each in _SAMPLES)} with at most {MAX_POINTS} points"
@@ -175,11 +175,11 @@ def _sample_size(sample: str) -> tuple[str, int]:
 
 
 def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> Plan:
-    """A plan from values in Python.
+    """Plan from values in Python.
 
-    Args: `vary`: by path, an array, SI, a list of values as a scene file has them, or the text of an axis
-        behind its "="; by a tuple of paths, one such list for each; by the name of a table, a list of
-        mappings from its keys, or a CSV file.
+    Args: `vary`: by path, an array, SI, a list of values as in a scene file, or the VALUES of an axis as
+        text; by a tuple of paths, one such list for each path; by the name of a table, a list of mappings
+        from its keys, or a CSV file.
     Raises: SceneError: all errors of the axes together.
     """
     return _plan([partial(_axis_of, scene, name, values) for name, values in vary.items()], sample)
@@ -188,15 +188,15 @@ def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> P
 def plan_of_texts(
     scene: SceneFile, texts: Sequence[str], *, sample: str = "", folder: Path | None = None
 ) -> Plan:
-    """A plan from axes as the command line has them, each KEY=VALUES; see `plan_of`.
+    """Plan from axes as on the command line, each KEY=VALUES; see `plan_of`.
 
-    Args: `folder`: folder of files that an axis names; default that of the process.
+    Args: `folder`: folder of the CSV files that axes name; default the working folder.
     """
     return _plan([partial(_axis_of_text, scene, each, folder=folder or Path()) for each in texts], sample)
 
 
 def _plan(axes: Iterable[Callable[[], SweepAxis]], sample: str) -> Plan:
-    """Make a plan of axes. Raises: SceneError: all errors of the axes together."""
+    """Make a plan from axes. Raises: SceneError: all errors of the axes together."""
     plan_axes: list[SweepAxis] = []
     faults: list[Fault] = []
     for axis in axes:
@@ -210,9 +210,9 @@ def _plan(axes: Iterable[Callable[[], SweepAxis]], sample: str) -> Plan:
 
 
 def plan_of_file(scene: SceneFile, file: Path) -> Plan:
-    """A plan from a TOML file with `vary`, a list of axes as the command line has them, and `sample`.
+    """Plan from a TOML file with `vary`, a list of axes as on the command line, and `sample`.
 
-    Raises: SceneError: it cannot be read, or has errors.
+    Raises: SceneError: the file cannot be read or has errors.
     """
     if not file.is_file():
         raise SceneError.of_file(str(file), "there is no such file", "a TOML file with vary and sample")
@@ -248,7 +248,7 @@ def plan_of_file(scene: SceneFile, file: Path) -> Plan:
 
 
 def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> SweepAxis:
-    """Read KEY=VALUES, or several with commas between."""
+    """Read one KEY=VALUES, or several separated by commas."""
     keys: list[tuple[str, list[str]]] = []
     for part in text.split(","):
         path, equals, value = part.partition("=")
@@ -292,7 +292,7 @@ def _axis_of(scene: SceneFile, name: Any, values: Any) -> SweepAxis:
 
 
 def _linked(parts: Sequence[tuple[str, Range | list[Any]]], path: str) -> SweepAxis:
-    """Keys that move together: all over ranges, or all over lists of one length."""
+    """Axis of keys that vary together: all over ranges, or all over lists of equal length."""
     ranges = {path: each for path, each in parts if isinstance(each, Range)}
     lists = {path: each for path, each in parts if isinstance(each, list)}
     if not lists:
@@ -328,7 +328,7 @@ def _values(scene: SceneFile, path: str, values: Any) -> tuple[str, Range | list
 
 
 def _check_scale(scene: SceneFile, path: str, values: Sequence[Any], reader: ValueReader) -> None:
-    """Refuse bare numbers that are all as far from the scene's value as in a wrong unit."""
+    """Refuse bare numbers that all differ from the scene's value by more than `_FAR_FACTOR`: a wrong unit."""
     table, _, key = path.partition(".")
     scene_value, dimension = getattr(getattr(scene, table), key, None), reader.dimension
     bare = bool(values) and all(isinstance(each, int | float) and each > 0 for each in values)
@@ -352,7 +352,7 @@ def _read(path: str, text: str, reader: ValueReader) -> Any:
 
 
 def _checked(path: str, value: Any, reader: ValueReader) -> Any:
-    """A value of a list as a scene takes it: numbers in SI."""
+    """Checked value of a list, a number in SI or text."""
     if not isinstance(value, str):
         return value
     read = _read(path, value, reader)
@@ -360,7 +360,7 @@ def _checked(path: str, value: Any, reader: ValueReader) -> Any:
 
 
 def _reader(scene: SceneFile, path: str) -> ValueReader:
-    """Reader of a key. Raises: SceneError: the scene's kind has no such key, or a table in its place."""
+    """Reader of a key. Raises: SceneError: no such key in this kind of scene, or a table of this name."""
     schema: Schema = scene_kind(scene.balancer).schema
     table, _, key = str(path).partition(".")
     declared = schema.tables[table].keys.get(key) if table in schema.tables else None

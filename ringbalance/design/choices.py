@@ -1,4 +1,4 @@
-"""Things to choose from, such as valves: a CSV file, a row for each, whose columns are keys of a table."""
+"""Alternatives such as valves, from a CSV file: one row each, columns are keys of a scene's table."""
 
 from __future__ import annotations
 
@@ -23,26 +23,27 @@ from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.units import FieldError
 
 NAME: Final = "name"
-"""Column that names a row, where the table of the scene has no such key."""
+"""Column with the names of rows, unless the scene's table has a key of this name."""
 MAX_ROWS: Final = 1_000_000
 _REMARK: Final = re.compile(r"^#.*$", re.MULTILINE)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choices:
-    """Rows of a file, in its order."""
+    """Rows of a CSV file, in the file's order."""
 
     names: tuple[str, ...]
-    """Empty without a column of them."""
+    """Names of the rows; empty without such a column."""
     rows: tuple[Mapping[str, Any], ...]
-    """By key: a number in SI, a word, or None for an empty cell, which takes the key away."""
+    """Values by key: a number in SI, a word, or None for an empty cell, which removes the key from the
+    scene."""
 
 
 def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
-    """Read a CSV file as spreadsheets write it, with commas, semicolons or tabs; lines marked # are remarks.
+    """Read a CSV file as spreadsheets write it, with commas, semicolons or tabs; lines with # are comments.
 
-    A head is a key, or a key with the unit of the numbers below it, such as "conductance [l/(s*bar)]".
-    Args: `table`: of the scene. `keys`: of that table.
+    A column head is a key, or a key with the unit of the numbers below, such as "conductance [l/(s*bar)]".
+    Args: `table`: name of a table of the scene. `keys`: its keys by name.
     Raises: SceneError: every error of the file, with line and column.
     """
     shown = file_name(file)
@@ -86,7 +87,7 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
 
 
 def as_toml(text: str, reader: ValueReader) -> Any:
-    """Text as a scene file would have it, where a key without unit takes a number."""
+    """Value as in a scene file: a number for a key without unit, if the text is one; else the text."""
     if reader.dimension is None:
         for number in (int, float):
             try:

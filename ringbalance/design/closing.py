@@ -1,7 +1,7 @@
-"""Last step of a search: designs near the required fraction are judged, all on the same devices.
+"""Last step of a search: verdicts on designs near the required fraction, all on the same devices.
 
-Nothing was chosen on these devices, so the fraction that a design serves does not depend on the way that led
-to it, and the difference between two designs is known several times better than the fraction of all devices.
+No design was selected on these devices, so the fraction that a design serves has no selection bias.  The
+difference of two designs on equal devices is several times more precise than either fraction.
 """
 
 from __future__ import annotations
@@ -21,28 +21,29 @@ from ringbalance.design.racing import Race, judged_design, tuned_settings
 from ringbalance.scene.arrays import FloatArray
 
 AS_SMALL: Final = 0.01
-"""Relative difference in size up to which two designs count as equally small: the search's resolution."""
+"""Relative difference in size below which two designs count as equal: resolution of the search."""
 _MAX_JUDGED: Final = 10
-"""Listed designs judged, after which no further pair is begun."""
+"""Number of judged designs of a list after which no further pair is judged."""
 _MAX_ROUNDS: Final = 6
-"""Rounds in each of which two designs are judged."""
+"""Largest number of rounds; two designs are judged in each."""
 _STEP_SIGMA: Final = 0.06
-"""Standard deviation of the points about the best, in the unit cube."""
+"""Standard deviation of the points about the best designs, in the unit cube."""
 _SIZE_STEPS: Final = (-12, 21)
 """Range of sizes to judge about the expected one, in steps of `AS_SMALL`."""
 _POINTS_PER_SIZE: Final = 24
 _FIRST_LIMIT: Final = 1.05
-"""Size to improve on where no design meets the requirement yet, relative to the expected size."""
+"""Size to improve on while no design meets the requirement, relative to the expected size."""
 _SIGMA_FACTOR: Final = 1.5
-"""Ratio of the surface's error near the required fraction to its own standard deviation, as measured."""
+"""Measured ratio of the surface's error near the required fraction to its stated standard deviation."""
 _MIN_GAIN: Final = 0.002
-"""Expected relative decrease of the size from which on a design is worth judging."""
+"""Smallest expected relative decrease of the size for which a design is judged."""
 _NEAR_FRACTION: Final = 0.03
-"""Fraction below the required one from which on a listed design may meet it, for the surface may be wrong."""
+"""Margin below the required fraction within which a design of a list is still judged: error of the
+surface."""
 
 
 def judged_designs(hunt: Hunt) -> list[RacedDesign]:
-    """Judge the promising designs of a search, each then with the race of its judged settings alone."""
+    """Judge the promising designs of a search; the race of each then contains only its judged settings."""
     if not hunt.races.candidates:
         return []
     if hunt.complete or not hunt.races.space.sized:
@@ -51,7 +52,7 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
 
 
 def growth(races: Races, best: RacedDesign) -> float:
-    """Derivative of the fraction of devices by the logarithm of the size at a design, by the surface."""
+    """Derivative of the fraction of devices with respect to the logarithm of the size, from the surface."""
     shares = next(each.shares for each in races.candidates if each.point == best.point)
     ends = best.size * np.array([1 - AS_SMALL, 1 + AS_SMALL])
     points = races.able(np.array([races.space.sized_at(shares, size) for size in ends]))
@@ -61,7 +62,7 @@ def growth(races: Races, best: RacedDesign) -> float:
 
 
 def _judge_smaller_and_smaller(races: Races, size: float) -> list[RacedDesign]:
-    """Judge two designs a round, by expected decrease of the size, until the surface promises none.
+    """Judge two designs a round, by expected decrease of the size, until the surface predicts no decrease.
 
     Every verdict improves the surface.
     """
@@ -101,10 +102,10 @@ def _judge_smaller_and_smaller(races: Races, size: float) -> list[RacedDesign]:
 def _most_promising_by_size(
     races: Races, size: float, *, below: float
 ) -> tuple[Points, FloatArray, FloatArray, FloatArray]:
-    """Draw points of every size, in equal steps, and keep the one of each that promises most.
+    """Draw points of every size, in equal steps, and keep the most promising of each size.
 
-    Returns: the points with their sizes, m^3, and the logits of their fractions with standard deviations, by
-        the surface.
+    Returns: Points, their sizes, m^3, the logits of their fractions by the surface, and the standard
+        deviations of these.
     """
     surface = races.surface()
     steps = size * (1 + AS_SMALL) ** np.arange(*_SIZE_STEPS)
@@ -128,8 +129,8 @@ def _most_promising_by_size(
 def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
     """Judge designs that raced, two at a time, in the order of their size and gas.
 
-    From the first that promises to meet the requirement, go on to smaller ones until two miss it, or to
-    larger ones until one meets it.
+    Start at the first that is predicted to meet the requirement; continue with smaller ones until two miss
+    it, or with larger ones until one meets it.
     """
     races = hunt.races
     sized, enough = races.space.sized, float(logit(races.threshold))
@@ -137,7 +138,7 @@ def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
     order = sorted(range(len(logits)), key=lambda i: (races.candidates[i].size, races.candidates[i].race.gas))
     listed: list[int] = []
     if sized:
-        # Of nearly equal sizes the most promising.
+        # The most promising of nearly equal sizes.
         for i in order:
             if not listed or races.candidates[i].size > (1 + AS_SMALL) * races.candidates[listed[-1]].size:
                 listed.append(i)
@@ -152,7 +153,7 @@ def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
     judged: dict[int, RacedDesign | None] = {}
 
     def judge(*numbers: int) -> list[int]:
-        """Judge designs by number. Returns: the numbers of all that meet the requirement."""
+        """Judge designs by number. Returns: Numbers of all designs that meet the requirement."""
         new = [i for i in numbers if 0 <= i < len(designs) and i not in judged]
         races.report_progress(f"judging designs {len(judged) + 1} and on")
         judge_one = partial(judged_design, races.space.hasty, search=search)
@@ -177,6 +178,6 @@ def _judge_listed(hunt: Hunt) -> list[RacedDesign]:
         met = judge(top + 1, top + 2)
         top += 2
     if not sized:
-        # The search knows the gas of few devices alone.
+        # The gas in the search is that of few devices: two more designs may need less.
         judge(top + 1, top + 2)
     return [each for each in judged.values() if each is not None]

@@ -27,13 +27,13 @@ _EDGES: Final = {
     True: ("design_edge", "design_edge_default"),
     False: ("design_edge_missed", "design_edge_missed_default"),
 }
-"""Codes, True if the design meets the requirements: at an end that the scene gives, and at a default."""
+"""Codes by success of the design: value at an end of a range from the scene, and of a default range."""
 _EDGE_FRACTION: Final = 0.02
-"""Fraction of an end of a range: nearer to it, a value stands at the end."""
+"""Relative distance below which a value counts as at an end of its range."""
 
 
 def design_rows(design: Design) -> Rows:
-    """Rows of a design: its verdict, others, and the effects of changes."""
+    """Rows of a design: its verdict, alternatives, and the effects of changes."""
     judgement = design.judgement
     tables = () if judgement is None else (_keys_table(design, judgement), required_table(judgement))
     return Rows(
@@ -45,7 +45,7 @@ def design_rows(design: Design) -> Rows:
 
 
 def design_document(design: Design) -> dict[str, Any]:
-    """Document of a design, SI."""
+    """JSON document of a design, SI."""
     scene, judgement, static = design.given, design.judgement, design.static
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
@@ -145,8 +145,8 @@ def _findings(design: Design) -> Iterator[Finding]:
 
 
 def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
-    """Number of designs that the checks of a scene refuse, and the most frequent reason."""
-    # Sentences of one reason differ in numbers and units, which are shorter words.
+    """Finding on designs that the checks of a scene refuse: their number, and the most frequent reason."""
+    # Sentences on one reason differ only in numbers and units; words of four letters or more identify it.
     reasons = [tuple(re.findall("[a-z_]{4,}", text)) for text in texts]
     for reason, most in Counter(reasons).most_common(1):
         values = {"count": len(texts), "points": points, "reasons": len(set(reasons)), "most": most}
@@ -155,7 +155,7 @@ def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
 
 
 def _sharpness(design: Design) -> Iterator[Finding]:
-    """Findings on how well the smallest size is known."""
+    """Findings on the uncertainty of the smallest size."""
     if design.smaller is not None:
         size, share = design.smaller
         values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
@@ -165,7 +165,7 @@ def _sharpness(design: Design) -> Iterator[Finding]:
 
 
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
-    """Findings on the demand that most devices miss, and by how much."""
+    """Finding on the demand that most devices miss, with the value reached."""
     worst = min(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
     parts = (judgement.required_fraction, 0.5)
     part = next((each for each in parts if math.isfinite(_reached(judgement, worst, each))), parts[0])
@@ -191,8 +191,7 @@ def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:
 
 
 def _edges(design: Design) -> Iterator[tuple[str, str, str | None]]:
-    """Keys that stand at an end of their range, with that end, and `vary` of a wider one, where the scene
-    does not give the end."""
+    """Keys at an end of their range, with that end, and `vary` with a wider range if the end is a default."""
     for axis in design.space.axes:
         for path, ends in axis.ranges.items():
             value = float(design.point[path])

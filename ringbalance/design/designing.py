@@ -1,7 +1,7 @@
-"""A design for a scene's table [design]: the smallest disc, with its bore, pressure, valve and settings, of
-whose drawn devices enough meet what is required; or what stands against it.
+"""Design for a scene's table [design]: the smallest disc, with bore, pressure, valve and settings, of whose
+random devices a sufficient fraction meets the requirements; or the reason why there is none.
 
-What the search finds is judged as `tune` judges: on devices on which nothing was chosen, the smallest first.
+Candidates of the search are judged as in `tune`, on devices that selected no design, the smallest first.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.processes import beside
 
 VALVE: Final = "valve"
-"""Stands for the keys of a thing with a name."""
+"""Path that represents all keys of a valve with a name."""
 _MOVE_FRACTION: Final = 0.05
-"""Relative change of a key to either side."""
+"""Relative change of a key, up and down, for its effect."""
 _EFFECT_DEVICES: Final = 256
-"""Devices on which a moved key is answered."""
+"""Number of devices on which the effect of a changed key is computed."""
 _MAX_VERDICTS: Final = 3
-"""Designs at most, each the next larger, that are judged on devices that have chosen none."""
+"""Largest number of designs, in order of size, that are judged on devices that selected no design."""
 _MAX_FRONT: Final = 6
 _NOTABLE_FRACTION: Final = 0.05
-"""Relative difference in size, time or gas that makes another design worth a line."""
+"""Relative difference in size, time or gas beyond which an alternative design is reported."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """Effect of a change of one key, with everything else as it is, on a design."""
+    """Effect of a change of one key on a design, with all other keys unchanged."""
 
     path: str
     changes: Point
     """Changes of the scene, SI; with those that follow."""
     met: Proportion | None
-    """Fraction of the devices that meet every demand; None: no such design."""
+    """Fraction of the devices that meet every demand; None: the changed scene is refused."""
     compared: Paired | None = None
-    """Comparison with the design as it is, on the same devices."""
+    """Comparison with the unchanged design on the same devices."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -73,31 +73,32 @@ class Design(PresentedResult):
     given: SceneFile
     space: Space
     static: Static
-    """Counts of the points that were answered without a run."""
+    """Counts of the points that were evaluated without a run."""
     raced: int
-    """Designs that ran as few devices."""
+    """Number of designs that ran on few devices."""
     needed: float
-    """Unbalance that is to be cancelled, kg m."""
+    """Unbalance to be cancelled, kg m."""
     reach: float | None
     """Unbalance that the design cancels in any direction, kg m."""
     point: Point
-    """Changes of the scene; of the design that comes nearest where none meets what is required."""
+    """Changes of the scene, SI; those of the nearest design if none meets the requirements."""
     judgement: Judgement | None
-    """Judgement of its best settings; None: no design can work."""
+    """Verdict on the design with its best settings; None: no design can work."""
     smaller: tuple[float, Proportion] | None
-    """Size, m^3, of the next smaller design that was judged, with the fraction of devices that it served;
-    None: none was, or the size does not vary."""
+    """Size, m^3, of the next smaller judged design, and the fraction of devices that it serves; None: no
+    smaller design was judged, or the size does not vary."""
     doubt: float | None
-    """By how much other drawn devices would move the size, relative (95 %); None: the fraction of devices
-    does not grow with the size, or that does not vary."""
+    """Relative half-width (95 %) of the size by the random choice of devices; None: the fraction of devices
+    does not grow with the size, or the size does not vary."""
     front: tuple[RacedDesign, ...]
-    """Others that should meet what is required, none better than another in size, time and gas."""
+    """Alternative designs that should meet the requirements, Pareto-optimal in size, settling time and
+    gas."""
     effects: tuple[Effect, ...]
     ranking: Ranking
 
     @property
     def succeeded(self) -> bool:
-        """True if the design meets what is required."""
+        """True if the design meets the requirements."""
         return self.judgement is not None and self.judgement.verdict == MET
 
     @property
@@ -107,7 +108,7 @@ class Design(PresentedResult):
 
     @property
     def recommended_scene(self) -> SceneFile:
-        """The scene as designed, checked. Raises: SceneError: no design can work."""
+        """Checked scene with the design's values. Raises: SceneError: no design can work."""
         if self.judgement is None:
             problem, allowed = "no design can work", "more space, pressure or a smaller unbalance"
             raise SceneError.of_file(self.given.file, problem, allowed)
@@ -123,10 +124,10 @@ def run_design(
     progress: Callable[[str], None] | None = None,
     start: int = 0,
 ) -> Design:
-    """Design what a scene leaves open; see `ringbalance.design`.
+    """Choose the values that a scene leaves open in [design].
 
     Args: `executor`: any executor; default `workers` processes, default one for each processor. `start`:
-        seed of the points that are tried.
+        seed of the tried points.
     Raises: SceneError: a scene without [design], or one that leaves nothing to choose or to cancel.
     """
     space, report_progress = Space.of(liquid_ring_scene(scene)), progress or (lambda _: None)
@@ -155,11 +156,11 @@ def run_design(
         judged = judged_designs(search)
 
         def order(each: RacedDesign) -> float:
-            """Size or, of designs of one size, gas."""
+            """Size, m^3; if no size varies, energy of the gas, J."""
             return each.size if space.sized else float(np.nanmedian(each.race.judgement.outcomes.energy))
 
         promising = sorted((each for each in judged if each.race.succeeded), key=order)[:_MAX_VERDICTS]
-        # Where none meets what is required, the one that serves most devices.
+        # If none meets the requirements, the design that serves most devices.
         for best in promising or sorted(judged, key=lambda each: -each.race.judgement.fraction.value)[:1]:
             report_progress("the verdict, and what changes of it would do")
             settings = best.race.judgement.settings
@@ -168,7 +169,7 @@ def run_design(
             if judgement is not None and judgement.verdict == MET:
                 break
         if best is not None and space.sized:
-            # Half-width of the fraction over its growth with the logarithm of the size.
+            # Half-width of the fraction, divided by its growth with the logarithm of the size.
             share, rise = best.race.judgement.fraction, growth(races, best)
             doubt = (share.high - share.low) / 2 / rise if rise > 0 else None
     reach, smaller, ranking = None, None, Ranking()
@@ -205,11 +206,11 @@ def _effects(
     executor: Executor | None,
     judge: Callable[[], Judgement | None],
 ) -> tuple[tuple[Effect, ...], Judgement | None]:
-    """Effects of every key changed alone, and the verdict on the design itself, which takes longest."""
+    """Effects of each key changed alone, and the verdict on the design, which starts first as the longest."""
     point = best.point
     moves: list[tuple[str, dict[str, Any]]] = []
     for axis in space.axes:
-        # A number moves to both sides; an entry of a list is replaced by each other one.
+        # A number changes up and down; an entry of a list is replaced by each other entry.
         for path in axis.ranges:
             by = (1 - _MOVE_FRACTION, 1 + _MOVE_FRACTION)
             moves += [(path, {path: float(f"{factor * float(point[path]):.4g}")}) for factor in by]
@@ -236,9 +237,10 @@ def _effects(
 
 
 def _front(races: Races, required_fraction: float, best: RacedDesign) -> tuple[RacedDesign, ...]:
-    """Designs that should meet what is required, the smallest first; of those nearly alike the first.
+    """Pareto-optimal alternatives, the smallest first; of nearly equal ones the first.
 
-    Args: `best`: the design itself: smaller ones met what is required on few devices alone.
+    Args: `best`: design with the verdict; smaller ones are left out, which met the requirements on few
+        devices only.
     """
     promises = races.surface().logits(races.coordinates(races.points))[0]
     pairs = sorted(zip(races.candidates, promises, strict=True), key=lambda row: row[0].size)

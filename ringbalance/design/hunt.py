@@ -1,11 +1,12 @@
-"""Search for a design: a Sobol sequence, races of a few drawn devices, then rounds about the best.
+"""Search for a design: a Sobol sequence, races over a few random devices, then rounds about the best.
 
-The points that can work without a run race first.  In every round points about the best designs race, closer
-and closer, chosen by a surface through the counts of devices of all designs that raced.
+First, some of the points that can work according to their values without a run take part in races.  In every
+further round, points ever closer to the best designs race; they are selected by a surface fitted to the
+counts of devices of all raced designs.
 
-Smallest is the volume of the cylinder around the chambers; where the disc's size does not vary, the gas that
-is used decides, and among listed designs within `closing.AS_SMALL` the surface.  Everything is counted and
-nothing timed, so that the same scene gives the same design on every machine.
+The size is the volume of the cylinder around the chambers; if it does not vary, the gas consumption decides,
+and among listed designs within `closing.AS_SMALL` the surface.  Decisions depend on counts, not on computing
+time, so that a scene gives the same design on every machine.
 """
 
 from __future__ import annotations
@@ -31,55 +32,55 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.registry import registered
 
 POINTS: Final = 2048
-"""Points of the Sobol sequence."""
+"""Number of points of the Sobol sequence."""
 _MAX_LISTED: Final = 256
 """Points up to which a space of lists is tried in full."""
 _FIRST_SMALLEST, _FIRST_SPREAD = 12, 14
-"""Points that race first: the smallest that can work, and as many spread over all sizes."""
+"""Numbers of points in the first races: smallest points that can work, and points spread over all sizes."""
 _STEP_SIGMAS: Final = (0.15, 0.15, 0.12, 0.1, 0.08, 0.06)
 """Standard deviation of the steps in the unit cube, by round."""
 _MIN_ROUNDS: Final = 2
-"""Rounds for a space without axes; every axis adds one, up to all."""
+"""Number of rounds for a space without axes; every axis adds one, up to the number of `_STEP_SIGMAS`."""
 _SIZE_RANGES: Final = ((0.6, 1.1), (0.7, 1.15), (0.8, 1.1), (0.85, 1.1), (0.88, 1.08), (0.9, 1.06))
 """Range of sizes relative to the expected one, by round."""
 _ANYWHERE_SHARES: Final = (0.5, 0.5, 0.3, 0.3, 0.3, 0.3)
-"""Share of the points that start anywhere in the unit cube, by round."""
+"""Fraction of the points that start at any workable point of the first sample, by round."""
 _RACES_PER_ROUND: Final = 16
 _POINTS_PER_RACE: Final = 32
-"""Points drawn for each race of a round, of which the most promising races."""
+"""Number of points drawn for each race of a round; the most promising one races."""
 _HOPE_SIGMA: Final = 0.7
-"""Standard deviations of the surface added to the promise of a point that may race."""
+"""Standard deviations of the surface that are added to its prediction when points are ranked."""
 _DOUBT_SIGMA: Final = 0.5
-"""Standard deviations subtracted where a design that raced is taken for one that meets the requirement."""
+"""Standard deviations subtracted from the prediction for a raced design that counts as sufficient."""
 _GAS_SMOOTHING: Final = 0.01
 _MIN_GAS_J: Final = 1e-6
 """Energy of the gas that counts as none, J."""
 _ABOVE_LOGITS: Final = 1e3
-"""Offset above every logit and every logarithm of an energy."""
+"""Number larger than any logit plus any logarithm of an energy."""
 _REACH: Final = 0.9
-"""Share of the initial unbalance that a design must cancel before it runs, for its devices differ."""
+"""Fraction of the initial unbalance that a nominal design must cancel to be run; devices scatter about it."""
 _REACH_ONE_WAY: Final = 0.6
-"""The required share where the unbalance lies in one direction: pairs of chambers at right angles cancel up
-to 1.41 times as much there as in every direction."""
+"""Required fraction if the unbalance has a known direction: pairs of chambers at right angles cancel up to
+1.41 times as much in one direction as in every direction."""
 _EVERY_WAY_RAD: Final = 3.0
-"""Range of the phase to both sides from which on the unbalance lies in any direction, rad."""
+"""Half-range of the phase beyond which the unbalance may have any direction, rad."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Static:
-    """Counts of the first sample without a run."""
+    """Counts of the first sample, evaluated without a run."""
 
     points: int
     refusals: tuple[str, ...]
-    """Reasons for which the checks of a scene refuse points, one for each of these."""
+    """Reason for each point that the checks of a scene refuse."""
     blocked: int
     """Number of points without any flow."""
     able: int
     """Number of points that cancel the unbalance."""
     reach: float
-    """Largest unbalance that a point cancels in any direction, kg m; NaN: none flows."""
+    """Largest unbalance that any point cancels in every direction, kg m; NaN: no point has a flow."""
     reach_point: Point
-    """The point with this reach."""
+    """Point with the largest reach."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +90,7 @@ class Hunt:
     static: Static
     races: Races
     complete: bool
-    """True if every design that can work raced."""
+    """True if every design that can work took part in a race."""
     size: float
     """Expected size of the smallest design that meets the requirement, m^3."""
 
@@ -124,7 +125,7 @@ def hunt(
         return Hunt(static=static, races=races, complete=complete, size=math.nan)
 
     def served(candidate: RacedDesign) -> float:
-        """Fraction of the devices less one: 4 of 4 are worth less than 60 of 64."""
+        """Fraction of devices, reduced by one device: 4 of 4 rank below 60 of 64."""
         return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
 
     enough = [each.size for each in races.candidates if served(each) >= races.threshold]
@@ -139,9 +140,9 @@ def hunt(
 
 
 def _race_first_sample(races: Races) -> tuple[Static, bool]:
-    """Answer the whole space without a run, and race some of the points that can work.
+    """Evaluate a sample of the space without a run, and race some of the points that can work.
 
-    Returns: counts, and whether every point of the space was tried.
+    Returns: Counts, and True if the sample contains every point of the space.
     """
     space = races.space
     counts = [len(axis.choices) for axis in space.axes]
@@ -179,10 +180,10 @@ def _race_first_sample(races: Races) -> tuple[Static, bool]:
 
 
 def _race_round(races: Races, size: float, index: int) -> float:
-    """Race points about the best designs, the most promising of every range of sizes.
+    """Race points about the best designs, the most promising of each range of sizes.
 
-    Args: `size`: expected, m^3. `index`: into the settings of the rounds.
-    Returns: the size from which on designs meet the requirement, by the surface, m^3.
+    Args: `size`: expected smallest size, m^3. `index`: index of the round's constants.
+    Returns: Smallest size that meets the requirement by the surface, m^3, within the round's range.
     """
     low, high = _SIZE_RANGES[index]
     promise = partial(_promise, races, races.surface())
@@ -202,9 +203,9 @@ def _race_round(races: Races, size: float, index: int) -> float:
 
 
 def _promise(races: Races, surface: Surface, points: Points) -> FloatArray:
-    """Logit of the fraction of devices, with some of its doubt; for discs of one size, the gas.
+    """Logit of the fraction of devices plus part of its standard deviation; for discs of one size, the gas.
 
-    The gas ranks only the points that may serve enough devices, above all others.
+    Points that may serve enough devices rank by gas, above all others.
     """
     coordinates = races.coordinates(points)
     logits, sigmas = surface.logits(coordinates)

@@ -1,4 +1,4 @@
-"""All designs of a space that raced, the surface through them, and points about the best of them."""
+"""Raced designs of a space, the surface fitted to them, and points about the best of them."""
 
 from __future__ import annotations
 
@@ -26,47 +26,48 @@ ReportProgress = Callable[[str], None]
 
 _POINTS_PER_BATCH: Final = 256
 _DEVICE_BLOCKS: Final = 8
-"""Blocks of devices over which designs are spread, so that chance in one block does not lead the search."""
+"""Number of blocks of devices that designs use in turn, so that chance in one block does not bias the
+search."""
 _MAX_PARENTS: Final = 6
 _NEIGHBOURS_PER_POINT: Final = 2
-"""Settings that race besides those of the parent."""
+"""Number of settings that race in addition to those of the nearest design."""
 _SWITCH_PROBABILITY: Final = 0.1
-"""Probability that a step takes another entry of a list, such as a valve."""
+"""Probability that a step replaces an entry of a list, such as a valve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RacedDesign:
-    """Design that raced."""
+    """Design with the result of its race."""
 
     shares: FloatArray
     """Coordinates in the unit cube."""
     reach: float
-    """Unbalance that it cancels in any direction, over the one that is needed."""
+    """Ratio of the unbalance that the design cancels in any direction to the needed one."""
     point: Point
     size: float
-    """Volume, m^3."""
+    """Volume of the cylinder around the chambers, m^3."""
     race: Race
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Points:
-    """Designs that can work."""
+    """Points of the space that can work."""
 
     shares: FloatArray
     """Coordinates in the unit cube, shape (n, axes)."""
     points: list[Point]
     reach: FloatArray
-    """Unbalance that each cancels in any direction, over the one that is needed, shape (n,)."""
+    """Ratios of the unbalance that each cancels in any direction to the needed one, shape (n,)."""
 
     def some(self, numbers: Sequence[int]) -> Points:
-        """Choose points by number."""
+        """Points with these numbers."""
         chosen = np.asarray(numbers, dtype=np.intp)
         points = [self.points[i] for i in chosen.tolist()]
         return Points(shares=self.shares[chosen], points=points, reach=self.reach[chosen])
 
 
 def threshold(required_fraction: float) -> float:
-    """Least fraction of the devices of a verdict whose lower 95 % bound is the required fraction."""
+    """Smallest fraction of a verdict's devices whose lower 95 % bound reaches the required fraction."""
     count = math.ceil(required_fraction * MOST_DRAWS)
     while count < MOST_DRAWS and Proportion(count=count, of=MOST_DRAWS).verdict(required_fraction) != MET:
         count += 1
@@ -74,7 +75,7 @@ def threshold(required_fraction: float) -> float:
 
 
 def deal(executor: Executor | None, calls: Sequence[Callable[[], Any]]) -> list[Any]:
-    """Answer calls, in their order. Args: `executor`: any executor; None: this process."""
+    """Results of calls, in their order. Args: `executor`: any executor; None: this process."""
     if executor is None:
         return [call() for call in calls]
     answers = dict(dealt(executor, calls))
@@ -83,15 +84,15 @@ def deal(executor: Executor | None, calls: Sequence[Callable[[], Any]]) -> list[
 
 @dataclass(kw_only=True)
 class Races:
-    """State that the steps of a search share."""
+    """State of a search, shared by its steps."""
 
     space: Space
     needed: float
-    """Unbalance that is to be cancelled, kg m."""
+    """Unbalance to be cancelled, kg m."""
     least: float
-    """Part of it that a design must cancel before it runs: its devices differ."""
+    """Fraction of `needed` that a nominal design must cancel to be run; devices scatter about it."""
     threshold: float
-    """Fraction of the devices from which on a design counts as one that meets the requirements."""
+    """Smallest fraction of the devices with which a design counts as meeting the requirements."""
     executor: Executor | None
     report_progress: ReportProgress
     trials: Sequence[Trials]
@@ -101,10 +102,10 @@ class Races:
     candidates: list[RacedDesign] = field(default_factory=list)
     raced: set[str] = field(default_factory=set)
     fitted: Surface | None = None
-    """Surface through the counts of all candidates; None: a candidate came since, or no surface is fitted."""
+    """Surface fitted to the counts of all candidates; None: not fitted since the last candidate was added."""
 
     def answered(self, points: Sequence[Point]) -> list[Record]:
-        """Answer points without a run."""
+        """Rows of points without a run."""
         batches = [
             points[start : start + _POINTS_PER_BATCH] for start in range(0, len(points), _POINTS_PER_BATCH)
         ]
@@ -112,7 +113,7 @@ class Races:
         return [row for part in deal(self.executor, calls) for row in part or ()]
 
     def able(self, shares: FloatArray, rows: Sequence[Record] | None = None) -> Points:
-        """Keep the points that can work. Args: `shares`: in the unit cube. `rows`: answers without a run."""
+        """Points that can work. Args: `shares`: coordinates in the unit cube. `rows`: rows without a run."""
         points = self.space.points(shares)
         rows = self.answered(points) if rows is None else rows
         reach = [(row_reach(row) or 0.0) * (row["status"] == "ok") / self.needed for row in rows]
@@ -122,7 +123,7 @@ class Races:
         )
 
     def race(self, points: Points, grid_points: Sequence[Sequence[GridPoint] | None]) -> None:
-        """Race points that have not raced yet, and keep those that have an answer."""
+        """Race points that have not raced yet, and add those with a result to the candidates."""
         keys = [repr(sorted(point.items())) for point in points.points]
         fresh = [i for i, key in enumerate(keys) if key not in self.raced and key not in keys[:i]]
         calls = [
@@ -166,12 +167,12 @@ class Races:
         )
 
     def coordinates(self, points: Points) -> FloatArray:
-        """Coordinates of the surface: those in the unit cube, and the unbalance that a design cancels, on
-        which the fraction depends more simply than on the keys that it follows from."""
+        """Coordinates of the surface: those in the unit cube, and the logarithm of the reach, since the
+        fraction depends more simply on the reach than on the keys behind it."""
         return np.column_stack([self.space.coordinates(points.shares), np.log(points.reach)])
 
     def surface(self) -> Surface:
-        """Surface through the counts of all designs."""
+        """Surface fitted to the counts of all candidates."""
         if self.fitted is None:
             self.fitted = Surface.of(
                 self.coordinates(self.points),
@@ -182,11 +183,11 @@ class Races:
 
     @property
     def _well_known(self) -> list[RacedDesign]:
-        """Candidates that ran many devices; all, where none has."""
+        """Candidates that ran at least `DEVICES` devices; all candidates if there are none."""
         return [each for each in self.candidates if each.race.meets.size >= DEVICES] or self.candidates
 
     def nearest_grid_points(self, shares: FloatArray) -> list[GridPoint | None]:
-        """Settings of the nearest design that ran many devices, by point."""
+        """Settings of the nearest design that ran many devices, for each point."""
         measured = self._well_known
         coordinates = self.space.coordinates(np.array([each.shares for each in measured]))
         distance = np.linalg.norm(self.space.coordinates(shares)[:, np.newaxis] - coordinates, axis=2)
@@ -205,7 +206,8 @@ class Races:
         return fields
 
     def parents(self, value: Callable[[Points], FloatArray], size: float) -> FloatArray:
-        """Coordinates in the unit cube of the designs that would be best if they had a size, m^3."""
+        """Coordinates in the unit cube of the best designs, each rescaled to a size, m^3, where size
+        varies."""
         measured = self._well_known
         shares = np.array([each.shares for each in measured])
         if self.space.sized:
@@ -220,8 +222,8 @@ class Races:
     def cloud(self, parents: FloatArray, step: float, sizes: FloatArray, *, anywhere: float = 0.0) -> Points:
         """Draw points about parents, one for each size, and keep those that can work.
 
-        Args: `step`: standard deviation in the unit cube. `anywhere`: fraction of them about any point of the
-            first sample that can work.
+        Args: `step`: standard deviation in the unit cube. `anywhere`: fraction of points drawn about a random
+            workable point of the first sample, not about a parent.
         """
         centres = parents[self.random.integers(0, len(parents), sizes.size)]
         free = self.random.random(sizes.size) < anywhere

@@ -1,8 +1,8 @@
-"""Race of controller settings on one design, over few drawn devices.
+"""Race of controller settings on one design, over few random devices.
 
-Settings are points of the balancer's search space, whose axes are in units of the design's own loop and dead
-time, so that the best settings of one design are a good start for another.  A design that serves few of the
-first devices is given up; the best run on a whole block of devices, whose inputs are spread evenly.
+Settings are points of the balancer's search space, whose axes are normalised by loop and dead time of the
+design, so that the best settings of one design are a good start for another.  A design that serves few of the
+first devices is dropped; the best settings run on a whole block of devices, whose inputs are evenly spread.
 """
 
 from __future__ import annotations
@@ -40,22 +40,22 @@ DEVICES: Final = HEATS[-1]
 STEP: Final = 0.5
 """Distance between neighbouring settings, levels."""
 _SURVIVORS: Final = (39, 8, 1)
-"""Largest numbers of settings that go on after each heat but the last."""
+"""Largest numbers of settings that continue after each heat but the last."""
 _MAX_BEHIND_DEVICES: Final = 2
-"""Settings that serve so many devices fewer than the best drop out."""
+"""Deficit of served devices, compared with the best settings, at which settings drop out."""
 _MAX_SHORTFALL_FRACTION: Final = 0.2
-"""Fraction of the devices below the required one from which on a design is given up."""
+"""Shortfall of the fraction of devices, below the required one, beyond which a design is dropped."""
 _WATCH_TIME_S: Final = 10.0
 """Time for which a settled device is watched in a race; a verdict watches longer."""
 _CHOICE_DEVICES: Final = 256
-"""Devices of a verdict after which only the best settings go on."""
+"""Number of devices of a verdict after which only the best settings continue."""
 _STOP_SIGMA: Final = 3.0
-"""Standard deviations from the required fraction at which a verdict ends before all devices."""
+"""Standard deviations from the required fraction beyond which a verdict ends before all devices ran."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Race:
-    """The best settings of a design with the judgement of the devices that they ran."""
+    """Best settings of a design, with the judgement on the devices of their runs."""
 
     grid_point: GridPoint | None
     """Point of the search spaces; None: the scene's own settings."""
@@ -88,24 +88,25 @@ class Race:
 
     @cached_property
     def gas(self) -> float:
-        """Median energy of the gas let in over the devices that ran, J; infinite: none ran."""
+        """Median energy of the injected gas over the devices, J; infinite: no device ran."""
         energy = self.judgement.outcomes.energy
         ran = energy[np.isfinite(energy)]
         return float(np.median(ran)) if ran.size else math.inf
 
     def time(self, fraction: float) -> float:
-        """Time by which a fraction of the devices has settled, s."""
+        """Time after which a fraction of the devices has settled, s."""
         times = np.sort(self.judgement.outcomes.settling_time)
         return float(times[max(math.ceil(fraction * times.size), 1) - 1])
 
     @property
     def order(self) -> tuple[float, ...]:
-        """Sort key: most devices that meet every demand, most that settle, shortest times, least gas."""
+        """Sort key, best first: most devices that meet every demand, most settled, shortest times, least
+        gas."""
         settled = float(np.mean(self.judgement.outcomes.settled))
         return (-self.fraction, -settled, self.time(0.9), self.time(0.5), self.gas)
 
     def extended(self, outcomes: Outcomes) -> Race:
-        """Add the outcomes of further devices."""
+        """Race with the outcomes of further devices added."""
         return replace(self, judgement=self.judgement.extended(outcomes))
 
 
@@ -118,11 +119,11 @@ def race(
     settings: bool,
     block: int = 0,
 ) -> Race | None:
-    """Find the best settings of a design; None: its scene is refused, or it breaks down.
+    """Race settings of a design and return the best; None: its scene is refused, or a run breaks down.
 
     Args: `grid_points`: settings to race, such as the best of another design; None: the coarse grid.
-        `required_fraction`: of devices that meet every demand. `settings`: False races the scene's own
-        settings alone. `block`: index of the block of devices.
+        `required_fraction`: of devices that meet every demand. `settings`: False races only the settings of
+        the scene. `block`: index of the block of devices.
     """
     try:
         balancer = quick_balancer(scene.with_values(point))
@@ -163,7 +164,8 @@ def race(
 
 
 def settings_at(spaces: Sequence[Trials], grid_point: GridPoint) -> Settings | None:
-    """Settings at a point of the search spaces, interpolated between levels; None: there are none."""
+    """Settings at a point of the search spaces, interpolated between levels; None: no settings at that
+    point."""
     kind, indices = grid_point
     point = {
         axis.name: float(np.interp(index, range(len(axis.levels)), axis.levels))
@@ -173,7 +175,7 @@ def settings_at(spaces: Sequence[Trials], grid_point: GridPoint) -> Settings | N
 
 
 def near(spaces: Sequence[Trials], grid_point: GridPoint) -> list[GridPoint]:
-    """Points one `STEP` away on one axis."""
+    """Points at a distance of one `STEP` along one axis."""
     kind, indices = grid_point
     return [
         (kind, (*indices[:axis], neighbour, *indices[axis + 1 :]))
@@ -192,13 +194,13 @@ def judged_design(
     search: bool = False,
     verdict: bool = False,
 ) -> Judgement | None:
-    """Judge the best of some settings of a design on the devices of a verdict; None: it breaks down.
+    """Judge the best of some settings of a design on many devices; None: the scene is refused or breaks down.
 
-    The devices are the same for every design, and nothing was chosen on them.  A look before the last ends
-    only what is three standard deviations from the required fraction, so that a design at the edge is decided
-    by all devices and not by the first look at which it happens to be above.
-    Args: `grid_point`, `settings`: to judge; default the scene's own settings. `search`: add those that
-        `tune` finds. `verdict`: True judges on devices that have chosen no design, and ends no run early.
+    The devices are the same for every design and took no part in the races.  An interim look ends the
+    judgement only if the fraction is three standard deviations from the required one, so that a design near
+    the limit is decided by all devices, not by the first look that happens to be favourable.
+    Args: `grid_point`, `settings`: settings to judge; default those of the scene. `search`: True adds the
+        result of `tune`. `verdict`: True judges on devices that selected no design, with complete runs.
     Source: Haybittle, "Repeated Assessment of Results in Clinical Trials of Cancer Treatment", British
         Journal of Radiology 44 (1971).
     """
@@ -234,7 +236,7 @@ def judged_design(
 
 
 def tuned_settings(scene: SceneFile, point: Point) -> Settings | None:
-    """Find the settings of a design as `tune` does; None: it breaks down."""
+    """Settings of a design by the search of `tune`; None: the scene is refused or breaks down."""
     try:
         return searched(quick_balancer(scene.with_values(point)))
     except (SceneError, *BREAKDOWNS):

@@ -1,4 +1,4 @@
-"""Closed-loop runs of one point over drawn devices, through the `Balancer` of its scene."""
+"""Closed-loop runs of one point over random devices, by the `Balancer` of its scene."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 
 _FIRST_LOOK_DEVICES: Final = 4
-"""Devices after which a design is left if none of them meets the requirements: where 7 of 10 do, that happens
-once in a hundred times.  Runs that do not settle take longest."""
+"""Number of devices after which a design is dropped if none of them meets the requirements.
+
+If 7 of 10 devices meet them, that happens once in a hundred times.  Runs that do not settle take longest."""
 _FIRST_LOOK_TIME: Final = 2.0
-"""End of the runs of the first look over the required settling time: later none of them meets it."""
+"""Length of the runs of the first look over the required settling time; later settling is too late anyway."""
 _SECOND_LOOK_DEVICES: Final = 16
-"""Devices after which the verdict of most other designs is known."""
+"""Number of devices after which the verdict on most other designs is known."""
 
 
 def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
-    """Run drawn devices of a point under the settings of its scene; plain data.
+    """Run random devices of a point with the settings of its scene; plain data.
 
-    Args: `runs`: devices at most; they are doubled from 16 until the verdict is known, and only 4 run where
-        none of these meets the requirements.
-    Returns: `devices` that were run, `fraction` that meets all requirements of the scene, `low` and `high`
+    Args: `runs`: largest number of devices; doubled from 16 until the verdict is known; only 4 if none of
+        these meets the requirements.
+    Returns: `devices` run, `fraction` that meets all requirements of the scene, `low` and `high`
         (Wilson, 95 %), `verdict`, `settling_time` within which the required fraction has settled, s, and
-        `settling_time_high`, its upper bound (both None where too few settle), `ended` (devices by code),
+        `settling_time_high`, its upper bound (both None if too few settle), `ended` (devices by outcome),
         `finding`.
     """
     try:

@@ -1,4 +1,4 @@
-"""Which input moves a result: first-order and total indices from the points that a sample has anyway."""
+"""Sensitivity of a result to its inputs: first-order and total Sobol indices from a given sample."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
 
 MIN_ROWS: Final = 64
-"""Rows below which an interval says nothing."""
+"""Smallest number of rows for a meaningful interval."""
 _WAVES: Final = 8
-"""Cosines along an input: of a step in its middle they hold 95 % of the variance."""
+"""Number of cosines along an input; they contain 95 % of the variance of a step in its middle."""
 _HALVES: Final = 200
-"""Random halves of the rows from which the interval is estimated."""
+"""Number of random halves of the rows from which the interval is estimated."""
 _MAX_DEGREE: Final = 10
 _ROWS_PER_TERM: Final = 4
-"""Least rows for each term of a polynomial, so that it predicts left-out rows."""
+"""Smallest number of rows for each term of a polynomial, so that it predicts left-out rows."""
 
 
 def first_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Share of a result's variance that each input explains by itself, and its half-width (95 %).
+    """First-order Sobol indices: share of a result's variance by each input alone, and half-width (95 %).
 
-    The variance of a cosine series of the result over the input's rank, less what noise alone would put into
-    it.  Inputs are independent; where they act together, the shares add up to less than 1.
+    The variance of a cosine series of the result over the input's rank, less the contribution of noise.
+    Inputs are independent; with interactions the shares sum to less than 1.
     Args: `inputs`: shape (n, k). `result`: shape (n,).
     Returns: Both of shape (k,); NaN for a result that does not vary, or below `MIN_ROWS` rows.
     Source: Plischke, Reliab. Eng. Syst. Saf. 95 (2010) 354; half-widths by the jackknife that leaves half of
-        the rows out, Shao and Wu, Ann. Statist. 17 (1989) 1176: of Sobol's points, too wide.
+        the rows out, Shao and Wu, Ann. Statist. 17 (1989) 1176; too wide for Sobol's points.
     """
     rows, count = inputs.shape
     if rows < MIN_ROWS or np.ptp(result) <= 1e-12 * np.max(np.abs(result)):
         return np.full(count, np.nan), np.full(count, np.nan)
     random = np.random.default_rng(0)
-    # Rows with equal inputs come in any order, not in that of the sample.
+    # Random order, so that rows with equal inputs do not keep the order of the sample.
     mixed = random.permutation(rows)
     x, y = inputs[mixed], result[mixed]
     halves = (np.sort(random.permutation(rows)[: rows // 2]) for _ in range(_HALVES))
@@ -55,10 +55,11 @@ def _shares(inputs: FloatArray, result: FloatArray) -> FloatArray:
 
 
 def total_order(inputs: FloatArray, result: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Share of a result's variance that each input takes part in, alone or with others; half-width (95 %).
+    """Total Sobol indices: share of a result's variance by each input, alone or with others; half-width (95
+    %).
 
     The variance of a polynomial of the inputs' ranks, of the total degree that predicts left-out rows best.
-    What it does not explain may belong to any input: it counts half, and its other half widens the interval.
+    The unexplained part may belong to any input: half of it is added, and the other half widens the interval.
     Args: `inputs`: shape (n, k), spread evenly as Sobol's or Latin points are. `result`: shape (n,).
     Returns: Both of shape (k,); NaN as `first_order`.
     Source: Sudret, Reliab. Eng. Syst. Saf. 93 (2008) 964; left-out rows by their leverage, Blatman and
@@ -84,7 +85,8 @@ _Fit = tuple[IntArray, FloatArray, FloatArray, float]
 
 
 def _powers(rows: int, count: int) -> list[IntArray]:
-    """Degrees of each term in each input, shape (terms, count), of polynomials that so many rows bear."""
+    """Degrees of each term in each input, shape (terms, count), of all polynomials that the rows can
+    determine."""
     powers: list[IntArray] = []
     for degree in range(1, _MAX_DEGREE + 1):
         if math.comb(degree + count, count) * _ROWS_PER_TERM > rows and powers:
@@ -99,7 +101,7 @@ def _powers(rows: int, count: int) -> list[IntArray]:
 
 
 def _fit(powers: IntArray, inputs: FloatArray, result: FloatArray) -> _Fit:
-    """Terms, their weights, the covariance of these, and the mean square of the error at left-out rows."""
+    """Terms, weights, covariance of the weights, and mean square error at left-out rows."""
     ranks = (np.argsort(np.argsort(inputs, axis=0, kind="stable"), axis=0) + 0.5) / result.size
     waves = legvander(2 * ranks - 1, int(powers.max())) * np.sqrt(2 * np.arange(powers.max() + 1) + 1)
     terms = np.prod(waves[:, np.arange(powers.shape[1]), powers], axis=-1)

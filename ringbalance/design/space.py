@@ -1,4 +1,4 @@
-"""Space of the designs: axes from the scene's table [design], and what follows where they move the disc."""
+"""Space of the designs: axes from the scene's table [design], and dependent dimensions of the tube."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.toml import toml_text
 
 BORES_M: Final = (0.3e-3, 3e-3)
-"""Range of the bore where the scene gives none: tubes that can be bought drawn, and cleaned."""
+"""Default range of the bore: drawn tubes on the market that can be cleaned."""
 _LEAST_FRACTION: Final = 0.1
-"""Lower end over the largest width or pressure, where the scene gives no range; of R2 - R1 twice as much."""
+"""Default lower end of width or pressure over its largest value; for R2 - R1 twice as much."""
 _DIGITS: Final = 3
-"""Digits of a value that is tried, so that it can stand in a drawing."""
+"""Significant digits of a tried value, as in a drawing."""
 _HASTY_FACTOR: Final = 2.0
-"""Run time over the required settling time: a later end of settling need not be seen."""
+"""Run time over the required settling time: any later settling is too late."""
 _VALVE: Final = ("gas.conductance", "gas.critical_ratio", "gas.valve_lag")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Space:
-    """Designs that may be tried: points of a unit cube."""
+    """Space of possible designs, a unit cube."""
 
     scene: Scene
     axes: tuple[SweepAxis, ...]
@@ -56,7 +56,8 @@ class Space:
 
     @cached_property
     def hasty(self) -> SceneFile:
-        """Scene with runs that end soon after the required settling time, which the same devices meet."""
+        """Scene with runs that end soon after the required settling time; the set of devices in time is
+        unchanged."""
         required = self.scene.requirement.settling_time
         if required is None or _HASTY_FACTOR * required >= self.scene.run.time_limit:
             return self.scene
@@ -74,15 +75,15 @@ class Space:
 
     @property
     def sets_controller(self) -> bool:
-        """True if keys of the controller vary, which are then not searched besides."""
+        """True if keys of the controller vary; then no other settings are searched."""
         return any(path.startswith("controller.") for path in self.paths)
 
     def points(self, shares: FloatArray) -> list[Point]:
-        """Changes of the scene by coordinates in the unit cube, shape (n, axes), with those that follow."""
+        """Changes of the scene at coordinates in the unit cube, shape (n, axes), dependent keys included."""
         columns = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
         points = []
         for row in zip(*columns, strict=True):
-            # Numbers of ranges as they can stand in a drawing; a valve's as they are.
+            # Rounded as in a drawing; the data of a valve are not rounded.
             point = {
                 path: float(f"{value:.{_DIGITS}g}")
                 if isinstance(value, float) and path not in _VALVE
@@ -94,10 +95,10 @@ class Space:
         return points
 
     def followed(self, point: Point) -> Point:
-        """A point with the tube on its disc.
+        """Point with the tube adapted to its disc.
 
-        The port keeps its distance from the outer wall, the crest the fill at which a free surface would
-        reach it, the length its ratio to the shortest path; except what the point itself says.
+        Constant are the distance of the port from the outer wall, the fill at which a free surface reaches
+        the crest, and the ratio of the length to the shortest path; keys of the point itself take precedence.
         """
         disc, tube = self.scene.disc, self.scene.tube
         outer = float(point.get("disc.outer_radius", disc.outer_radius))
@@ -123,8 +124,8 @@ class Space:
         return math.pi * outer**2 * float(point.get("disc.axial_width", disc.axial_width))
 
     def sized_at(self, shares: FloatArray, size: float) -> FloatArray:
-        """Coordinates in the unit cube for another size, m^3, by the width where it varies, else by the outer
-        radius; as near to it as the range allows."""
+        """Coordinates in the unit cube of a design scaled to another size, m^3, within its range: by the
+        width if that varies, else by the outer radius."""
         moved = shares.copy()
         for i, axis in enumerate(self.axes):
             for path, power in (("disc.axial_width", 1.0), ("disc.outer_radius", 0.5)):
@@ -135,7 +136,8 @@ class Space:
         return moved
 
     def coordinates(self, shares: FloatArray) -> FloatArray:
-        """Coordinates of the surface, by those in the unit cube; entries of lists are equally far apart."""
+        """Coordinates of the surface from those in the unit cube; entries of a list are at equal
+        distances."""
         return np.concatenate(
             [
                 column[:, np.newaxis]
@@ -149,16 +151,16 @@ class Space:
 
     @property
     def valves(self) -> tuple[str, ...]:
-        """Names of the valves at hand."""
+        """Names of the available valves."""
         return tuple(name for axis in self.axes for name in axis.names if name)
 
     @property
     def valve_paths(self) -> tuple[str, ...]:
-        """Keys that a valve with a name sets."""
+        """Paths of the keys that a named valve sets."""
         return tuple(path for axis in self.axes if any(axis.names) for path in axis.paths)
 
     def valve(self, point: Point) -> str:
-        """Name of a point's valve; empty where none is chosen."""
+        """Name of a point's valve; empty if valves have no choice or no name."""
         for axis in self.axes:
             for name, choice in zip(axis.names, axis.choices, strict=False):
                 if all(point.get(path) == value for path, value in choice.items()):
@@ -166,7 +168,7 @@ class Space:
         return ""
 
     def wider(self, path: str, *, low: bool) -> str | None:
-        """`vary` with a range that goes on beyond an end, as TOML; None: the scene itself gives this end."""
+        """`vary` with a range extended beyond an end, as TOML; None: the scene gives this end."""
         if any(path in axis.paths for axis in _listed(self.scene)) or not (low or path == "tube.bore"):
             return None
         (ends,) = (axis.ranges[path] for axis in self.axes if path in axis.ranges)
@@ -205,7 +207,7 @@ def _listed(scene: Scene) -> tuple[SweepAxis, ...]:
 
 
 def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
-    """One axis of all valves at hand; none where there are none."""
+    """One axis with all available valves; empty if there are none."""
     keys = scene.design
     if keys.valve_file is not None:
         folder = scene.checked.folder if scene.checked is not None else Path()
@@ -222,7 +224,7 @@ def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
 
 
 def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
-    """Give an error of an axis to the key of the scene that has it; one of a file of valves stays."""
+    """Attribute an error of an axis to its key of the scene; errors within a file of valves are unchanged."""
     if fault.file != COMMAND_LINE:
         return fault
     return Fault(
@@ -236,7 +238,7 @@ def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
 
 
 def _ranges(scene: Scene) -> dict[str, tuple[float, float, bool]]:
-    """Lower and upper end by path, and True where small values are tried as often as large ones."""
+    """Lower and upper end by path, and True for a logarithmic range."""
     keys, disc = scene.design, scene.disc
     ranges: dict[str, tuple[float, float, bool]] = {"tube.bore": (*BORES_M, True)}
     if keys.outer_radius is not None:

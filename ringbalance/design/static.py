@@ -1,7 +1,7 @@
-"""Static answers of many designs: liquid rings through the array core, other balancers one by one.
+"""Results of many designs without a run: liquid rings by the array core, other balancers one by one.
 
-An interval is that by all uncertain inputs of the scene, 95 %: each input moved to both sides, the effects by
-the root of the sum of their squares.  The models' own uncertainty is what `calibrate` adds to it.
+An interval (95 %) is that by all uncertain inputs of the scene: each input is changed up and down, and the
+effects are added as root of the sum of squares.  It excludes the models' uncertainty, which `calibrate` adds.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ UNITS: Final[Mapping[str, str]] = MappingProxyType(
         "loop_factor": "1",
     }
 )
-"""SI unit of each answer for a liquid ring, in the order of the table."""
+"""SI unit of each result for a liquid ring, in the order of the table."""
 _ANSWER_FIELDS: Final = {"lambda": "moment_per_mass"}
-"""Names in `Answers` that differ."""
+"""Field of `Answers` by name of the result, where they differ."""
 BLOCKED: Final = "blocked"
 REFUSED: Final = "point_refused"
-"""Codes of findings of a point."""
+"""Code of the finding on a refused point."""
 EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
     {
         **dict.fromkeys(("devices", "fraction", "low", "high", "settling_time", "settling_time_high")),
@@ -66,29 +66,29 @@ EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
 )
 """Result of `run_row` for a point without runs."""
 _LIMIT_SUFFIX: Final = ", at most"
-"""End of a name of a quantity that only limits a setting."""
+"""Suffix of the name of a quantity that is the limit of a setting."""
 BREAKDOWNS: Final = (ValueError, ArithmeticError, RuntimeError)
 """Exceptions besides `SceneError` with which a point may break down."""
 
 
 def row_reach(row: Record) -> float | None:
-    """Unbalance that a design cancels in any direction, kg m, of its static row; None: not known."""
+    """Unbalance that a design cancels in any direction, kg m, from its static row; None: not known."""
     reach: float | None = row["values"].get("reach", (None,))[0]
     return reach
 
 
 def refusal(error: Exception) -> Record:
-    """Finding of a point that failed, as a document."""
+    """Finding on a failed point, as a document."""
     text = str(error.faults[0]) if isinstance(error, SceneError) else f"{type(error).__name__}: {error}"
     return Finding(code=REFUSED, values={"text": text}).document()
 
 
 def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = True) -> list[Record]:
-    """Answer points without a run, a row of plain data for each.
+    """Rows of points without a run, plain data.
 
-    Args: `intervals`: True answers both sides of every uncertain input too, 2 m + 1 designs a point.
-    Returns: By point `sha256` of its scene (empty where refused), `values` with pairs of value and
-        half-width (95 %, of the inputs; None: not known) by name, `units`, `status` and `finding`.
+    Args: `intervals`: True adds half-widths by uncertain inputs: 2 m + 1 designs a point for m inputs.
+    Returns: For each point `sha256` of its scene (empty if refused), `values` with pairs of value and
+        half-width (95 %, by the inputs; None: not known) by name, `units`, `status` and `finding`.
     """
     rows: list[Record] = []
     scenes: list[Scene] = []
@@ -113,7 +113,7 @@ def _failed(error: Exception) -> Record:
 
 
 def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
-    """Answer liquid rings together; one by one where that breaks down."""
+    """Rows of liquid rings, computed together; one by one if that breaks down."""
     if not scenes:
         return []
     try:
@@ -145,7 +145,8 @@ def _plain(value: float) -> float | None:
 
 
 def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
-    """Regimes, values and half-widths (95 %, of the inputs) of designs, (1 + 2 k, n); NaN: not known."""
+    """Regimes, values and half-widths (95 %, by the inputs) of designs, shape (1 + 2 k, n); NaN: not
+    known."""
     if not intervals:
         values = _values(designs)
         return np.concatenate([values, np.full(values[1:].shape, np.nan)])
@@ -157,19 +158,19 @@ def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
 
 
 def _values(designs: Designs, *, near: TubeFlow | None = None) -> FloatArray:
-    """Regime, and the answers that `UNITS` names. Args: `near`: as for `Answers.of`."""
+    """Regime and the results in `UNITS`, shape (1 + k, n). Args: `near`: see `Answers.of`."""
     answers = Answers.of(designs, near=near)
     return np.array([answers.regime, *(getattr(answers, _ANSWER_FIELDS.get(name, name)) for name in UNITS)])
 
 
 def _row_without_core(scene: SceneFile) -> Record:
-    """Answer a point of a balancer without the array core by the quantities that it knows without a run."""
+    """Row of a point whose balancer has no array core, from the balancer's quantities without a run."""
     values: dict[str, list[float | None]] = {}
     units: dict[str, str] = {}
     for each in balancer_of(scene).quantities():
         if each.value is None:
             continue
-        # A name that cannot be taken for a setting where the quantity is the most that a setting may be.
+        # The suffix distinguishes the limit of a setting from the setting.
         name = each.key + _LIMIT_SUFFIX * each.name.endswith(_LIMIT_SUFFIX)
         width = None
         if each.lower is not None and each.upper is not None and each.value:
@@ -179,5 +180,5 @@ def _row_without_core(scene: SceneFile) -> Record:
 
 
 def content_of(scene: SceneFile) -> Record:
-    """Content of a scene that decides its answers, plain data: its document and the mesh that it names."""
+    """Content of a scene that determines its results, plain data: its document and the digest of its mesh."""
     return {"document": dict(document_of(scene)), "mesh": scene.mesh_digest}

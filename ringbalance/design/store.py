@@ -1,8 +1,7 @@
-"""Answers kept in a folder, each found by the content that it was computed from.
+"""Results stored in a folder, each under a key derived from the content that determines it.
 
-An entry begins with the digest of its payload and is written whole or not at all.  One that does not fit its
-digest, such as a file with a flipped bit, a link or a folder, counts as absent and is removed; it is computed
-again.
+An entry begins with the digest of its payload and is written completely or not at all.  An entry that does
+not match its digest, such as a corrupted file, a link or a folder, is removed and computed again.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from ringbalance.scene.platform.program import program_digest
 
 @dataclass(frozen=True, kw_only=True)
 class Store:
-    """Entries in a folder, which need not exist yet."""
+    """Store of results in a folder, which need not exist yet."""
 
     folder: Path
 
     def get(self, key: str) -> Any:
-        """Payload of an entry; None: there is none, or it is damaged."""
+        """Payload of an entry; None: absent or damaged."""
         path = self._path(key)
         try:
             digest, _, payload = read_kept(path).partition(b"\n")
@@ -39,9 +38,9 @@ class Store:
         return None
 
     def put(self, key: str, payload: Any) -> None:
-        """Keep a payload, plain data. Raises: OSError: it cannot be written; nothing is left behind."""
+        """Store a payload, plain data. Raises: OSError: it cannot be written; no partial file remains."""
         content = json.dumps(payload, allow_nan=False).encode()
-        # With the key in the digest an entry under another's name does not fit.
+        # The digest includes the key, so that a renamed entry does not match.
         digest = hashlib.sha256(key.encode() + content).hexdigest()
         write_whole(self._path(key), f"{digest}\n".encode() + content)
 
@@ -50,6 +49,6 @@ class Store:
 
 
 def key_of(content: Mapping[str, Any]) -> str:
-    """Name of the entry that this program computes from a content, plain data."""
+    """Name of the entry for a content, plain data, as computed by this version of the program."""
     text = json.dumps([program_digest(), content], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -1,9 +1,9 @@
-"""Fraction of the devices that designs serve, as a smooth function of their places.
+"""Fraction of the devices that designs serve, as a smooth function of their coordinates.
 
-The logit of the fraction is a Gaussian process of the coordinates, seen through the counts of the designs
-that ran; how fast it changes along each coordinate follows from the counts themselves.  So many designs of 64
-devices say together what each of them says within 3 % alone, and a cliff in one direction does not hide what
-another does on the plain behind it.
+The logit of the fraction is a Gaussian process of the coordinates, observed through the counts of the designs
+that ran; its length along each coordinate is fitted to the counts.  Many designs with 64 devices each
+together give a more precise fraction than one of them alone, and a steep change along one coordinate does not
+mask the influence of another.
 Source: Rasmussen and Williams, "Gaussian Processes for Machine Learning" (2006), algorithm 2.1, equations
     4.17 (Matern, 5/2) and 5.9; the logit of a count and its variance: Haldane, "The Estimation and
     Significance of the Logarithm of a Ratio of Frequencies", Annals of Human Genetics 20 (1956).
@@ -23,33 +23,33 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.draws import BLOCK
 
 _PRIOR: Final = (2.0, 0.5)
-"""Standard deviation of the process in logits and lengths on which it changes: medians of their priors, whose
-logarithms have a standard deviation of 1."""
+"""Median of the priors of standard deviation, in logits, and of lengths; both log-normal, with a standard
+deviation of 1 of the logarithm."""
 _MEAN_SIGMA: Final = 1.0
 """Standard deviation of the process's mean, in logits."""
 _BLOCK_VARIANCE_FACTOR: Final = 0.5
-"""Variance of the count of a block, relative to that of independent devices: the block's inputs are spread
-evenly."""
+"""Variance of the count of a block, relative to that of independent devices: smaller, since the block's
+inputs are evenly spread."""
 _ROUGH_VARIANCE: Final = 0.01
-"""Variance of what is not smooth, such as the settings that served best."""
+"""Variance of the part that is not smooth, such as the effect of different best settings."""
 _MAX_STEPS: Final = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
-    """The process, given the counts."""
+    """Gaussian process conditioned on the counts."""
 
     places: FloatArray
     """Coordinates of the designs, shape (n, k)."""
     mean: float
     scale: float
-    """Standard deviation, in logits."""
+    """Standard deviation of the process, in logits."""
     lengths: FloatArray
-    """Lengths on which the process changes, shape (k,)."""
+    """Correlation lengths along the coordinates, shape (k,)."""
     factor: tuple[FloatArray, bool]
-    """Cholesky factor of the covariance of the logits, as `scipy.linalg.cho_factor` has it."""
+    """Cholesky factor of the covariance of the observed logits, as from `scipy.linalg.cho_factor`."""
     weights: FloatArray
-    """Inverse of that covariance times what was counted, shape (n,)."""
+    """Inverse of that covariance times the observed logits less their mean, shape (n,)."""
 
     @classmethod
     def of(cls, places: FloatArray, *, met: IntArray, devices: IntArray) -> Surface:
@@ -74,7 +74,7 @@ class Surface:
         )
 
     def logits(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Logits of the fractions at places, shape (n, k), and their standard deviations."""
+        """Logits of the fractions, and their standard deviations, at coordinates of shape (n, k)."""
         apart = (places[:, np.newaxis] - self.places) ** 2
         shared = self.scale**2 * _matern(_distance(apart, self.lengths)) + _MEAN_SIGMA**2
         explained = np.einsum("ij,ji->i", shared, cho_solve(self.factor, shared.T))
@@ -85,9 +85,9 @@ class Surface:
 def _loss(
     parameters: FloatArray, *, start: FloatArray, apart: FloatArray, seen: FloatArray, noise: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Minus the logarithm of the parameters' posterior density, with its gradient.
+    """Negative logarithm of the parameters' posterior density, with its gradient.
 
-    Args: `parameters`: logarithms of scale and lengths. `start`: means of their priors. `apart`: squared
+    Args: `parameters`: logarithms of scale and lengths. `start`: prior means of these. `apart`: squared
         differences of coordinates, shape (n, n, k).
     """
     scale, lengths = np.exp(2 * parameters[0]), np.exp(parameters[1:])
@@ -108,5 +108,5 @@ def _distance(apart: FloatArray, lengths: FloatArray) -> FloatArray:
 
 
 def _matern(distance: FloatArray) -> FloatArray:
-    """Correlation at a distance in lengths, times the root of 5."""
+    """Matern correlation (5/2) at a distance of sqrt(5) times that in correlation lengths."""
     return np.asarray((1 + distance + distance**2 / 3) * np.exp(-distance))

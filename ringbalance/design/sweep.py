@@ -1,4 +1,4 @@
-"""A sweep: a row of answers for every point of a plan, static and over drawn devices."""
+"""Sweep: a row of results for every point of a plan, without runs and over random devices."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
 
 _POINTS_PER_BATCH: Final = {True: 256, False: 1024}
-"""Points that are answered in one batch, with intervals and without: of one composition, since a batch's last
-bits may depend on it.
+"""Number of points in one batch, with intervals and without; constant, since the last bits of the results may
+depend on the composition of a batch.
 """
 _EDGE_FRACTION: Final = 0.02
-"""Fraction of the varied range: nearer to its end, a value stands at it."""
+"""Distance, as a fraction of the varied range, below which a value counts as at the end."""
 STORE: Final = "store"
-"""Folder of stored answers in that of a sweep."""
+"""Name of the folder with stored results, within the folder of a sweep."""
 _RUN_COLUMNS: Final = {
     "devices": ("devices", ""),
     "fraction": ("fraction", "1"),
@@ -49,8 +49,8 @@ _RUN_COLUMNS: Final = {
 
 
 Shares = dict[str, dict[str, tuple[float, float]]]
-"""Share of a result's variance and its half-width (95 %), by result and axis, for which its first key or the
-column of its names stands.
+"""Share of a result's variance and its half-width (95 %), by result and by axis; an axis is represented by
+its first key or the column of its names.
 """
 
 
@@ -59,7 +59,7 @@ class SweepColumn(NamedTuple):
 
     name: str
     unit: str
-    """SI unit; empty for texts and numbers of rows."""
+    """SI unit; empty for texts and row numbers."""
     values: list[Any]
     """Values by point; None where not known."""
 
@@ -70,7 +70,7 @@ class SweepColumn(NamedTuple):
 
     @property
     def array(self) -> Any:
-        """Values as an array: numbers with NaN for what is not known, or texts."""
+        """Values as an array: numbers with NaN for unknown values, or texts."""
         return _array(self.values)
 
 
@@ -103,23 +103,23 @@ class Sweep(Result):
     driven: tuple[Mapping[str, Any], ...]
     """Rows of runs, as `run_row` returns them."""
     runs: int
-    """Drawn devices a point at most; 0: static alone."""
+    """Largest number of devices for each point; 0: no runs."""
     errors: tuple[Record, ...]
-    """Errors of the array core by quantity, see `trade.left_out`; empty where nothing was checked."""
+    """Errors of the array core by quantity, see `trade.left_out`; empty without a check."""
     designs_per_second: Mapping[str, float]
-    """Points a second that this run computed, "static" and "runs"; wall time."""
+    """Points computed per second of wall time, for "static" and "runs"."""
     resumed: Mapping[str, int]
-    """Points whose answers an earlier run had stored, "static" and "runs"."""
+    """Number of points with results stored by an earlier run, for "static" and "runs"."""
 
     @cached_property
     def verdicts(self) -> tuple[str, ...]:
-        """Verdict of each point by its runs, else the status of its static row."""
+        """Verdict on each point by its runs, else the status of its static row."""
         pairs = zip(self.static, self.driven, strict=True)
         return tuple(run["verdict"] if self.runs and row["sha256"] else row["status"] for row, run in pairs)
 
     @cached_property
     def feasible(self) -> tuple[bool, ...]:
-        """True for each point that meets what the scene requires or, without runs, has a flow."""
+        """True for each point that meets the requirements of the scene or, without runs, has a flow."""
         return tuple(verdict == (MET if self.runs else "ok") for verdict in self.verdicts)
 
     @property
@@ -129,40 +129,41 @@ class Sweep(Result):
 
     @cached_property
     def best(self) -> int | None:
-        """The feasible point that settles first or, without runs, reaches the largest unbalance by a flow."""
+        """Row of the feasible point that settles first or, without runs, cancels the largest unbalance."""
         if self.runs:
             ranked = [(each["settling_time"], i) for i, each in enumerate(self.driven)]
         else:
-            # The reach decides between rows with a flow; of other balancers nothing is judged without runs.
+            # Reach decides between rows with a flow; other balancers are not judged without runs.
             ranked = [(row_reach(row), i) for i, row in enumerate(self.static) if self._flows]
             ranked = [(None if value is None else -value, i) for value, i in ranked]
         return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
 
     @property
     def best_or_nearest(self) -> int | None:
-        """Best row, or the nearest where none is feasible."""
+        """Best row, or the nearest if none is feasible."""
         return self.nearest if self.best is None else self.best
 
     @cached_property
     def nearest(self) -> int | None:
-        """Point that serves most devices where runs show no feasible one; None: none serves any."""
+        """Row of the point that serves most devices if runs show no feasible one; None: no point serves
+        any."""
         ranked = [(run["fraction"] or 0.0, -i) for i, run in enumerate(self.driven)]
         fraction, negative_row = max(ranked, default=(0.0, 0))
         return -negative_row if self.runs and self.best is None and fraction > 0 else None
 
     def point_scene(self, row: int) -> SceneFile:
-        """Scene of a row. Raises: SceneError: the row was refused, or there is none."""
+        """Scene of a row. Raises: SceneError: a refused row, or no such row."""
         check_rows([row], len(self.points))
         return self.scene.with_values(self.points[row])
 
     def columns(self) -> dict[str, list[Any]]:
-        """The table, one list a column, by name with SI unit such as "velocity [m/s]".
+        """Table, one list for each column, by name with SI unit such as "velocity [m/s]".
 
-        In this order: `row`; the changed keys by path, those of a list with names behind these, such as
-        "gas.name"; static answers, each with the half-width of its
-        interval (95 %, by the uncertain inputs; only with `intervals`); with runs `devices`, `fraction` with
-        its bounds, and `settling_time` with its upper one; `status`, `verdict`, `finding` (why a point has no
-        answer) and `scene sha256`. None where a value is not known.
+        In this order: `row`; the changed keys by path, for a list with names after the column of names, such
+        as "gas.name"; results without runs, each with its half-width (95 %, by the uncertain inputs; only
+        with `intervals`); with runs `devices`, `fraction` with its bounds, and `settling_time` with its upper
+        bound; `status`, `verdict`, `finding` (reason why a point has no result) and `scene sha256`. None for
+        unknown values.
         """
         return {column.head: column.values for column in self.fields()}
 
@@ -193,7 +194,7 @@ class Sweep(Result):
 
     @property
     def failures(self) -> list[str]:
-        """Reason for which each point has no answer; empty where it has one."""
+        """Reason why each point has no result; empty if it has one."""
         pairs = zip(self.static, self.driven, strict=True)
         return [
             finding["values"]["text"] if (finding := row["finding"] or run["finding"]) else ""
@@ -201,8 +202,8 @@ class Sweep(Result):
         ]
 
     def to_csv(self) -> str:
-        """`columns` as comma-separated values, as `ringbalance sweep` writes table.csv; an empty cell is not
-        known.
+        """`columns` as comma-separated values, as `ringbalance sweep` writes table.csv; an empty cell is an
+        unknown value.
         """
         return csv_text(self.columns())
 
@@ -211,7 +212,8 @@ class Sweep(Result):
         return extra("pandas", "pandas_frame")(self.columns())
 
     def to_xarray(self) -> Any:
-        """`columns` as a Dataset over the axes of a grid or the rows of a sample, with units as CF has them.
+        """`columns` as a Dataset over the axes of a grid or the rows of a sample, with units by the CF
+        conventions.
 
         Raises: ModuleNotFoundError: without xarray.
         """
@@ -232,10 +234,10 @@ class Sweep(Result):
     def sensitivity(self, *, total: bool = False) -> Shares:
         """Share of the variance of each result that each axis explains, and its half-width (95 %).
 
-        Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.  A share
-        below zero, or shares that sum to more than 1, are noise of the sample: an interval that holds zero
-        shows no influence, and more points narrow it.
-        Args: `total`: True counts what an axis explains together with others too, see `total_order`.
+        For samples, see `first_order`; empty for a grid, and for results with too few points.  Shares below
+        zero, or with a sum above 1, are noise of the sample: an interval that contains zero shows no
+        influence; more points narrow it.
+        Args: `total`: True includes interactions of an axis with others, see `total_order`.
         """
         changed = {*self.plan.paths, *(axis.head for axis in self.plan.axes)}
         names = [column.name for column in self.fields() if column.name not in changed]
@@ -269,8 +271,8 @@ class Sweep(Result):
         return shares_by_name
 
     def grid(self) -> dict[str, list[Any]]:
-        """Values of each axis of a grid, the last fastest: names of its rows, else its first key; of a sample
-        "row" with numbers."""
+        """Values of each axis of a grid, the last fastest: names of its rows, else values of its first key;
+        for a sample, row numbers as "row"."""
         if self.plan.sample:
             return {"row": list(range(len(self.points)))}
         return {
@@ -281,8 +283,8 @@ class Sweep(Result):
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Draw the map or curves of the sweep: feasible points, their boundary, the best.
 
-        Args: `path`: a folder for an SVG file each; None: none.
-        Returns: The files, or without a folder figures that a notebook shows; `svg()` has them as text.
+        Args: `path`: folder for one SVG file per figure; None: no files.
+        Returns: Files, or without a folder figures that a notebook shows; `svg()` gives them as text.
         Raises: OSError: a file cannot be written.
         """
         if path is None:
@@ -338,7 +340,7 @@ class Sweep(Result):
             by = "settles first" if self.runs else "cancels most in any direction, nothing was run"
             values: dict[str, Value] = {"row": best, "by": by, "changes": self._change_text(best)}
             yield Finding(code="sweep_best", values=values)
-            # Keys whose value stands at an end of what was varied.
+            # Keys with a value at an end of their varied range.
             for path in (path for axis in self.plan.axes if not axis.names for path in axis.paths):
                 numbers = [value for point in self.points if isinstance(value := point.get(path), float)]
                 low, high = min(numbers, default=0.0), max(numbers, default=0.0)
@@ -366,7 +368,7 @@ class Sweep(Result):
         return ", ".join(self.axis_text(axis, row) for axis in self.plan.axes)
 
     def axis_text(self, axis: SweepAxis, row: int) -> str:
-        """Value of an axis in a row: its name where it was chosen by name, else keys with values."""
+        """Value of an axis in a row: name of the alternative if it has one, else keys with values."""
         point = self.points[row]
         if axis.names:
             return f"{axis.head} = {axis.name_of(point)}"
@@ -410,7 +412,7 @@ class Sweep(Result):
 
 
 def check_rows(rows: Sequence[int], count: int) -> None:
-    """Refuse a row that a table of so many rows does not have. Raises: SceneError: there is one."""
+    """Check row numbers against the length of a table. Raises: SceneError: no such row."""
     for row in rows:
         if not 0 <= row < count:
             allowed = f"0 to {count - 1}"
@@ -435,7 +437,7 @@ def run_sweep(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Sweep:
-    """Answer every point of a plan; see `sweep`."""
+    """Compute every point of a plan; see `sweep`."""
     points = plan.points()
     rates: dict[str, float] = {}
     resumed: dict[str, int] = {}
@@ -462,7 +464,7 @@ def run_sweep(
         for i, row in zip(accepted, deal_out("runs", tasks_of(content, calls)), strict=True):
             driven[i] = row
     deal_in_process = partial(deal, executor=None)
-    # Loaded where rows are checked alone: it brings the meshes.
+    # Imported only for a check, since it loads the meshes.
     left_out = registered("function", "left_out") if check else None
     errors = left_out(scene, points, static, check, deal_in_process) if left_out else []
     return Sweep(

@@ -1,4 +1,4 @@
-"""Errors of the array core, measured: some rows are calibrated, the next finer level."""
+"""Measured errors of the array core: some rows are compared with `calibrate`, the next finer model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUANTITIES: Final = ("lambda", "moment", "velocity", "drag_coefficient", "stall_
 
 
 def calibrated_row(scene: SceneFile, point: Point) -> Record:
-    """Value and expanded uncertainty (95 %, numerics and models) of quantities of `calibrate`, by name."""
+    """Pairs of value and expanded uncertainty (95 %, numerical and model) from `calibrate`, by quantity."""
     try:
         quantities = calibrate(scene.with_values(point)).quantities
     except (SceneError, *BREAKDOWNS):
@@ -39,10 +39,10 @@ def left_out(
     count: int,
     deal: Callable[[str, Sequence[Task]], list[Record]],
 ) -> list[Record]:
-    """Calibrate some rows, evenly over those that have an answer.
+    """Calibrate some rows, evenly spread over those with results.
 
     Args: `static`: rows of `points`. `count`: number of rows to calibrate. `deal`: see `work.answers`.
-    Returns: By quantity the largest error of the rows and the largest uncertainty beside it, both as
+    Returns: By quantity the largest error and the largest uncertainty of the calibrated value, both as
         fractions of the largest value.
     """
     answered = [i for i, row in enumerate(static) if row["status"] == "ok" and "lambda" in row["values"]]

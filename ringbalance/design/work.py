@@ -1,6 +1,6 @@
-"""Work dealt out: stored answers are taken, others computed here or by an executor, and stored.
+"""Distribution of tasks: results are read from the store, or computed here or by an executor, and stored.
 
-A task's answer follows from the task alone, so that it is the same wherever and beside whatever it runs.
+The result of a task depends on the task only, not on the process or on other tasks.
 """
 
 from __future__ import annotations
@@ -17,42 +17,42 @@ from ringbalance.design.store import Store, key_of
 from ringbalance.scene.platform.processes import beside, dealt
 
 CALL_TIME_S: Final = 5e-3
-"""Longest time that a call of an executor costs besides its work."""
+"""Upper bound of the overhead of one call of an executor."""
 _BUNDLE_TIME_S: Final = 0.5
-"""Work in one call, where there is enough for all workers."""
+"""Duration of one call, if there is enough work for all workers."""
 _IDLE_FRACTION: Final = 0.05
-"""Fraction of their time that workers may wait for the process that sends and takes all bundles."""
+"""Largest fraction of time that workers wait for the process that distributes the bundles."""
 _START_WORK_S: Final = 4.0
-"""Work for which processes are started, which takes each a second."""
+"""Remaining work beyond which processes are started; each start takes one second."""
 _BUNDLES_PER_WORKER: Final = 8
-"""Least number of bundles for each worker, so that all end at about the same time; unless there are so many
-workers that the calls themselves take longer."""
+"""Smallest number of bundles for each worker, so that all end at about the same time; one if there are so
+many workers that the overhead of calls dominates."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """Call whose answer, plain data, can be stored."""
+    """Call whose result, plain data, can be stored."""
 
     call: partial[Any]
-    """Call with a scene and one of its points, or several; it can be pickled."""
+    """Picklable call with a scene and one or several of its points."""
     content: Mapping[str, Any]
-    """Content of the scene that decides its answers, plain data."""
+    """Content of the scene that determines its results, plain data."""
 
     @property
     def weight(self) -> int:
-        """Number of points that it answers."""
+        """Number of points of the call."""
         points = self.call.args[1]
         return 1 if isinstance(points, Mapping) else len(points)
 
     @property
     def key(self) -> str:
-        """Key of the stored answer: all that it follows from."""
+        """Key of the stored result, from everything that determines it."""
         name, (_, points) = self.call.func.__name__, self.call.args
         return key_of({"call": name, "scene": self.content, "points": points, "options": self.call.keywords})
 
 
 def tasks_of(content: Mapping[str, Any], calls: Sequence[partial[Any]]) -> list[Task]:
-    """Make a task of each call. Args: `content`: of the scene that each begins with."""
+    """Make a task of each call. Args: `content`: content of the scene, the first argument of each call."""
     return [Task(call=call, content=content) for call in calls]
 
 
@@ -64,17 +64,17 @@ class Done:
     points: int
     total: int
     computed: int
-    """Points of this run, not stored by an earlier one."""
+    """Number of points computed in this run, without those stored by an earlier one."""
     seconds: float
 
     @property
     def rate(self) -> float:
-        """Points a second."""
+        """Points computed per second."""
         return self.computed / max(self.seconds, 1e-9)
 
     @property
     def left(self) -> float:
-        """Time that the rest will take, s."""
+        """Expected time for the remaining points, s."""
         return (self.total - self.points) / self.rate if self.computed else math.inf
 
     @property
@@ -96,10 +96,10 @@ def answers(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> list[Any]:
-    """Answer each task, in their order.
+    """Results of the tasks, in their order.
 
-    Args: `executor`: any executor; default this process, and `workers` processes of its own where the work
-        takes longer than their start.
+    Args: `executor`: any executor; default this process, and `workers` further processes if the work takes
+        longer than their start.
     """
     results = [store.get(task.key) if store else None for task in tasks]
     start, total, computed = time.perf_counter(), sum(task.weight for task in tasks), 0
@@ -125,9 +125,9 @@ def answers(
 def _computed(
     tasks: Sequence[Task], missing: Sequence[int], executor: Executor | None, workers: int
 ) -> Iterator[tuple[Sequence[int], list[Any]]]:
-    """Numbers and payloads of tasks as they come; the first is computed in this process, and timed.
+    """Yield numbers and payloads of tasks as they are completed.
 
-    The time of the second one counts, since the first may compile.
+    This process computes the first two; the time of the second, without compilation, sizes the bundles.
     """
     seconds = 0.0
     for i in missing[:2]:
@@ -137,7 +137,7 @@ def _computed(
         yield [i], [payload]
     rest = missing[2:]
     own_pool = executor is None and workers > 1 and seconds * len(rest) > _START_WORK_S
-    # This process only waits, so that answers are stored as soon as they come.
+    # This process computes nothing more, so that results are stored as soon as they arrive.
     with beside(workers + 1 if own_pool else 1) as pool:
         crew = executor or pool
         if crew is None or not rest:
@@ -152,10 +152,10 @@ def _computed(
 
 
 def bundle_size(seconds: float, *, count: int, workers: int) -> int:
-    """Tasks in one call of an executor, so that calls cost little, none of many workers waits for the process
-    that makes them, and workers end together.
+    """Number of tasks in one call of an executor: large enough for little overhead and no waiting workers,
+    small enough that all workers end together.
 
-    Args: `seconds`: processor time that each takes. `count`: of tasks that are left.
+    Args: `seconds`: processor time of one task. `count`: number of remaining tasks.
     """
     busy = CALL_TIME_S * workers / (1 - _IDLE_FRACTION)
     enough = math.ceil(max(_BUNDLE_TIME_S, busy) / max(seconds, 1e-6))

@@ -1,4 +1,4 @@
-"""Calibration of a scene: lambda, k(u) and the flow law, each with its uncertainty and what it is made of."""
+"""Calibration of a scene: lambda, k(u) and the flow law, each with its uncertainty budget."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def calibrate(scene: AnyScene) -> Calibration:
 
 
 def _answers(scene: Scene, chamber: ChamberCalibration) -> Answers:
-    """The answers of one scene as numbers, by the curves of its chamber, which hold gravity."""
+    """Answers for one scene as scalars, from the tables of its chamber, which include gravity."""
     tube = TubeFlow.of(Designs.stacked([scene]), curve=chamber.hydrostatic_pressure.table.quintic)
     answers = Answers.of_tubes(tube, moments=chamber.moment.table.quintic)
     row = {name: values[0] for name, values in vars(answers).items()}
@@ -78,10 +78,11 @@ def _answers(scene: Scene, chamber: ChamberCalibration) -> Answers:
 
 
 def calibrated_model(scene: Scene, *, checked: bool = True, varied: bool = True) -> BalancerModel:
-    """The balancer that `calibrate` finds, without what it reports beside: half the work.
+    """Balancer model of `calibrate` without the rest of its report, at half the cost.
 
-    Args: `checked`: whether finite elements check the chamber, which takes half of the rest.
-        `varied`: whether the law knows what the scene's uncertain inputs do to it, half of what remains.
+    Args: `checked`: true if finite elements check the chamber, half of the remaining cost.
+        `varied`: true if the law carries the effects of the scene's uncertain inputs, half of what then
+        remains.
     Raises: SceneError, ValueError: as `calibrate`.
     """
     return BalancerModel.of(known_chamber_and_law(scene, checked=checked, varied=varied)[1])
@@ -100,7 +101,7 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
 def chamber_and_law(
     scene: Scene, *, checked: bool = True, varied: bool = True
 ) -> tuple[ChamberCalibration, CalibratedLaw]:
-    """The chamber, and the law. Args: as `calibrated_model`.
+    """Calibrated chamber and flow law of a scene. Args: as `calibrated_model`.
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
@@ -110,4 +111,4 @@ def chamber_and_law(
 
 
 known_chamber_and_law = lru_cache(maxsize=16)(chamber_and_law)
-"""`chamber_and_law`, made once in a process."""
+"""`chamber_and_law`, cached for the last 16 calls."""

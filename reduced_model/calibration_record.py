@@ -78,17 +78,17 @@ ANSWERED: Final[Mapping[str, _Named]] = MappingProxyType(
 MAIN: Final = 4
 """Number of answers that a short text shows."""
 FIELDS: Final = {"lambda": "moment_per_mass"}
-"""Names in `Answers` that differ."""
+"""Field of `Answers` by the name of an answer, where the two differ."""
 _INDEX: Final = {name: index for index, name in enumerate(ANSWERED)}
 _NEGLIGIBLE_CHANGE: Final = 1e-12
 """Relative change of a quantity that counts as rounding, not as an effect of an input."""
 
 
 def _budgets(calibration: Calibration) -> Iterator[Quantity]:
-    """Each of `ANSWERED` with its interval; wall pressure and moment at the largest fill.
+    """Quantities of `ANSWERED` with intervals; wall pressure and moment at the largest fill.
 
-    Every uncertainty of the scene counts by `changes_of`, with what the velocity does when it moves. A tube
-    in which nothing flows has no drag coefficient and no crest pressure, one without a crest no margin.
+    The effect of every error comes from `changes_of`, the change of the velocity included. A blocked tube has
+    no drag coefficient and no crest pressure, a tube without a crest no cavitation margin.
     """
     scene, stated = calibration.scene, bool(calibration.scene.uncertainty)
     errors = (*uncertainties(scene), of_chamber(VOLUME))
@@ -123,20 +123,21 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _ErrorEffects:
-    """Changes of `ANSWERED`, the last axis, by the errors of a scene."""
+    """Changes of the quantities of `ANSWERED` (last axis) by the errors of a scene."""
 
     scene: Scene
     errors: Sequence[Uncertainty]
     values: FloatArray
     alone: FloatArray
-    """At both sides of each error, shape (m, 2, quantities)."""
+    """Changes at the 2.5 and 97.5 % quantiles of each error alone, shape (m, 2, quantities)."""
     linear: FloatArray
-    """Half-widths (95 %) by what is no change of the scene, which act in proportion, (m, quantities)."""
+    """Half-widths (95 %) by errors that change no number of the scene; linear in the error, (m,
+    quantities)."""
     waves: Waves
 
     @classmethod
     def of(cls, calibration: Calibration, errors: Sequence[Uncertainty]) -> _ErrorEffects:
-        """Effects of every error alone; those of the chambers' unmodelled terms included."""
+        """Effects of each error alone, the unmodelled terms of the chambers included."""
         scene, chamber, answers = calibration.scene, calibration.chamber, calibration.answers
         values, changes = changes_of(scene, _quantities, errors)
         row = {error.name: index for index, error in enumerate(errors)}
@@ -166,8 +167,8 @@ class _ErrorEffects:
     def together(self, quantities: Sequence[int]) -> tuple[list[float], list[float]]:
         """Largest decrease and increase (95 %) of quantities, by index, by all errors together.
 
-        All move at once, in proportion to what each alone changes: on the sphere of 1.96 standard deviations
-        to the point from which on, to the first order, a value lies further away.
+        All errors deviate at once, in proportion to the effect of each alone: to the point on the sphere of
+        1.96 standard deviations that changes the quantity most, to first order.
         Source: Hasofer and Lind, "Exact and Invariant Second-Moment Code Format", J. Eng. Mech. Div. 100
             (1974) 111 (first-order reliability).
         """
@@ -180,7 +181,7 @@ class _ErrorEffects:
             z[row] = NORMAL_95 * np.where(high >= low, 1.0, -1.0) * size / (np.linalg.norm(size) or 1.0)
         waves = [each.name for each in self.errors].index(WAVES)
         values, base = np.empty((len(ANSWERED), len(z))), with_places(self.scene, self.errors)
-        # Chambers of a mesh move with the scene, so that each scene has its own.
+        # An imported chamber differs from scene to scene, so these are evaluated one by one.
         at_once = np.arange(len(z)) if base.disc.geometry is None else None
         for rows in [at_once] if at_once is not None else range(len(z)):
             scene = base
@@ -193,7 +194,7 @@ class _ErrorEffects:
         for row, (quantity, side) in enumerate(targets):
             change = side * (values[quantity, row] - self.values[quantity])
             change += side * float(z[row] @ self.linear[:, quantity]) / NORMAL_95
-            # Where nothing flows at that point, what flows at the sides counts.
+            # Without flow at that point, the combined effects of single errors count.
             sides = alone[(side + 1) // 2][quantity]
             changes.append(float(max(change, 0.0) if np.isfinite(change) else sides))
         return changes[::2], changes[1::2]
@@ -253,17 +254,17 @@ class Calibration(PresentedResult):
     tube: TubeLoss
     """k over `VELOCITIES`."""
     flow_law: CalibratedLaw
-    """The law distilled from both."""
+    """Flow law from chamber and tube."""
     paper_law: PaperLaw
     """Eq. 19 of the liquid-ring paper, for comparison."""
     answers: Answers
-    """Numbers: the flow at equal fills under the scene's gas pressure, what a pair can use, thresholds."""
+    """Flow at equal fills under the scene's gas pressure, usable range of a pair, and thresholds."""
     instability: AsynchronousInstability | None
-    """Whirl that surface waves lock to; None where there is no such wave."""
+    """Asynchronous whirl with surface waves; None where every wave is faster than the rotor."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     statistics: Mapping[str, float]
-    """Counted work and measured interpolation errors; no wall times, so they reproduce."""
+    """Operation counts and interpolation errors; no wall times, so that they are reproducible."""
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -284,7 +285,7 @@ class Calibration(PresentedResult):
 
     @cached_property
     def regime(self) -> Regime:
-        """Regime of the tube at equal fills under the scene's gas pressure, gas over the crest beforehand."""
+        """Regime of an unprimed tube at equal fills under the scene's gas pressure."""
         law = self.flow_law
         half = law.max_fill_ratio / 2
         flow = law.evaluate(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=self.scene.gas.pressure)
@@ -293,7 +294,7 @@ class Calibration(PresentedResult):
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:
         """Effect of the gas line, or of both ends of a default range of lines; computed on first use."""
-        # The march is compiled: what needs no answer of it loads no compiler.
+        # The time integration is compiled; only its use loads the compiler.
         answers: tuple[LineAnswer, ...] = registered("function", "line_answers")(self.scene, self.model)
         return answers
 
@@ -304,7 +305,7 @@ class Calibration(PresentedResult):
 
     @property
     def model(self) -> BalancerModel:
-        """The balancer as the closed loop takes it."""
+        """Balancer model for the closed loop."""
         return BalancerModel.of(self.flow_law)
 
     def lambda_over_fill(self, *, fill_ratio: FloatArray) -> FloatArray:

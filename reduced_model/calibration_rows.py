@@ -1,4 +1,4 @@
-"""A calibration as rows: its quantities with intervals, its findings, and the tables that a person reads."""
+"""Presentation of a calibration: quantities with intervals, findings, and tables."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ringbalance.scene.models import Scene
 _SYMMETRIC_DEG: Final = 0.01
 """Largest angle of the moment in a chamber that counts as symmetric."""
 _INWARD_SHARE: Final = 1e-3
-"""Share of the outer wall's area below which no face counts as turned inward."""
+"""Fraction of the outer wall's area that may face inward without a warning."""
 _MARKS: Final = MappingProxyType(
     {Regime.SIPHON: "", Regime.SEPARATED: "*", Regime.REVERSE: "r", Regime.UNDECIDED: "?"}
 )
@@ -57,7 +57,8 @@ def calibration_rows(calibration: Calibration) -> Rows:
 
 
 def _printable_uncertainty(calibration: Calibration, value: float, total: float | None) -> float | None:
-    """Printable uncertainty: as far as the scene states its inputs' uncertainties."""
+    """Uncertainty to print: None below rounding, that of the inputs included if the scene states no
+    uncertainty."""
     return believed(value, total, stated=bool(calibration.scene.uncertainty))
 
 
@@ -78,7 +79,7 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
 
 
 def _mesh_findings(scene: Scene) -> Iterator[Finding]:
-    """Warnings of a mesh that a user may not have meant; the numbers are those of the mesh all the same."""
+    """Warnings of likely mistakes in an imported mesh; results are those of the mesh as it is."""
     geometry = scene.disc.geometry
     if geometry is None:
         return
@@ -113,7 +114,7 @@ def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
 
 
 def _direction(calibration: Calibration) -> Iterator[Finding]:
-    """Angle from the middle of an imported chamber in which its pair acts, where it is not symmetric."""
+    """Angle between a pair's moment and the middle of its chamber, for an asymmetric imported chamber."""
     total, moment = calibration.scene.disc.max_fill_ratio, calibration.flow_law.moment
     fill = total * np.linspace(0.525, 1.0, 20)
     angles = np.angle(moment.pair_vector(fill_ratio=fill, opposite_fill_ratio=total - fill))
@@ -165,7 +166,7 @@ def _chamber_table(calibration: Calibration) -> Table:
 
 
 def _off(value: float, reference: float) -> str:
-    """Percent, a zero without sign."""
+    """Deviation from a reference in percent, as text; zero without sign."""
     shown = f"{100 * (value / reference - 1):+.1f}" if reference else ""
     return "0.0" if shown in ("+0.0", "-0.0") else shown
 

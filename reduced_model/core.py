@@ -1,6 +1,6 @@
-"""The calibration of many designs at once: arrays in, arrays out, without meshes.
+"""Calibration of many designs at once, as arrays and without meshes.
 
-Chamber by closed forms, tube by its loss, regimes by `column_flow`; velocities are found on the loss itself.
+Chamber by closed forms, regimes by `column_flow`; velocities are solved on the loss itself, not on a table.
 """
 
 from __future__ import annotations
@@ -36,31 +36,31 @@ _DESIGNS_TOGETHER: Final = 8192
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answers:
-    """Answers of calibrating n designs: arrays of shape (n,), SI, NaN where a design has no such thing.
+    """Results of calibrating n designs: arrays of shape (n,), SI, NaN where a quantity does not exist.
 
-    Gravity is left out, but of a single scene with its chamber's curves.  Where an input differs between
-    designs all that depends on it does: the coefficient of loss k is that at the velocity of each design, not
-    at one velocity for all.
+    Gravity is neglected, except for a single scene with the tables of its chamber. The loss coefficient k is
+    that at the velocity of each design, not at one velocity for all.
     """
 
     chamber_volume: FloatArray
     """V, m^3."""
     wall_pressure: FloatArray
-    """At the largest fill, Pa."""
+    """Mean liquid pressure on the outer wall at the largest fill, Pa."""
     moment: FloatArray
     """Moment of a chamber at the largest fill, kg m."""
     moment_per_mass: FloatArray
     """lambda at equal fills, per transferred mass, m."""
     regime: IntArray
-    """`Regime` of the flow at equal fills under the design's gas pressure, gas over the crest beforehand."""
+    """`Regime` of an unprimed tube at equal fills under the design's gas pressure."""
     velocity: FloatArray
-    """u of that flow, m/s; zero where it is blocked."""
+    """Velocity u at equal fills, m/s; zero where the tube is blocked."""
     drag_coefficient: FloatArray
-    """k at u; NaN where it is blocked."""
+    """Loss coefficient k at `velocity`; NaN where the tube is blocked."""
     crest_pressure: FloatArray
-    """At the end of the crest's arc in that flow, gauge, Pa."""
+    """Gauge pressure at the end of the crest's arc at equal fills, Pa; NaN where the tube is blocked."""
     cavitation_margin: FloatArray
-    """Lowest pressure of a full siphon, of a primed tube that is blocked, less the cavity's, Pa."""
+    """Lowest pressure in a full siphon (if blocked, in a primed tube at rest) less the cavity pressure,
+    Pa."""
     stall_pressure: FloatArray
     """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
     priming_pressure_vented: FloatArray
@@ -74,15 +74,15 @@ class Answers:
     least_fill_ratio: FloatArray
     """Smallest fill to which injections can bring a chamber."""
     largest_fill_ratio: FloatArray
-    """Fill of the opposite chamber then."""
+    """Fill of the opposite chamber at `least_fill_ratio`."""
     residual_depth: FloatArray
     """Depth of the liquid over the port as gas enters it, m; zero if the chamber empties before."""
     usable_volume: FloatArray
     """Volume that a pair can move from one chamber to the other, m^3."""
     usable_moment: FloatArray
-    """Largest moment of a pair to which injections can bring it, kg m."""
+    """Largest moment that injections can give a pair, kg m."""
     reach: FloatArray
-    """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m.
+    """Largest unbalance that all pairs together cancel in any direction, kg m.
 
     Each of n pairs, pi/n apart, gives a moment between -U and U along its axis: together a regular polygon of
     2 n sides, U/sin(pi/(2 n)) to its corners and U cot(pi/(2 n)) to its sides: U with four chambers, 1.73 U
@@ -97,8 +97,8 @@ class Answers:
     def of(cls, designs: Designs, *, near: TubeFlow | None = None, waves: Waves | None = None) -> Answers:
         """Calibrate designs.
 
-        Args: `near`: the tubes of n designs of which these are variations, n behind n: with them half of the
-            work is saved. `waves`: error of the chambers' levels.
+        Args: `near`: tubes of n designs of which these are variations, in blocks of n; halves the cost.
+            `waves`: errors of the chambers' levels.
         Source: Eqs. 2 to 18 of the liquid-ring paper, with exact chambers, the siphon crest and k(u).
         """
         parts = []
@@ -119,9 +119,9 @@ class Answers:
     def of_tubes(
         cls, tube: TubeFlow, *, moments: Callable[[FloatArray], FloatArray] | None = None
     ) -> Answers:
-        """Answers of the designs of tubes.
+        """Evaluate all answers for the designs of tubes.
 
-        Args: `moments`: of a chamber over the fill ratio, kg m; default the closed form.
+        Args: `moments`: moment of a chamber as a function of the fill ratio, kg m; default the closed form.
         """
         designs, scene = tube.designs, tube.designs.scene
         top, rho = scene.disc.max_fill_ratio * np.ones(designs.size), scene.liquid.density
@@ -176,7 +176,8 @@ class Answers:
 
 
 def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tuple[FloatArray, FloatArray]:
-    """Pressure at the end of the crest's arc where something flows, and the margin of a full siphon, Pa."""
+    """Gauge pressure at the end of the crest's arc (NaN if blocked), and cavitation margin of a full siphon,
+    Pa."""
     path, rows = tube.path, np.arange(tube.designs.size)
     flows, driving = flow.velocity > 0, driving_pressure(path, ends)
     siphon = flow.siphon_velocity
@@ -191,7 +192,7 @@ def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tup
 
 
 def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
-    """Fill at which gas enters the port."""
+    """Fill ratio of the driven chamber at which gas enters its port."""
 
     def draws_down_to(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
         part = tube.take(rows)
@@ -206,7 +207,7 @@ def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
 def _stalled_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     """Fill at which an injection moves no liquid any more; zero where the gas drives a chamber empty.
 
-    An injection starts with what the tube holds while the gas is off.
+    An injection starts with the liquid that the tube holds while the gas is off.
     """
 
     def moves(rows: IntArray, fills: FloatArray) -> BoolArray:

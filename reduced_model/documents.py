@@ -22,20 +22,19 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.working import LARGEST_COMPRESSION
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
-"""Gas pressures of the law's table, over the scene's own."""
+"""Gas pressures of the law's table over the scene's gas pressure."""
 
 
 def calibration_document(calibration: Calibration) -> dict[str, Any]:
-    """Lay a calibration out as plain lists, numbers and texts.
+    """Convert a calibration to plain lists, numbers and texts.
 
-    `quantities` have the main numbers with their uncertainty budgets, each once; the rest are curves over
-    fill, velocity and pressure, and what is no number. `*_uncertainty` are expanded uncertainties (95 %).
-    Those of wall pressure and moment hold for the scene's inputs as they stand (rounding, quadrature, what
-    the check by finite elements contradicts, left-out gravity and terms without a model); what uncertain
-    inputs add stands beside them (`*_input_uncertainty`), and the two combine as the root of the sum of
-    squares.  Those of k and of velocities hold everything.
-    The law's rows run along
-    `gas_pressure_Pa`, its columns along `fill_ratio`, for a tube that is empty beforehand.
+    `quantities` has the main numbers with their uncertainty budgets; the rest are curves over fill, velocity
+    and pressure, and texts. `*_uncertainty` are expanded uncertainties (95 %). Those of wall pressure and
+    moment are for the scene's nominal inputs (rounding, quadrature, contradictions by finite elements,
+    neglected gravity and terms without a model); the contribution of uncertain inputs is
+    `*_input_uncertainty`, and the two combine as the root of the sum of squares. Those of k and of velocities
+    include all contributions. The law has rows along `gas_pressure_Pa` and columns along `fill_ratio`, for a
+    tube that is empty beforehand.
     Returns: The document, in SI units and gauge pressures; no value is NaN or infinite.
     Source: combination after ASME V&V 20-2009.
     """
@@ -153,7 +152,7 @@ def _law(calibration: Calibration) -> dict[str, Any]:
 
 
 def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
-    """Limits of a chamber's answers at the reported fill ratios."""
+    """Status of a chamber's results at the reported fill ratios."""
     scene, chamber = calibration.scene, calibration.chamber
     fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
     closed = computed & closed_ring(scene, fills)
@@ -161,7 +160,7 @@ def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
-    """Limits of the velocity out of a chamber at fill ratios, under the scene's gas pressure."""
+    """Status of the velocity out of a chamber at fill ratios, under the scene's gas pressure."""
     scene = calibration.scene
     return _row_status(
         scene,
@@ -173,7 +172,7 @@ def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[R
 
 
 class RowStatus(StrEnum):
-    """Limit of a row at its fill ratio, the first that applies; each is the code of a finding."""
+    """First limit that applies to a row at its fill ratio; each value is the code of a finding."""
 
     OK = "ok"
     NO_RING = "no_ring"

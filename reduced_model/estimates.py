@@ -1,7 +1,7 @@
-"""Basis of the estimates of left-out terms: the tube's flow, and the injection that decides.
+"""Basis of the estimates of neglected terms: the flow in the tube and the shortest injection that matters.
 
-Every estimate of `terms` is relative to the quantity that the term changes and holds at the worst fill of the
-range.  What belongs to an injection is judged for the one that matters most, the shortest.
+Every estimate in `terms` is relative to the quantity that the term changes, at the worst fill of the range.
+Terms of an injection are estimated for the shortest one that matters.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
 
 FILL_SHARES: Final = (0.15, 0.3, 0.5, 0.7, 0.85)
-"""Fills of the driven chamber at which the flow is judged, as shares of max_fill_ratio."""
+"""Fills of the driven chamber at which the flow is evaluated, as fractions of max_fill_ratio."""
 _NO_PRESSURE_PA: Final = 1.0
 """Gauge pressure at or below which the gas drives nothing."""
 _VELOCITY_POINTS: Final = 25
@@ -33,13 +33,14 @@ _LOSS_PARTS: Final = ("whole", "roughness", "rotation", "bends", "ends")
 
 
 def deciding_gas_time(scene: Scene, *, rate: float) -> float:
-    """Valve-open time of the shortest injection that matters, s: the one commanded at the limit of the
-    vibration.
+    """Valve-open time of the shortest injection that matters, s: the one commanded for a vibration at its
+    limit.
 
     Target vector: Kc times the limit; trial: the short step, where the limit lies below `fine_below`;
     law-based: the limit over the rate.  Every time scale is compared with this one, because the last
     injections decide whether a run settles.
-    The controller's limits hold.  `rate` is the change of the vibration per second of gas, m/s; zero where
+    The result lies within the controller's limits of the valve-open time. `rate` is the change of the
+    vibration per second of gas, m/s; zero where
     nothing flows.
     Source: section 4 of the liquid-ring paper.
     """
@@ -62,12 +63,12 @@ def injection_time(scene: Scene) -> float:
 
 
 def start_up_loss(*, start_up: float, gas_time: float, laminar: float = 0.0) -> float:
-    """Fraction of an injection's steady volume that the column's start costs, from 0 to 1.
+    """Fraction of an injection's steady volume that is lost while the column starts, from 0 to 1.
 
     1 - (tau/T) ln cosh(T/tau), or (tau/T) (1 - exp(-T/tau)) laminar.  A full column of length L under the
     driving pressure p obeys du/dt = (p/(rho L)) (1 - (u/u0)^2), p = (k + 1) rho u0^2/2, so that
     u = u0 tanh(t/tau) with tau = rho L u0/p = 2 L/((k + 1) u0); where the loss is laminar, in proportion to
-    u, u = u0 (1 - exp(-t/tau)).  What the column coasts after the gas is shut is not subtracted.
+    u, u = u0 (1 - exp(-t/tau)).  The flow by inertia after the gas is shut is not subtracted.
     """
     t = gas_time / start_up
     log_cosh = t + math.log1p(math.exp(-2 * t)) - math.log(2)
@@ -82,8 +83,8 @@ class RangeFlow(NamedTuple):
     siphon: FloatArray
     """Velocity of a full siphon, m/s; zero without a driving pressure."""
     separated: FloatArray
-    """Velocity of a column separated at the crest, m/s, of one that spills where gas stays there; infinite
-    without a crest, zero where it blocks."""
+    """Velocity of a column that is separated at the crest, or spills into gas that stays there, m/s; infinite
+    without a crest, zero where the tube is blocked."""
     primes: BoolArray
     """True where the gas lifts liquid over the crest of an unprimed tube."""
     starts: BoolArray
@@ -118,7 +119,8 @@ def range_flow(scene: Scene) -> RangeFlow:
 
 
 def range_velocities(flow: RangeFlow) -> FloatArray:
-    """A quarter of the slowest velocity, full or separated, to twice the fastest, m/s; empty without flow."""
+    """Velocities from a quarter of the slowest (full or separated) to twice the fastest, m/s; empty without
+    flow."""
     velocities = np.concatenate([flow.siphon, flow.separated])
     ends = np.log(velocities[(velocities > 0) & np.isfinite(velocities)])
     if not np.any(flow.velocity > 0):
@@ -127,10 +129,11 @@ def range_velocities(flow: RangeFlow) -> FloatArray:
 
 
 def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
-    """Largest change by leaving a part of the tube's loss out, or by a constant in place of the whole.
+    """Largest relative change by neglecting a part of the tube's loss, or by a constant in place of the
+    whole.
 
-    Returns: By part of the loss, relative, of k under the same pressure, or of the head up to the siphon
-        crest.
+    Returns: The larger change of k under the same pressure and of the head up to the siphon crest, by part of
+        the loss.
     """
     drags, heads = {}, {}
     for part in ("", *_LOSS_PARTS):
@@ -152,7 +155,7 @@ def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
         drags[part], heads[part] = state.k, [(state.k + 1) * velocity**2 / 2]
         if tube.hump_radius is not None:
             heads[part].append(crest_head(scene=scene, tube=scene.tube, state=state, velocity=velocity))
-    # The same head drives another velocity, at which k is another: fully so in laminar flow.
+    # Under the same head the velocity changes, and k with it, most in laminar flow.
     log_u = np.log(velocity)
     head_slope, k_slope = np.gradient(np.log(heads[""][0]), log_u), np.gradient(np.log(drags[""]), log_u)
     changes = {}

@@ -1,4 +1,4 @@
-"""Fills at which gas enters the port of the chamber that is emptied, and at which its liquid stops moving."""
+"""Fill ratios at which gas enters the port of a driven chamber, and at which its liquid stops moving."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Disc, Scene
 
 NEARLY_EMPTY: Final = 1e-6
-"""Share of a pair's liquid that counts as a chamber's last liquid."""
+"""Fraction of a pair's liquid at which a chamber counts as empty."""
 _ZERO_FILL: Final = 1e-9
 """Fill ratio that counts as zero."""
 _MAX_STEPS: Final = 60
@@ -22,14 +22,14 @@ _STEEPEST_SLOPE: Final = 0.9
 _FIRST_SLOPE: Final = 0.1
 """Estimate of dg/dx before the first two values."""
 _SAME_FILL: Final = 1e-8
-"""Error of a fill, of which the last step leaves a hundredth."""
+"""Largest |g(x) - x| at the end of the iteration, whose last step leaves a hundredth of it."""
 _ROUNDING: Final = 1e-12
 _SCAN_POINTS: Final = 17
 """Fills of the scan for the first one at which nothing moves."""
 _QUARTERINGS: Final = 12
-"""Quarterings of the step in which that fill lies: 4e-9 of the way is left."""
+"""Quarterings of the scan's step in which liquid stops moving, down to 4e-9 of the range."""
 Drawn = Callable[[IntArray, FloatArray], FloatArray]
-"""Function of rows and their fills: fill down to which the flow at a fill draws gas."""
+"""Function g of row numbers and fill ratios x: fill ratio below which the flow at x draws gas."""
 
 
 def _fill_at(disc: Disc, radius: npt.ArrayLike) -> FloatArray:
@@ -48,14 +48,13 @@ def drawn_fill(scene: Scene, *, flow_rate: FloatArray) -> FloatArray:
 def first_gas(
     scene: Scene, draws_down_to: Drawn, *, top: FloatArray, about: Drawn | None = None
 ) -> FloatArray:
-    """Fill at which gas enters the port of a chamber that a running tube empties: the largest such fill.
+    """Largest fill ratio at which gas enters the port of a chamber that a running tube empties.
 
-    x = g(x), g the fill that the flow at x draws gas down to: from the top down g falls with the flow, so the
-    largest of such fills is the first to be met.
-    Args: `top`: of every row. `about`: a cheaper g to start with.
+    Largest root of x = g(x), g the fill ratio below which the flow at x draws gas: it is reached first.
+    Args: `top`: fill ratio at the start, by row. `about`: cheaper approximation of g for the first estimate.
     Returns: x from 0 (no gas before the chamber is empty, or no flow) to `top` (gas at any fill).
     """
-    # Above, the opposite chamber leaves its port open, and its gas over the crest lets less liquid flow.
+    # Above this fill the opposite port is uncovered, and its gas over the crest reduces the flow.
     covered = top - _fill_at(scene.disc, scene.tube.port_radius)
     covered = np.where(covered < top, covered * (1 - _ROUNDING), top)
     start = top if about is None else _fixed_point(about, top, covered, start=top)
@@ -100,10 +99,10 @@ def first_stalled(
     end: FloatArray,
     points: int = _SCAN_POINTS,
 ) -> FloatArray:
-    """Fill from `start` down to `end` at which liquid first stops moving; NaN where it moves at all.
+    """Fill ratio between `start` and `end` at which liquid first stops moving; NaN where it never stops.
 
-    By a scan of so many points, and by quarters of the step in which it stops.
-    Args: `moves`: of some rows, whether liquid moves at fills of shape (k, rows).
+    A scan of `points` fills, then repeated quartering of the step in which liquid stops.
+    Args: `moves`: true where liquid moves, for row numbers and fill ratios of shape (k, rows).
     """
     step = (end - start) / (points - 1)
     moved = moves(np.arange(start.size), start + np.arange(points)[:, None] * step)

@@ -1,7 +1,7 @@
-"""Smallest effect that the valve and line of a chamber have, and the valve-open time of it.
+"""Smallest correction through the valve and line of a chamber, and its valve-open time.
 
-A line that a scene does not give is a range, not an absence: conductances of small valves behind a rotary
-distributor and their switching times, of which both ends are answered for.
+A scene without a gas line has a default range: conductances and switching times of small valves behind a
+rotary distributor, with results at both ends.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ _DEFAULT_CONDUCTANCES_M3_S_PA: Final = (0.2e-8, 1e-8)
 _DEFAULT_LAGS_S: Final = (10e-3, 5e-3)
 """Switching times of small solenoid valves, slow and fast."""
 _DEFAULT_CRITICAL_RATIO: Final = 0.3
-"""Between 0.5 of a nozzle and 0.2 of a long line."""
+"""Critical pressure ratio, between 0.5 of a nozzle and 0.2 of a long line."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LineEnd:
-    """One gas line that answers are given for."""
+    """Gas line for which results are given."""
 
     name: str
     """ "given", or "slow" and "fast", the ends of the default range."""
     line: GasLine
     valve_lag: float
-    """s."""
+    """Switching time of the valve, s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,26 +40,27 @@ class LineAnswer:
     """C, m^3/(s Pa)."""
     critical_ratio: float
     valve_lag: float
-    """s."""
+    """Switching time of the valve, s."""
     filling_time: float
-    """From ambient to the supply's pressure, s."""
+    """Time to fill a chamber at equal fills with gas, from ambient to supply pressure, s."""
     choked_filling_time: float
     """Filling time of a line that is choked to the end, a lower bound, s."""
     venting_time: float
-    """Back to ambient, s."""
+    """Time to vent a chamber at equal fills, from supply to ambient pressure, s."""
     shortest_opening: float | None
-    """Shortest valve-open time whose effect is sure, s: it primes the tube; None: the gas starts no flow, or
-    what it moves runs back."""
+    """Shortest valve-open time with a certain effect, s: it primes the tube; None: the gas starts no flow, or
+    the moved liquid runs back."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
     dead_time: float | None = None
-    """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
+    """Valve-open time lost against the steady velocity by an injection that corrects the vibration limit,
+    s."""
     holds: bool | None = True
-    """True if what an injection moves stays moved with the gas off; None: likely, as `TubePath.holds`."""
+    """True if the moved liquid stays with the gas off; None: likely, as in `TubePath.holds`."""
 
 
 def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
-    """The scene's gas line, or the slow and the fast end of the default range of what it does not give."""
+    """Gas line of the scene, or the slow and the fast end of the default range of missing values."""
     gas = scene.gas
     ends: tuple[tuple[str, int], ...] = (("slow", 0), ("fast", 1))
     if gas.conductance is not None and gas.valve_lag is not None:

@@ -1,7 +1,6 @@
-"""The pressure along the tube's path, from the driven chamber over the crest to the opposite one.
+"""Pressure along the tube's path, from the driven chamber over the crest to the opposite one.
 
-A tube at rest without liquid over its crest: how far each leg is full, and what lies between.  What liquid is
-in the tube before, during and after an injection, and what it does to the vibration.
+In a tube at rest without liquid over its crest each leg is full up to a level, with gas or a cavity between.
 """
 
 from __future__ import annotations
@@ -45,33 +44,36 @@ from ringbalance.scene.models import Scene, Tube
 class HumpProfile:
     """State of the tube along its path; arrays of one shape, from the driven to the opposite chamber.
 
-    A path coordinate stands twice where the pressure steps (ends, bends) or the tube stops being full.
+    A path coordinate appears twice where the pressure steps (ends, bends) or the tube stops being full.
     """
 
     path: FloatArray
-    """s, m, from 0 to the tube's length, never falling."""
+    """Path coordinate s, m, from 0 to the tube's length, non-decreasing."""
     radius: FloatArray
-    """r, m."""
+    """Radius r of the path, m."""
     pressure: FloatArray
-    """Gauge, Pa; of the gas or the cavity where the tube is not full.  First and last: in the chamber."""
+    """Gauge pressure, Pa: of the gas or the cavity where the tube is not full; first and last in the
+    chambers."""
     full: BoolArray
     """True where liquid fills the bore."""
     regime: Regime
     """Regime of the flow."""
     velocity: float
-    """u, m/s, negative in reverse; zero when blocked."""
+    """Velocity u, m/s; negative in reverse, zero when blocked."""
     hump_path: float | None
-    """s of the crest where the pressure is lowest, the end of its arc, m; None without one."""
+    """Path coordinate of the lowest crest pressure, at the end of the crest's arc, m; None without a
+    crest."""
     hump_pressure: float | None
-    """Pressure over the crest, gauge, Pa; None without one."""
+    """Gauge pressure over the crest, Pa; None without a crest."""
     cavity_pressure: float | None
-    """At which a column separates at the crest: vapour, or the downstream chamber's gas; gauge, Pa."""
+    """Gauge pressure at which a column separates at the crest, Pa: of vapour, or of the downstream chamber's
+    gas."""
     cavitation_margin: float | None
     """Pressure over the crest of a full siphon under these conditions, less the cavity pressure, Pa.
     Negative: no such siphon exists, so the flow is separated or a resting column separates.  When blocked,
     it is that of a primed tube."""
     cavitation_margin_uncertainty: float | None
-    """Expanded uncertainty (95 %), Pa."""
+    """Expanded uncertainty (95 %) of the cavitation margin, Pa."""
 
     @classmethod
     def of(
@@ -85,7 +87,7 @@ class HumpProfile:
         primed: bool = False,
         points: int = 401,
     ) -> HumpProfile:
-        """Follow the pressure along the path at one operating state.
+        """Compute the pressure along the path at one operating state.
 
         p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there plus
         alpha, the kinetic-energy factor of the velocity profile.
@@ -157,7 +159,8 @@ class _Line:
 
 
 def _pressure_over_crest(law: CalibratedLaw, ends: TubeEnds, reverse: bool, velocity: float) -> float | None:
-    """Gauge pressure of the cavity or gas that a flowing column spills into, Pa; None: full, or at rest."""
+    """Gauge pressure of the cavity or gas that a flowing column spills into, Pa; None for a full tube or at
+    rest."""
     way = law.heads.to_crest(reverse=reverse)
     if way is None or velocity == 0:
         return None
@@ -176,7 +179,7 @@ def _flowing(
     cavity: float | None,
     points: int,
 ) -> _Line:
-    """Along a tube in which liquid flows or a column rests, from its upstream end."""
+    """Pressure along a tube with flowing liquid or a column at rest, from its upstream end."""
     terms = corrected_state(replace(scene, tube=tube), velocity) if velocity else None
     head = scene.liquid.density * velocity**2 / 2
     if cavity is not None and terms is not None:
@@ -201,7 +204,8 @@ def _separated(
     head: float,
     points: int,
 ) -> _Line:
-    """Full up to the crest, then a cavity, then the column that the downstream chamber supports."""
+    """Pressure along a separated column: full up to the crest, a cavity, the column held by the downstream
+    chamber."""
     top = ends.downstream_gas + back_pressure(path, ends)
 
     def behind(at: Places) -> FloatArray:
@@ -226,7 +230,7 @@ def _separated(
 
 
 def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: float, hump: float) -> float:
-    """Share of the path from which on the column seen from its downstream end is above the cavity."""
+    """Fraction of the path beyond which the pressure of the downstream column exceeds that of the cavity."""
     low = np.flatnonzero((behind(at) < cavity) & (at.share >= hump))
     if low.size == 0:
         return hump
@@ -245,8 +249,8 @@ def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: floa
 
 
 def _blocked(scene: Scene, law: CalibratedLaw, ends: TubeEnds, primed: bool, points: int) -> _Line:
-    """Two columns at rest and what lies between; without a crest, each chamber's pressure up to the
-    middle."""
+    """Pressure along a blocked tube: two columns at rest and the space between; without a crest, each
+    chamber's pressure up to the middle."""
     path, is_covered = law.path, bool(covered(law.path, ends))
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
     is_open = discharges_openly(path, ends)
@@ -262,18 +266,19 @@ def _blocked(scene: Scene, law: CalibratedLaw, ends: TubeEnds, primed: bool, poi
     in_near = ((at.share < first) | ((at.share == first) & ~at.after)) & is_covered
     in_far = ((at.share > last) | ((at.share == last) & at.after)) & (not is_open)
     pressure = np.where(in_near, near - hydrostatic, np.where(in_far, far - hydrostatic, between))
-    # A chamber that leaves its port open shows its own gas there.
+    # At an uncovered port the pressure is that of the chamber's gas.
     pressure[0] = pressure[0] if is_covered else max(pressure[0], ends.upstream_gas)
     return _Line(share=at.share, pressure=pressure, full=in_near | in_far)
 
 
 def _rest(scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None) -> tuple[float, float, float]:
-    """Shares s/L up to which and from which on the two legs of a tube at rest are full, and the pressure of
-    what lies between, gauge, Pa.
+    """Path fractions s/L at which the two columns of a tube at rest end, and the gauge pressure between them,
+    Pa.
 
     A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
     opposite chamber's pressure; trapped, it is compressed isothermally from the hydrostatic pressures alone
-    until it leaves at the opposite port, and at least to what keeps the driven column below the crest.
+    until it leaves at the opposite port, and at least to the pressure that keeps the driven column below the
+    crest.
     Args: `ends`: pressures at the tube's ends, the driven chamber upstream; one that leaves its port open
         supports no column. `cavity`: pressure of the cavity of a separated column, gauge, Pa; None for gas.
     Source: hydrostatics in the rotating frame; Boyle's law.

@@ -1,4 +1,5 @@
-"""Limits of emptying a chamber, gas in its port or too little, and of keeping a full one with the gas off."""
+"""Limits of emptying a chamber (gas enters its port, or the flow stalls) and of holding a full one, gas
+off."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
 _SCAN_POINTS: Final = 257
-"""Fills of the scan of a single row, for which a long one costs little."""
+"""Number of fills in the scan of a single row, which is cheap."""
 
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
@@ -36,11 +37,11 @@ def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
 def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs: bool = False) -> float:
     """Fill ratio at which an injection moves no liquid any more; total/2 where it moves none at equal fills.
 
-    An injection starts with what the tube holds while the gas is off. Over a crest where no column holds
-    that is p_gas = rho omega^2 (a^2 - r_m^2)/2 with vented gas, of a full siphon that of `stall_pressure`. A
-    long injection whose flow has carried the gas off the crest goes on to a lower fill, from which no
-    injection could correct any further.
-    Args: `runs`: of that flow instead.
+    An injection starts with the liquid that the tube holds while the gas is off. Without a column over the
+    crest the limit is p_gas = rho omega^2 (a^2 - r_m^2)/2 with vented gas; for a full siphon it is that of
+    `stall_pressure`. A long injection whose flow has carried the gas off the crest reaches a lower fill, from
+    which no injection could correct any further.
+    Args: `runs`: true for the fill that such a long injection reaches.
     """
 
     def moves(_: IntArray, fills: FloatArray) -> BoolArray:
@@ -62,23 +63,27 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs:
 
 @dataclass(frozen=True, kw_only=True)
 class Holding:
-    """Fate of the fullest chamber's liquid with the gas off, by the pressure of a cavity over the crest.
+    """Stability of the fullest chamber's liquid with the gas off: it stays if the column over the crest
+    parts.
 
-    Vapour alone is sure to be reached, and runs of nominal parts take `TubePath.released`.
+    Only at the vapour pressure does a column certainly part; runs with nominal parts assume the cavity
+    pressure by `TubePath.released`.
     """
 
     sure_speed: float | None
-    """Lowest speed at which it stays whatever that pressure, rad/s; None: not even at the scene's."""
+    """Lowest speed at which the liquid stays at any cavity pressure, rad/s; None: not at the scene's
+    speed."""
     likely_speed: float | None
-    """Lowest speed at which it stays under the pressure that runs take, likewise."""
+    """Lowest speed at which the liquid stays at the cavity pressure of runs, rad/s; None: not at the scene's
+    speed."""
     hump_radius: float | None
     """Radius of the scene's crest, m; None without one."""
     largest_hump_radius: float | None
-    """Largest radius of a crest that holds it whatever the pressure of a cavity there, m; None: no crest."""
+    """Largest crest radius that holds the liquid at any cavity pressure, m; None: no radius does."""
 
     @classmethod
     def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
-        """By hydrostatics, gravity left out. Args: `fill_ratio`: the largest that runs reach."""
+        """Judge by hydrostatics without gravity. Args: `fill_ratio`: the largest that runs reach."""
         path, wall, speed = tube_path(scene), scene.disc.outer_radius, scene.rotor.speed
         fullest = float(
             surface_radius(disc=scene.disc, fill_ratio=min(fill_ratio, scene.disc.max_fill_ratio))

@@ -1,7 +1,7 @@
-"""Every physical term of a scene: what leaving it out would change, and the model that holds it.
+"""Physical terms of a scene: the change by neglecting each, and its model.
 
-Every term that has a model is modelled, whatever the tolerance: none of them costs what a user could feel.  A
-new term is one `Term` of its part below; its model lives with the part that it changes.  Every command takes
+Every term that has a model is modelled, whatever the tolerance: none adds a noticeable run time. A new term
+is one `Term` of its part below; its model stands with the part that it changes.  Every command takes
 `models_used` from here, so that all of them report the same list for the same scene.
 """
 
@@ -52,7 +52,7 @@ class Term(NamedTuple):
     group: str
     """Dimensionless group that the contribution grows with."""
     model: str
-    """Model that holds the term; empty where none does."""
+    """Model of the term; empty without one."""
     value: float | None
     """Relative change by leaving the term out, at the worst fill; None where the scene gives no basis."""
     formula: str
@@ -67,7 +67,7 @@ class Term(NamedTuple):
     """Text in place of a missing value."""
 
     def reason(self, tolerance: float = 0.0) -> str:
-        """Formula and value, of a term without a model compared with the tolerance."""
+        """Formula and value; without a model, compared with the tolerance."""
         text = self.unknown if self.value is None else percent(self.value)
         if self.value is not None and tolerance and not self.model:
             side = "above" if self.value > tolerance else "below"
@@ -232,7 +232,7 @@ def _lifted_liquid(scene: Scene) -> Term:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelUsed:
-    """The model that serves one term of a scene, as `models_used` lists it."""
+    """Model used for one term of a scene."""
 
     term: str
     model: str
@@ -240,11 +240,12 @@ class ModelUsed:
     why: str
     """Formula of the estimate, its value, and further reasons."""
     estimated_contribution: float | None
-    """Relative, before solving; None where the scene gives no basis for an estimate."""
+    """Relative contribution, estimated before solving; None where the scene gives no basis for an
+    estimate."""
 
     @property
     def modelled(self) -> bool:
-        """True if a model holds the term."""
+        """True if the term is modelled."""
         return self.model not in (LEFT_OUT, NOT_MODELLED)
 
 
@@ -260,7 +261,7 @@ def models_used(
 
     Args:
         law: name of the flow law; any but the calibrated one has its own models of chamber and tube.
-        obstacles: why the flow law cannot carry a term of an injection, by term.
+        obstacles: reason why the flow law cannot model a term of an injection, by term.
         selected: the terms of an injection to model; None: all.
         injections_only: true if the terms of chamber and tube are neither estimated nor listed.
     """
@@ -290,14 +291,14 @@ class _Neglected:
 
     terms: tuple[str, ...]
     bound: float
-    """Sum of their contributions, relative to the liquid that the shortest injection that matters moves."""
+    """Sum of their contributions, relative to the liquid moved by the shortest injection that matters."""
     unknown: tuple[str, ...]
     """Terms that the scene gives no basis for an estimate of; not part of the bound."""
     text: str
 
 
 def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
-    """Terms that a run neglects beyond its flow law.
+    """Terms of an injection that a run neglects, with a bound on their sum.
 
     Source: errors of one sign at worst; each estimate is an upper bound.
     """
@@ -312,7 +313,7 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
             f"neglected terms ({', '.join(estimated)}) change the liquid moved by the shortest injection "
             f"that matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
         )
-    # Without their numbers in the scene these two are a default range.
+    # Without values in the scene these two have a default range.
     ranges = [term for term in unknown if term in (FILLING, LAG)]
     others = [term for term in unknown if term not in ranges]
     text += f"; not in the scene, see the gas line's default range: {', '.join(ranges)}" if ranges else ""

@@ -34,7 +34,7 @@ from ringbalance.scene.platform.compiled import in_place, inlined
 
 Four = tuple[float, float, float, float]
 _SLOWEST_M_S: Final = 1e-150
-"""m/s, below which the tube's loss is neglected."""
+"""Velocity below which the tube's loss is neglected, m/s."""
 _SEPARATED: Final = int(Regime.SEPARATED)
 _SLOW_FROUDE: Final = CLEARING[0]
 _FAST_FROUDE: Final = CLEARING[1]
@@ -75,19 +75,19 @@ def crest_table(plant: Record, direction: int) -> int:
 
 @in_place
 def quasi_steady(plant: Record, which: int, pressure: float, log_speed: float) -> float:
-    """Quasi-steady velocity, m/s, under a pressure above zero; `log_speed`: of a factor on it."""
+    """Quasi-steady velocity, m/s, under a pressure above zero; `log_speed`: ln of a factor on it."""
     return velocity_under(plant.numbers, plant.rows, which, pressure) * math.exp(log_speed)
 
 
 @inlined
 def law_speed(speed: float, log_speed: float) -> float:
-    """Velocity that the law itself has where a factor on it gives this one."""
+    """Velocity of the law without the factor exp(`log_speed`), m/s."""
     return abs(speed) * math.exp(-log_speed)
 
 
 @inlined
 def tube_loss(plant: Record, which: int, speed: float, of_law: float) -> tuple[float, float]:
-    """Pressure that a velocity loses over rho, m^2/s^2, and its derivative by the velocity, m/s."""
+    """Pressure loss of a velocity over rho, m^2/s^2, and its derivative by the velocity, m/s."""
     if abs(speed) < _SLOWEST_M_S:
         return 0.0, 0.0
     root, growth = root_of_velocity(plant.root_cells[which], plant.roots, plant.rows, which, of_law)
@@ -114,7 +114,7 @@ def ends(plant: Record, x: float, opposite: float, p: float, q: float, direction
 
 @inlined
 def _allowed(plant: Record, at: Four) -> bool:
-    """Under a one-way law liquid leaves a chamber with gas in it, or one whose level passes the crest."""
+    """True if the law lets liquid leave: a one-way law needs gas, or a level above the crest."""
     return bool(not plant.one_way or at[0] > plant.gas_off or at[2] - plant.column_pressure > at[1])
 
 
@@ -148,8 +148,8 @@ def _crest_margin(
     primed: bool,
     log_speed: float,
 ) -> tuple[float, float, float]:
-    """Pressure that drives a separated column, Pa; fraction of the gas over the crest that is carried out;
-    derivative of the former by the gas margin beyond 1 - the latter."""
+    """Pressure p that drives a separated column, Pa; fraction c of the gas over the crest that is carried
+    out; dp/dg - (1 - c), g the margin over gas."""
     primed_margin, gas_margin = crest_margins(plant, at)
     if primed:
         return primed_margin, 1.0, 0.0
@@ -216,7 +216,7 @@ def holds(
 
 @in_place
 def clearance(plant: Record, at: Four, direction: int, log_speed: float) -> float:
-    """Pressure over rho, m^2/s^2, beyond that of the flow that carries the gas over an unprimed crest out."""
+    """Pressure over rho in excess of that of the flow that clears an unprimed crest of gas, m^2/s^2."""
     half = _HALF_CLEARED * plant.froude_velocity
     if half == 0.0:
         return math.inf
@@ -288,8 +288,8 @@ def accelerations(
 
 @inlined
 def crest_slopes(plant: Record, at: Four) -> tuple[float, float, float]:
-    """Derivatives of the pressures over the crest: of a cavity and of gas by the gas pressure downstream, and
-    of gas by the liquid's pressure there."""
+    """Derivatives of the pressures over the crest: of cavity and gas by the downstream gas pressure, and of
+    gas by the downstream liquid's pressure."""
     is_open = at[3] < plant.port_pressure
     by_cavity = 1.0 if is_open else plant.released if at[1] > plant.vapour_pressure else 0.0
     cavity_margin, gas_margin = crest_margins(plant, at)
@@ -300,16 +300,16 @@ def crest_slopes(plant: Record, at: Four) -> tuple[float, float, float]:
 
 @in_place
 def open_to_gas(plant: Record, at: Four) -> bool:
-    """True if its liquid leaves the upstream port open, or flow is ruled out without gas."""
+    """True if the upstream port is open to gas, or if the law rules out flow without gas pressure."""
     if plant.tabled:
         return False
     return bool(at[2] < plant.port_pressure or not _allowed(plant, at))
 
 
 _LEAST_GAS: Final = 1e-3
-"""Fraction of a chamber that liquid never takes from its gas."""
+"""Smallest fraction of a chamber's volume that counts as gas."""
 _AT_REST: Final = 1e-6
-"""Relative distance of a gas from its end pressure that counts as there."""
+"""Relative distance of a gas from its end pressure at which it counts as having reached it."""
 _flow_shape: Final = inlined(flow_shape)
 _flow_shape_slope: Final = inlined(flow_shape_slope)
 
@@ -322,7 +322,7 @@ def gas_volume(plant: Record, x: float) -> float:
 
 @inlined
 def end_pressure(plant: Record, is_open: bool) -> float:
-    """Absolute, that a gas tends to, Pa."""
+    """Absolute pressure that a gas tends to, Pa."""
     return float(plant.ambient_pressure + (plant.gas_pressure if is_open else 0.0))
 
 
@@ -345,14 +345,14 @@ def line_rates(
     else:
         ratio, scale = outside / pressure, -plant.passing
         if plant.heat_capacity_ratio > 1.0:
-            # A trial step may empty a chamber of its gas; such a step is thrown away.
+            # A trial step may empty a chamber of its gas; such a step is rejected.
             temperature, varies = pressure * volume / max(content, 1e-9 * volume), 1.0
             scale *= math.sqrt(temperature / plant.temperature)
         shape = _flow_shape(ratio, plant.critical_ratio)
         flow = scale * pressure * shape
         slope = _flow_shape_slope(ratio, plant.critical_ratio, shape)
         by_pressure = scale * (shape - ratio * slope)
-    # A gas that vents has the temperature p V/(m R), and its flow goes with the root of it.
+    # A venting gas has the temperature p V/(m R), and its flow is proportional to the root of that.
     kappa, half = plant.heat_capacity_ratio, 0.5 * varies * flow
     per = kappa / volume
     rise, gain = (flow - pressure * growth) * per, flow / temperature
@@ -370,6 +370,6 @@ def line_rates(
 
 @in_place
 def near_end(plant: Record, motion: Record, chamber: int) -> bool:
-    """True if a gas has the pressure that it tends to."""
+    """True if a gas has reached its end pressure."""
     end = end_pressure(plant, motion.valve_0 > 0 if chamber == 0 else motion.valve_1 > 0)
     return bool(abs(motion.state[P + chamber] - end) <= _AT_REST * end)

@@ -48,21 +48,21 @@ class Event(StrEnum):
     FULL = "full"
     """The receiving chamber reached its largest fill."""
     UNFINISHED = "unfinished"
-    """The bound on the number of steps was reached; the fills after that are the last ones found."""
+    """The bound on the number of steps was reached; all later fills repeat the last one."""
 
 
 Record = Any
 """One element of an array with one of the types below; compiled code changes it in place."""
 
 FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
-"""Gas on and tube primed, or not, in the tables of a law that gives velocities alone."""
+"""Gas on or off and tube primed or not, in the order of the tables of a law that gives velocities alone."""
 PIECES: Final = 4096
 """Pieces of each table in `FLOWS`."""
 NUMBERS: Final = 4352
 """Room for the numbers of a law, fixed, so that compiled code serves every law."""
 WAYS: Final = 3
 ROWS: Final = len(FLOWS) * PIECES
-"""Room for its pieces."""
+"""Room for the pieces of a law."""
 
 _PLANT_REAL: Final = (
     "density",  # kg/m^3
@@ -72,7 +72,7 @@ _PLANT_REAL: Final = (
     "port_pressure",  # D_p, Pa
     "column_pressure",  # D_m, Pa; of a one-way law the level above which liquid leaves a vented chamber
     "vapour_pressure",  # gauge, Pa
-    "released",  # as in `TubePath`
+    "released",  # of `TubePath`
     "froude_velocity",  # m/s
     "lift_straight",  # of `Lift`
     "lift_entrance",
@@ -114,19 +114,19 @@ PLANT: Final = np.dtype(
     + [
         ("moment", np.complex128, (MOMENT_NODES, 2)),  # of a pair, along and across: value, slope per step
         ("numbers", np.float64, (NUMBERS,)),  # of the law, as `point` reads it
-        ("root_cells", np.float64, (WAYS, ROOT_PLACES)),  # where to look for the root of a velocity
-        ("roots", np.float64, (ROWS, WIDTH_OF_ROOT)),  # beside `rows`, next to such roots
-        ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # its pieces, or those of a law that is tabled
+        ("root_cells", np.float64, (WAYS, ROOT_PLACES)),  # search cells for the root of a velocity
+        ("roots", np.float64, (ROWS, WIDTH_OF_ROOT)),  # starting values of such roots, row by row as `rows`
+        ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # pieces of the law, or of its tables
     ]
 )
-"""Constants of a plant with moving liquid, filling gas, late valves and moments of its pairs."""
+"""Constants of a pair: liquid column, gas line, valve lag and moments."""
 
 
 def empty_plants(count: int) -> Records:
     """Records of type `PLANT`, of zeros.
 
-    Few laws fill the room for their pieces.  What is not written to takes neither memory nor time here;
-    arrays of NumPy's own would lie on huge pages, which the system fills with zeros as a whole.
+    Few laws fill the room for their pieces.  Memory that is not written to costs nothing here; NumPy's
+    arrays would lie on huge pages, which the system fills with zeros as a whole.
     """
     return np.frombuffer(mmap.mmap(-1, count * PLANT.itemsize), dtype=PLANT)
 
@@ -138,7 +138,7 @@ WORK: Final = 6
 _MOTION_REAL: Final = (
     "opens",  # s from now until the valve of `chamber` opens, infinite for never
     "closes",
-    "log_speed",  # of the factor on the law's velocity
+    "log_speed",  # ln of the factor on the law's velocity
     "length",  # of the next step, s
     "now",  # s since the interval began
     "started",  # x at the last start
@@ -149,7 +149,7 @@ _MOTION_REAL: Final = (
     "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
     "ended",  # s since the interval began, at which the flow out of the driven chamber last ended
     "filled",  # s since the interval began, at which the tube was first primed; below zero for not yet
-    "run_dry",  # time for which its valve stays open to the empty chamber, s
+    "run_dry",  # time for which the valve stays open to the empty chamber, s
     "front",  # fraction of the path up to which liquid stood in the tube at `started`, from chamber `side`
 )
 _MOTION_WHOLE: Final = (
@@ -210,18 +210,18 @@ class Lift:
 
 
 def gives_forces(law: FlowLaw) -> bool:
-    """True if a law knows the forces on the column, which terms beyond its velocity need."""
+    """True if a law gives the forces on the column, which inertia and a slow gas need."""
     return isinstance(law, CalibratedLaw | PaperLaw)
 
 
 RELATIVE_ERROR: Final = 1e-9
 """Relative error of each state, allowed to one step of a single run."""
 MOST_STEPS: Final = 200_000
-"""Within one interval of time."""
+"""Largest number of steps within one interval of time."""
 _FIRST_STEP_S: Final = 1e-4
-"""s, at the most after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
+"""Longest step after a jump of the rates, s, at `RELATIVE_ERROR`; proportional to the error's fourth root."""
 _NO_HEADS: Final = np.array([1e-12, 2e-12])
-"""Eighth roots of heads, above which a table goes on with one ratio."""
+"""Knots, eighth roots of heads, of a table with a single ratio, which continues above them."""
 _OF_PATH: Final = (
     "density",
     "port_pressure",
@@ -248,16 +248,16 @@ _OF_DYNAMICS: Final = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dynamics:
-    """Flow law of a pair, and the terms that the law does not know."""
+    """Flow law of a pair, and the terms that the law leaves out."""
 
     law: FlowLaw
     tube: Tube
     inertia: bool
-    """True if the liquid in the tube has mass."""
+    """True if the liquid in the tube has inertia."""
     line: GasLine | None
     """Valve and line of each chamber; None: gas fills and vents at once."""
     valve_lag: float
-    """s."""
+    """Time from a command to the valve's movement, s."""
     gas_pressure: float
     """Gauge pressure of the supply, Pa."""
     ambient_pressure: float
@@ -291,7 +291,7 @@ class Dynamics:
         lifts: bool = False,
         residual: float = 0.0,
     ) -> Dynamics:
-        """By the flow law alone, or with terms beyond it; `lifts`: a dry tube fills up to its crest."""
+        """Make them by the flow law alone, or with more terms; `lifts`: an unprimed tube is filled first."""
         return cls(
             law=model.flow,
             tube=scene.tube,
@@ -361,14 +361,14 @@ class Dynamics:
         return {}
 
     def kept_plant(self, *, total: float) -> npt.NDArray[np.void]:
-        """`plant`, made once for each sum of fill ratios."""
+        """Cached `plant` for a sum of fill ratios."""
         if total not in self._plants:
             self._plants[total] = self.plant(total=total)
         return self._plants[total]
 
 
 def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
-    """Liquid leaves only a chamber that has gas, or a level that passes the crest."""
+    """Write the paper's law: liquid leaves only a chamber with gas or with a level above the crest."""
     plant["density"], plant["one_way"] = law.density, True
     if law.return_pressure is not None:
         plant["column_pressure"] = law.return_pressure
@@ -389,10 +389,10 @@ def _fill_rows(plant: npt.NDArray[np.void], ways: int, numbers: FloatArray, rows
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
-    """Tables of a law of velocities, one of `FLOWS` each: u|u| by powers of the place, column, regime.
+    """Write the tables of a law of velocities, one for each of `FLOWS`: powers of u|u|, primed, regime.
 
-    u|u| is straight where the law has it so, as near a stall.  A law that changes its regime within a piece
-    does so at its end.
+    u|u| is linear in a piece that holds a stall or a reversal.  A change of regime within a piece takes
+    effect at its end.
     """
     total, largest = float(plant["total"][0]), law.max_fill_ratio
     lowest, highest = max(0.0, total - largest), min(total, largest)

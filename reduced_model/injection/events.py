@@ -29,7 +29,7 @@ STALLED: Final = EVENTS.index(Event.STALLED)
 EMPTY: Final = EVENTS.index(Event.EMPTY)
 FULL: Final = EVENTS.index(Event.FULL)
 FILLS: Final = 2
-"""The tube counts as filled, beside the directions of a start."""
+"""The tube becomes filled; types of events from here on stand beside the directions of a start."""
 STOPS: Final = 3
 """The column comes to rest."""
 ARRIVES: Final = 4
@@ -90,7 +90,7 @@ def outward(motion: Record) -> int:
 
 @in_place
 def command(plant: Record, motion: Record, chamber: int, duration: float) -> None:
-    """A valve opens and closes a lag after its command, which begins a new record of what it does."""
+    """Command a valve to open and close, each after its lag, and begin a new record of the injection."""
     x = shown(plant, motion, motion.state[X])
     motion.chamber, motion.opens, motion.closes = chamber, plant.valve_lag, plant.valve_lag + duration
     forget(motion, plant.total - x if chamber else x)
@@ -98,7 +98,7 @@ def command(plant: Record, motion: Record, chamber: int, duration: float) -> Non
 
 @in_place
 def forget(motion: Record, fill: float) -> None:
-    """Begin a new record of what a valve does, with the fill of the driven chamber."""
+    """Begin a new record of an injection, from the present fill of the driven chamber."""
     motion.fill_before, motion.least_fill = fill, fill
     motion.state[WORK], motion.state[WORK + 1] = 0.0, 0.0
     motion.regime_start, motion.regime_end, motion.event = RESTING, RESTING, _BLOCKED
@@ -115,7 +115,7 @@ def rests(plant: Record, motion: Record) -> bool:
 
 @in_place
 def limit_in_the_way(plant: Record, x: float, direction: int) -> int:
-    """The event by which a chamber is in the way of flow in a direction; `NONE`: it is not."""
+    """Event of the empty or full chamber that prevents flow in a direction; `NONE`: no chamber does."""
     lowest, highest = max(0.0, plant.total - plant.max_fill_ratio), min(plant.total, plant.max_fill_ratio)
     if direction > 0 and x <= lowest:
         return EMPTY if lowest == 0.0 else FULL
@@ -126,7 +126,7 @@ def limit_in_the_way(plant: Record, x: float, direction: int) -> int:
 
 @in_place
 def would_start(plant: Record, state: Four, primed: bool) -> int:
-    """Direction in which resting liquid would flow; zero for none."""
+    """Direction in which the law lets resting liquid flow, apart from limits of fill; zero for none."""
     if plant.tabled:
         speed = tabled(
             plant, state[0], state[2] - plant.ambient_pressure, state[3] - plant.ambient_pressure, primed, 0.0
@@ -140,7 +140,7 @@ def would_start(plant: Record, state: Four, primed: bool) -> int:
 
 @in_place
 def starts(plant: Record, motion: Record, state: Four) -> int:
-    """Direction in which resting liquid does start to flow; zero for none."""
+    """Direction in which resting liquid starts to flow within the limits of fill; zero for none."""
     direction = would_start(plant, state, motion.primed > 0)
     if direction == 0 or motion.balanced or limit_in_the_way(plant, state[0], direction) != NONE:
         return 0
@@ -149,7 +149,7 @@ def starts(plant: Record, motion: Record, state: Four) -> int:
 
 @in_place
 def _push(plant: Record, motion: Record, state: Four, direction: int) -> float:
-    """Acceleration of a column at rest, or of lifted liquid."""
+    """Acceleration from rest of a column or of lifted liquid, m/s^2."""
     if motion.lifting:
         return lift_push(plant, motion, state[0], state[2], state[3])
     at = pair_ends(plant, state, direction)
@@ -212,7 +212,7 @@ def heading(plant: Record, motion: Record, state: Four) -> int:
 def beyond(plant: Record, motion: Record, state: Four, event: int) -> float:
     """Event function: below zero before an event, above zero after it, in a unit of that event.
 
-    A guide to it and no more: `changes` tells on which side a state is.
+    It only guides the search; `changes` decides on which side of the event a state is.
     """
     if motion.direction == 0:
         return _push(plant, motion, state, event) if event != 0 else 0.0

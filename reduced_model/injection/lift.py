@@ -1,16 +1,16 @@
 """Liquid that is lifted in the tube before any of it passes the crest, in plain numbers.
 
-In a tube that is not primed the liquid of the chamber that gives stands at that chamber's level, with the
-gas of the other one over it.  Under gas its front, at the fraction s of the path, moves by
+In an unprimed tube the liquid of the giving chamber stands at that chamber's level, with the gas of the
+other one over it.  Under gas pressure its front, at the fraction s of the path, moves by
     rho s L du/dt = p_A - p_c + P_A - D(s) - K(s) rho u^2/2,    L ds/dt = u,
-D(s) a column from the front to the outer wall, p_c the gas over the crest, K(s) = e K + (1 - e) K s/s_end
-with K = alpha + k_up up to the crest's end s_end, and e the fraction of it lost at the entrance.  From s_end
-on the flow law's column continues at the same velocity.
+D(s) the pressure of a column from the front to the outer wall, p_c that of the gas over the crest,
+K(s) = e K + (1 - e) K s/s_end with K = alpha + k_up up to the crest's end s_end, and e the fraction of it
+lost at the entrance.  From s_end on the flow law's column continues at the same velocity.
 
-Liquid on the crest's circle is pulled to neither side.  What is there when the column parts is taken to drain
-evenly: what was lifted to the middle of the crest falls back, what was lifted beyond it has passed.  Between
-injections gas is taken to lie over the crest; legs on both sides of a cavity would stand somewhat higher.
-While liquid is lifted the fill of the state is that of the chamber alone; `shown` is with the tube's share.
+Liquid on the crest's circle is pulled to neither side.  When the column parts, this liquid is assumed to
+drain evenly: liquid short of the middle of the crest falls back, liquid beyond it has passed.  Between
+injections gas is assumed to lie over the crest; legs on both sides of a cavity would stand somewhat higher.
+While liquid is lifted the state holds the fill of the chamber alone; `shown` adds what would fall back.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def front(plant: Record, motion: Record, x: float) -> float:
 
 @inlined
 def shown(plant: Record, motion: Record, x: float) -> float:
-    """Fill of chamber 0 with what the tube gives back to it."""
+    """Fill of chamber 0, with lifted liquid counted in the chamber to which it would drain."""
     if not motion.lifting:
         return x
     return float(motion.started - motion.direction * _passed(plant, motion, front(plant, motion, x)))
@@ -75,13 +75,13 @@ def _passed(plant: Record, motion: Record, position: float) -> float:
 
 @in_place
 def stands(plant: Record, motion: Record) -> tuple[float, float]:
-    """Present `front`, and the fill that is `shown`."""
+    """Present values of `front` and `shown`."""
     return front(plant, motion, motion.state[X]), shown(plant, motion, motion.state[X])
 
 
 @in_place
 def resume(plant: Record, motion: Record, position: float) -> None:
-    """Set lifted liquid whose front `stands` at a fraction of the path, from the fill that is shown."""
+    """Restore lifted liquid with its front at a fraction of the path, from the fill that `shown` gives."""
     motion.started = motion.state[X] + motion.direction * _passed(plant, motion, position)
     motion.state[X] = motion.started - motion.direction * (position - motion.front) * plant.hold_up
 
@@ -107,8 +107,8 @@ def _leg(plant: Record, position: float, direction: int) -> tuple[float, float]:
 def lift_rates(
     plant: Record, motion: Record, at: tuple[float, float, float, float], x: float, speed: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Acceleration per_path the direction, m/s^2; by x through the front, against the direction; then as
-    `accelerations` by the speed, the pressure upstream, the gas downstream and the liquid there."""
+    """Acceleration along the direction, m/s^2; derivative of du/dt, u out of chamber 0, by x through the
+    front; then, as in `accelerations`, by the speed, the upstream pressure, the downstream gas and liquid."""
     direction, rho = motion.direction, plant.density
     position, entrance = front(plant, motion, x), plant.lift_entrance
     height, slope = _leg(plant, position, direction)
@@ -162,11 +162,11 @@ def set_out(plant: Record, motion: Record) -> None:
 
 @in_place
 def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
-    """Fraction of the path where the leg stands as flow over the crest becomes possible, and velocity, m/s.
+    """Front of the leg, a fraction of the path, when flow over the crest becomes possible; velocity, m/s.
 
-    At the level under a gas that is there at once.  Under one that a line fills slowly the leg has risen with
-    it, `_risen`.  Between them as far as a rising pressure moves a leg of constant length: p t^2/(6 rho s L),
-    t the time of the line while choked.
+    At the chamber's level if the gas pressure jumps.  If a line raises it slowly, the leg has risen with it,
+    see `_risen`.  Between the two the leg has gone as far as a rising pressure moves one of constant length,
+    p t^2/(6 rho s L), t the filling time of the choked line.
     """
     direction, x = motion.direction, motion.state[X]
     fill = x if direction > 0 else plant.total - x

@@ -1,6 +1,6 @@
-"""Fills at which injections of runs end: where the gas stalls, and where gas enters a port.
+"""Fill ratios at which injections end: where the flow stalls, and where gas enters a port.
 
-For many plants at once; `residual_liquid` has the same of one law.
+For many plants at once; `residual_liquid` treats one law.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ringbalance.scene.designs import Designs
 from ringbalance.scene.platform.compiled import in_place
 
 _PLACES: Final = 256
-"""Looked at between equal fills and an empty chamber."""
+"""Number of steps of fill from equal fills to an empty chamber."""
 _HALVINGS: Final = 24
 """Halvings of the step in which the flow stops: 2e-10 of a fill is left."""
 
@@ -38,7 +38,7 @@ def residual_fills(plants: npt.NDArray[np.void], designs: Designs) -> FloatArray
 
 
 def hold_liquid(plants: npt.NDArray[np.void], designs: Designs) -> None:
-    """Let the plants of a crest fill the tube up to it before liquid passes."""
+    """Set plants with a crest to fill the tube up to it before liquid passes."""
     if not np.any(plants["crest"]):
         return
     rows, velocity = np.arange(designs.size), np.empty(designs.size)

@@ -18,7 +18,7 @@ from ringbalance.scene.models import Scene
 def line_answers(scene: Scene, model: BalancerModel) -> tuple[LineAnswer, ...]:
     """Performance of the balancer's gas line for each of `line_ends`, at equal fills of a pair."""
     law, fill = model.flow, model.flow.max_fill_ratio / 2
-    # Under a law without levels the liquid stays moved.
+    # Under a law without levels moved liquid is assumed to stay.
     holds = law.holds(fill) if isinstance(law, CalibratedLaw | PaperLaw) else True
     return tuple(_answer(scene, end, model, fill, holds) for end in line_ends(scene))
 
@@ -30,7 +30,7 @@ def _answer(scene: Scene, end: LineEnd, model: BalancerModel, fill: float, holds
         scene,
         model,
         inertia=isinstance(model.flow, CalibratedLaw),
-        # A law that gives no forces fills gas at once.
+        # Under a law that gives no forces gas fills at once.
         line=line if gives_forces(model.flow) else None,
         lifts=True,
     )
@@ -41,7 +41,7 @@ def _answer(scene: Scene, end: LineEnd, model: BalancerModel, fill: float, holds
         moved = injections.moved(opening)
         moment = model.moment.pair_moment(fill_ratio=fill - moved, opposite_fill_ratio=fill + moved)
         correction = abs(float(moment)) * scene.rotor.influence_coefficient
-        # Under extreme laws the shortest injection may move nothing: then no vibration belongs to a way.
+        # With extreme laws the shortest injection may move nothing: then no amount corresponds to the limit.
         if correction > 0:
             dead = injections.dead_time(limit * moved / correction)
     return LineAnswer(

@@ -49,20 +49,20 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.platform.compiled import in_place, inlined
 
 _ROUND_OFF_S: Final = 1e-12
-"""s, of the clock of a valve."""
+"""Round-off of the clock of a valve, s."""
 _BISECTIONS: Final = 40
 _SECANTS: Final = 12
-"""Bisections at most that a secant guides: a smooth event takes five."""
+"""Largest number of bisections that a secant guides: a smooth event takes five."""
 _REST_EVENT: Final = 1e-11
-"""Error of the instant of an event over a step at rest, which may be long."""
+"""Allowed error of an event's instant over the length of a step at rest, which may be long."""
 _NOTHING_MOVED: Final = 1e-13
-"""Fill ratio below which a start has come to nothing but round-off."""
+"""Moved fill ratio below which a start counts as round-off."""
 _LITTLE_MOVED: Final = 1e-9
-"""Fill ratio below which a flow that ends was the last swing of a column about its balance."""
+"""Moved fill ratio below which a flow counts as the last swing of a column about its balance."""
 _OPENINGS: Final = 42
-"""Valve-open times that are tried at most to leave a chamber its residual fill."""
+"""Largest number of valve-open times tried to leave a chamber its residual fill."""
 SPARE: Final = 3
-"""Motions that these are tried on."""
+"""Number of motions needed for these trials."""
 _LEFT_OVER: Final = 1e-4
 """Fill ratio that may be left above the residual one, over the error allowed to a step."""
 _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
@@ -72,12 +72,13 @@ _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 def advance(
     plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
 ) -> None:
-    """Let a time pass, s, through the valves' movements on the way.
+    """Advance a pair by a time, s, with all movements of the valves in it.
 
-    The fill at the first `count` instants in row 0 of `notes`, s from now and ascending, goes to another row.
+    The first `count` places of row 0 of `notes` are ascending instants, s from now; the fills at them are
+    written to `row`.
     """
     left, motion.now, motion.noted = duration, 0.0, 0
-    # What is due at the end counts, whatever the clock has rounded off.
+    # A movement due at the end counts, despite round-off of the clock.
     while min(motion.opens, motion.closes) <= left + _ROUND_OFF_S:
         until = min(motion.opens, motion.closes, left)
         _march(plant, motion, until, notes, row, count, w, True)
@@ -128,7 +129,7 @@ def inject_each(
 
 @in_place
 def _pause(plant: Record, motion: Record) -> None:
-    """Liquid without mass has no motion of its own: the next instant finds it again."""
+    """Drop the motion of liquid without inertia; the next step determines it from the state."""
     if motion.direction != 0 and not (plant.inertia or motion.lifting):
         motion.primed, motion.direction = 1 if holds_column(plant, motion, now(motion)) else 0, 0
 
@@ -146,9 +147,9 @@ def opening_within(
 ) -> float:
     """Longest valve-open time, at most `duration`, that leaves the driven chamber its residual fill, s.
 
-    All times that are tried have the steps of the shorter ones in common, which are taken once.
-    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: to which the whole
-        `duration` and its tail would empty it, a fill ratio.
+    The steps that a trial has in common with shorter ones are taken once.
+    Args: `spare`: first of `SPARE` motions that are written to. `lowest`: lowest fill ratio of the driven
+        chamber by the whole `duration` and its tail.
     Returns: zero where the chamber is already there.
     """
     y, residual, opened, way = motions[pair].state, motions[pair].residual, spare + 2, spare + 1
@@ -186,20 +187,20 @@ def opening_within(
 
 @inlined
 def _illinois_step(low: float, high: float, before: float, after: float, step: int, near: float) -> float:
-    """Next guess of a root between two ends with values of opposite sign, at most `near` exact.
+    """Next guess of a root between two ends with values of opposite sign, exact to `near`.
 
-    By the secant through both, and by halves where that has no sign change or takes long. The caller halves
-    the value of an end that stays (the Illinois rule).
+    By the secant through both; by bisection without a sign change or after many steps. The caller halves the
+    value of an end that stays (the Illinois rule).
     """
     guided = step < _SECANTS and before < 0.0 < after
     middle = low + (high - low) * (before / (before - after) if guided else 0.5)
-    # Never nearer to an end than that: so a root close to it is soon between two close ends.
+    # At least half of `near` from either end, so that a root close to an end is soon bracketed.
     return float(min(max(middle, low + near / 2.0), high - near / 2.0))
 
 
 @in_place
 def _open(plant: Record, motion: Record, chamber: int, w: FloatArray) -> None:
-    """Command a valve, and let it open for good."""
+    """Open a valve that does not close."""
     command(plant, motion, chamber, math.inf)
     advance(plant, motion, plant.valve_lag, w, 0, 0, w)
     motion.now = 0.0
@@ -209,8 +210,7 @@ def _open(plant: Record, motion: Record, chamber: int, w: FloatArray) -> None:
 def _least_after(plant: Record, motions: Record, spare: int, duration: float, w: FloatArray) -> float:
     """Lowest fill of the driven chamber until an injection and its tail are over.
 
-    `motions[spare + 1]` is on the way, its valve open, and goes as far on it as steps have nothing to do with
-    its end.
+    `motions[spare + 1]` has its valve open, and advances by the steps that do not depend on the duration.
     """
     left = duration - motions[spare + 1].now
     _march(plant, motions[spare + 1], left, w, 0, 0, w, False)
@@ -245,10 +245,10 @@ def _march(
     w: FloatArray,
     to_end: bool,
 ) -> None:
-    """Steps and their events, with the valves as they are.
+    """Take steps with their events, without movements of the valves.
 
-    Args: `to_end`: true if the last step is shortened to what is left, or not taken; then a chamber that
-        passes its residual fill ends them too.
+    Args: `to_end`: true: the last step is shortened to the time left; false: it is not taken, and a chamber
+        below its residual fill ends the steps too.
     """
     left, goes_on = duration, False
     while left > 0.0:
@@ -280,7 +280,7 @@ def _goes_no_further(plant: Record, motion: Record, left: float) -> bool:
 
 @in_place
 def _pass(plant: Record, motion: Record, time: float, notes: FloatArray, row: int, count: int) -> None:
-    """The clocks of the valves and of the interval; what is not noted yet has not moved."""
+    """Advance the clocks of valves and interval; instants not noted yet get the present fill."""
     motion.opens -= time
     motion.closes -= time
     motion.now += time
@@ -301,7 +301,7 @@ def _step(
 ) -> tuple[float, bool]:
     """One accepted step, cut at the first event within it.
 
-    Returns: Its length, s, and whether liquid moves on, so that nothing needs to be settled.
+    Returns: Its length, s, and true if liquid moves on, so that `_settle` is not needed.
     """
     h, moves = take(plant, motion, left, w), motion.direction != 0
     event = changes(plant, motion, _at(w, END))
@@ -349,7 +349,7 @@ def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
 def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatArray) -> float:
     """Part of the step just taken after which the first event lies, at most `near` late.
 
-    Looked for by how far both ends are `beyond` it, see `_illinois_step`.
+    Searched by the event function `beyond` at both ends, see `_illinois_step`.
     """
     low, high, event, stays = 0.0, 1.0, heading(plant, motion, _at(w, END)), 0
     before = beyond(plant, motion, now(motion), event)
@@ -407,7 +407,7 @@ def _first(plant: Record, motion: Record) -> float:
 
 @in_place
 def _stop(plant: Record, motion: Record, event: int) -> None:
-    """At rest: at a limit exactly, and with a column only where the law has one."""
+    """Bring liquid to rest: exactly at a limit, and with a column only where the law holds one."""
     y, direction = motion.state, motion.direction
     if motion.lifting:
         # The liquid comes to rest in the tube, and the chambers are as they were.
@@ -416,7 +416,7 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
         motion.front, motion.lifting = position, 0
     _note(plant, motion, event, direction)
     little = _NOTHING_MOVED if motion.stopped != -direction else _LITTLE_MOVED
-    # A start that moved nothing will move nothing again, until a valve or a gas pressure does.
+    # A start that moved nothing is not repeated until a valve or a gas pressure changes.
     motion.balanced = 1 if not plant.line and abs(y[X] - motion.started) < little else 0
     motion.stopped = direction
     if event in (EMPTY, FULL):
@@ -430,7 +430,7 @@ def _stop(plant: Record, motion: Record, event: int) -> None:
 
 @in_place
 def _flip(plant: Record, motion: Record) -> None:
-    """The next waiting valve moves."""
+    """Move the valve that is due next."""
     opens = motion.opens <= motion.closes
     if opens:
         motion.opens = math.inf
@@ -461,7 +461,7 @@ def _quiet(plant: Record, motion: Record) -> bool:
 
 @in_place
 def _rest_gases(plant: Record, motion: Record) -> None:
-    """The gases at the pressures that they tend to."""
+    """Set the gases to the pressures that they tend to."""
     if plant.line:
         motion.state[P] = end_pressure(plant, motion.valve_0 > 0)
         motion.state[P + 1] = end_pressure(plant, motion.valve_1 > 0)
@@ -469,7 +469,7 @@ def _rest_gases(plant: Record, motion: Record) -> None:
 
 @in_place
 def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
-    """Keep what happens to the flow out of the driven chamber."""
+    """Record an event of the flow out of the driven chamber."""
     if direction == outward(motion):
         is_open = motion.valve_1 > 0 if motion.chamber else motion.valve_0 > 0
         if motion.regime_start == RESTING and event == NONE:

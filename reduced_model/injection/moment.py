@@ -11,7 +11,7 @@ from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 MOMENT_NODES: Final = 513
-"""Equally spaced; cubic between them."""
+"""Number of equally spaced nodes; cubic between them."""
 END_STEP: Final = 1e-3
 """Fraction of the range of x over which a slope at its end is taken."""
 _HALVINGS: Final = 60

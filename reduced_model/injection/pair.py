@@ -1,4 +1,4 @@
-"""A pair of chambers at rest, its way through an interval of time, and one injection into it.
+"""One pair of chambers: at rest, through an interval of time, and under a single injection.
 
 **Shortest injection.**  Nothing flows before the gas has filled the chamber up to the pressure that starts
 the flow and lifted the liquid to the crest, and until the tube is primed liquid at most spills.  A valve that
@@ -68,15 +68,15 @@ def fills_at(plant: npt.NDArray[np.void], state: npt.NDArray[np.void], instants:
 
 
 _RELATIVE_ERROR: Final = 1e-7
-"""Allowed to one step: an amount is then right to 1e-5 of it."""
+"""Relative error allowed to one step: a moved amount is then accurate to 1e-5 of itself."""
 _TAIL: Final = 10.0
-"""s after a valve has closed: the gas has vented and the liquid rests."""
+"""Seconds from the closing of a valve until the gas has vented and the liquid rests."""
 _TIME_ERROR_S: Final = 1e-6
-"""s, of a valve-open time."""
+"""Error of a valve-open time, s."""
 _DOUBLINGS: Final = 12
-"""Doublings of the time by which an opening may be longer than the steady velocity has it."""
+"""Doublings of the time by which an opening may exceed that at the steady velocity."""
 _RUN_BACK: Final = 0.01
-"""Part of what an injection has moved that may run back as its column swings out."""
+"""Fraction of the amount moved by an injection that may run back as its column swings out."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +91,7 @@ class Injections:
     chamber: int
     """0 or 1: the driven one."""
     steady: float
-    """Fill ratio that leaves the driven chamber per second by a primed column under the supply's gas, 1/s."""
+    """Fill ratio per second that leaves the driven chamber by a primed column under supply pressure, 1/s."""
 
     @classmethod
     def of(
@@ -181,7 +181,7 @@ class Injections:
         )
 
     def dead_time(self, amount: float) -> float | None:
-        """Dead time of the injection that moves a fill ratio, or of the shortest sure one that moves more, s.
+        """Dead time of the injection that moves a fill ratio, or of the shortest if that moves more, s.
 
         Zero where the gas cannot move so much; None where what it has moved runs back with the valves shut.
         """

@@ -1,7 +1,7 @@
-"""One step in time of a pair's states by a linearly implicit method, for easy and stiff flows alike.
+"""One step in time of a pair's states by a linearly implicit method, for non-stiff and stiff flows.
 
 A very viscous liquid in a narrow tube answers in microseconds while the levels shift for minutes, and a gas
-line is stiff towards the end of filling; an explicit method would creep there.
+line is stiff towards the end of filling; an explicit method would take tiny steps.
 Source: the L-stable method of order 4(3) with four stages and three evaluations, Hairer and Wanner, "Solving
 Ordinary Differential Equations II" (1996), section IV.7, table 7.2.
 """
@@ -45,13 +45,13 @@ _C: Final = np.array(
 _B: Final = np.array([2.255570073418735, 0.2870493262186792, 0.4353179431840180, 1.093502252409163])
 """Weights of the stages in the state at the end."""
 _E: Final = np.array([0.2815431932141155, 0.07276199124934920, 0.1082196201495311, 1.093502252409163])
-"""Weights of the stages in what the method of order 3 would change there."""
+"""Weights of the stages in the difference from the embedded method of order 3."""
 _SHORTEST_STEP_S: Final = 1e-15
-"""s, below which no error is looked at."""
+"""Length of a step below which its error is not checked, s."""
 _REST_STEP: Final = 0.25
-"""In units of a gas's time constant, while both gases change."""
+"""Longest step at rest while both gases change, in units of the shorter time constant of a gas."""
 _SLOW_M_S: Final = 30.0
-"""m/s, below which a velocity's error is not relative: a column keeps it for some 10 ms, in which a
+"""Velocity, m/s, below which the error is not relative: a column keeps it for some 10 ms, in which a
 ten-thousandth of that moves less than 1e-6 of a chamber's liquid."""
 _SAFETY: Final = 0.85
 _SHRINK: Final = 0.2
@@ -77,7 +77,7 @@ def _column_rates(
 ) -> tuple[float, float, float, float, float, float]:
     """Velocity and acceleration of the liquid; derivatives of the latter by u, x, p and q.
 
-    Without inertia those of the velocity by x, p and q: they keep the balance of forces.
+    Without inertia, derivatives by x, p and q of the velocity that keeps the forces in balance.
     """
     direction, primed, ambient = motion.direction, motion.primed > 0, plant.ambient_pressure
     if direction == 0:
@@ -178,7 +178,7 @@ def _linearize(plant: Record, motion: Record, w: FloatArray) -> None:
 
 @inlined
 def _eliminate_gas(w: FloatArray, row: int, d: float, moves: float) -> float:
-    """Prepare a gas's two equations; (d - J) k = r. Returns: change of its pressure with the velocity's."""
+    """Prepare the two equations of a gas in (d - J) k = r. Returns: pressure change per velocity change."""
     free, by_velocity = d - w[row, 6], w[row, 2] - w[row, 1] * moves / d
     w[row, 7] = 1.0 / ((d - w[row, 0]) * free - w[row, 3] * w[row, 4])
     return float((by_velocity * free - w[row, 3] * w[row, 5] * moves / d) * w[row, 7])
@@ -186,7 +186,7 @@ def _eliminate_gas(w: FloatArray, row: int, d: float, moves: float) -> float:
 
 @inlined
 def _gas_increment(w: FloatArray, row: int, stage: int, column: int, d: float, x: float) -> float:
-    """Change of a gas pressure with the velocity's change left out."""
+    """Change of a gas pressure without the part by the change of velocity."""
     pressure, content = w[stage, column] + w[row, 1] * x, w[stage, column + 2] + w[row, 5] * x
     return float((pressure * (d - w[row, 6]) + w[row, 3] * content) * w[row, 7])
 
@@ -202,7 +202,7 @@ def _solve(
     first: float,
     second: float,
 ) -> None:
-    """Solve (d - J) k = k in the row of a stage.
+    """Solve (d - J) k = r; the row of a stage holds r, then k.
 
     Given the change of the velocity, the fill and both gases follow from their own rows, which leaves one
     equation; `first` and `second` are what `_eliminate_gas` gives for the gases.
@@ -288,7 +288,7 @@ def _rosenbrock(plant: Record, motion: Record, h: float, w: FloatArray) -> float
 
 @in_place
 def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
-    """Largest error of a state over the allowed one; the works are integrals and allow any."""
+    """Largest error of a state over the allowed one; the works, integrals only, are not checked."""
     worst, supply = 0.0, plant.gas_pressure + plant.ambient_pressure
     for i in range(WORK):
         scale = 0.1 if i == X else _SLOW_M_S if i == U else 0.1 * (supply if i < P + 2 else y[i])
@@ -340,7 +340,7 @@ def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 
 @in_place
 def shorten(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
-    """End the step of length h just taken after a part of it, with what lies `between`."""
+    """End the step of length h just taken after a part of it, by the state `between` or a shorter step."""
     if (plant.inertia and motion.direction != 0) or in_closed_form(plant, motion):
         between(plant, motion, h, part, w)
         _copy(w, BETWEEN, END)
@@ -369,7 +369,7 @@ def rates_at_end(plant: Record, motion: Record, w: FloatArray) -> None:
 
 
 _STRAIGHT: Final = 1e-5
-"""Below which tanh, tan and their inverses are straight to round-off."""
+"""Argument below which tanh, tan and their inverses are linear to round-off."""
 _flow_shape: Final = inlined(flow_shape)
 
 

@@ -1,7 +1,4 @@
-"""The flow law distilled from a chamber's free surface and the tube's loss, with all its regimes.
-
-Beside it the moment of a pair of chambers, from the same chamber.
-"""
+"""Calibrated flow law, from a chamber's free surface and the tube's loss, and moment of a chamber pair."""
 
 from __future__ import annotations
 
@@ -34,20 +31,20 @@ from ringbalance.scene.models import HumpGas
 from ringbalance.scene.registry import registered
 
 WIDTH: Final = 3
-"""Column of a moment's half-width over the fill ratio."""
+"""Column of `CalibratedMoment.along` that holds the expanded uncertainty of U."""
 _Conditions = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
 _Answers = tuple[FloatArray, IntArray, BoolArray, FloatArray]
 _FEW_POINTS: Final = 500
-"""Points up to which compiled code would take longer to load than they take without."""
+"""Number of points up to which plain Python is faster than loading the compiled code."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalibratedMoment:
-    """U(x) of one chamber along its middle, and W(x) across it; a pair's is U(x_A) - U(x_C), W alike."""
+    """Moments of one chamber: U(x) along its middle, W(x) across it; a pair has U(x_A) - U(x_C), W alike."""
 
     along: Table
-    """Over the fill ratio: U, kg m, with slope and curvature, and its expanded uncertainty (95 %), kg m:
-    numerical, interpolation and left-out terms."""
+    """Table over the fill ratio of U, kg m, its slope, curvature and expanded uncertainty (95 %), kg m; the
+    last covers numerical and interpolation errors and left-out terms."""
     across: Table | None = None
     """W, kg m, over the fill ratio, in the sense of the rotation; None for a symmetric chamber."""
 
@@ -76,7 +73,7 @@ class CalibratedLaw:
 
     The velocity is continuous in fills and pressure, except where the physics jumps: when a column separates
     at rest, and when a chamber's liquid leaves the port open.  The arithmetic is that of `point`, interpreted
-    for a few points and compiled for many, with the same bits.
+    for a few points and compiled for many, bit for bit alike.
 
     `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
     (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
@@ -87,7 +84,7 @@ class CalibratedLaw:
     name: str
     """ "calibrated"."""
     max_fill_ratio: float
-    """Liquid of the pair as a share of one chamber's volume."""
+    """Liquid of the pair as a fraction of one chamber's volume."""
     ambient_pressure: float
     """Absolute, Pa."""
     chamber_volume: float
@@ -95,15 +92,15 @@ class CalibratedLaw:
     tube_area: float
     """S, m^2."""
     levels: Table
-    """Over the fill ratio: `hydrostatic_pressure` with slope and curvature, Pa."""
+    """Table over the fill ratio of `hydrostatic_pressure`, Pa, with slope and curvature."""
     path: TubePath
-    """Radii of the tube, as pressures."""
+    """Path of the tube, with its radii as pressures."""
     heads: TubeHeads
     """Loss of the tube."""
     moment: CalibratedMoment
     """The moment that goes with this law."""
     gas_factor: float = 1.0
-    """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
+    """Gas pressure on the liquid over that at the point of measurement; all arguments are the latter."""
 
     half_widths: HalfWidths | None = None
     """Expanded uncertainties (95 %); None: half-widths are zero, and no regime is undecided."""
@@ -122,7 +119,7 @@ class CalibratedLaw:
         return numbers[0], pieces[0]
 
     def with_gas_factor(self, gas_factor: float) -> CalibratedLaw:
-        """Copy the law with another gas pressure on the liquid over the one at the place of measurement."""
+        """Copy the law with another `gas_factor`."""
         copy = replace(self, gas_factor=gas_factor)
         numbers, pieces = self.constants
         numbers = numbers.copy()
@@ -131,7 +128,7 @@ class CalibratedLaw:
         return copy
 
     def carrying_pressures(self, table: Table) -> FloatArray:
-        """Under which a flow carries half of the gas over the crest out, none and all, Pa."""
+        """Pressures at which the flow clears half, none and all of the gas from the crest, Pa."""
         return _carrying_pressures(table, self.density, self.path.froude_velocity)
 
     def scalars(self) -> dict[int, float]:
@@ -159,7 +156,7 @@ class CalibratedLaw:
 
     @cached_property
     def _lists(self) -> tuple[list[float], FloatArray, Any]:
-        """Numbers, cells and pieces."""
+        """Numbers, cells and pieces in the form that `answer` reads in plain Python."""
         numbers, pieces = self.constants
         return numbers[: point.PLACES].tolist(), numbers[point.PLACES :], _LazyRows(pieces)
 
@@ -191,7 +188,7 @@ class CalibratedLaw:
             primed=primed,
         )
         shape = conditions.fill_ratio.shape
-        # Copies: arrays that may not be written are another type to compile for.
+        # Copies: read-only arrays would be another type to compile for.
         flat = (
             np.array(conditions.fill_ratio).ravel(),
             np.array(conditions.opposite_fill_ratio).ravel(),
@@ -250,8 +247,8 @@ class CalibratedLaw:
     ) -> tuple[FloatArray, IntArray]:
         """Half-widths of velocities, m/s, and regimes, undecided where the margin lies within its half-width.
 
-        With other liquid opposite than the rest of the pair's, a full tube counts as one under the gas
-        pressure that drives it alike with that.
+        The half-widths are those with the rest of the pair's liquid opposite.  For another opposite fill, a
+        full tube takes those at the wall pressure that gives the same driving pressure.
         """
         assert self.half_widths is not None
         fill, opposite, pressure, primed = conditions
@@ -298,7 +295,7 @@ class CalibratedLaw:
         opposite_fill_ratio: npt.ArrayLike | None = None,
         hump_gas: HumpGas,
     ) -> FloatArray | None:
-        """Gas pressure that lifts the liquid over the crest of an empty tube, whatever gas the law has there.
+        """Gas pressure that lifts liquid over the crest of an unprimed tube, with `hump_gas` there.
 
         Returns: Gauge pressure, Pa, of the broadcast shape; None without a crest.
         Source: `regime.priming_pressure`. For the liquid-ring paper's disc a crest at 31.5 mm gives its 0.54
@@ -312,9 +309,9 @@ class CalibratedLaw:
         return np.asarray(priming_pressure(path, ends)) / self.gas_factor
 
     def holds(self, fill_ratio: float) -> bool | None:
-        """True if a chamber of that fill keeps its liquid against a lower one with the gas off.
+        """True if a chamber keeps its liquid with the gas off, against a chamber with less.
 
-        None: as `TubePath.holds`.
+        None: undecided, as in `TubePath.holds`.
         """
         return self.path.holds(max(float(self.hydrostatic_pressure(fill_ratio)), 0.0))
 
@@ -344,7 +341,7 @@ class CalibratedLaw:
 
 
 def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]:
-    """`CalibratedLaw.constants` of laws with equally many ways and knots, each with a first axis of laws."""
+    """`CalibratedLaw.constants` of laws with equally many ways and knots, stacked on a first axis."""
     siphon, *ways = (Table.stacked(each) for each in zip(*(law.heads.tables for law in laws), strict=True))
     density = np.array([law.density for law in laws])
     froude = np.array([law.path.froude_velocity for law in laws])
@@ -359,9 +356,9 @@ def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]
 
 
 def cleared_laws(laws: Sequence[CalibratedLaw], froude_velocities: Sequence[float]) -> list[CalibratedLaw]:
-    """Copy laws with equally many ways and knots, with other velocities that carry gas out of the crest.
+    """Copy laws with equally many ways and knots, with other Froude velocities.
 
-    Args: `froude_velocities`: of the paths, m/s.
+    Args: `froude_velocities`: `TubePath.froude_velocity` of each copy, m/s.
     """
     density = np.array([law.density for law in laws])
     tables = [Table.stacked(each) for each in zip(*(law.heads.tables for law in laws), strict=True)]
@@ -378,7 +375,7 @@ def cleared_laws(laws: Sequence[CalibratedLaw], froude_velocities: Sequence[floa
 
 
 def _carrying_pressures(table: Table, density: npt.ArrayLike, froude: npt.ArrayLike) -> FloatArray:
-    """Under which flows carry half of the gas over the crest out, none and all, Pa; of a stack, too."""
+    """Pressures at which flows clear half, none and all of the gas from the crest, Pa; also of a stack."""
     low, high = CLEARING
     velocities = np.multiply.outer(froude, [(low + high) / 2, low, high])
     if not np.any(velocities):
@@ -387,7 +384,7 @@ def _carrying_pressures(table: Table, density: npt.ArrayLike, froude: npt.ArrayL
 
 
 class _LazyRows(dict[int, list[float]]):
-    """Rows of an array as lists, each made when it is first looked at: few queries look at few."""
+    """Rows of an array as lists, each made at its first use: a few queries need few of them."""
 
     def __init__(self, pieces: FloatArray) -> None:
         super().__init__()
@@ -399,7 +396,7 @@ class _LazyRows(dict[int, list[float]]):
 
 
 def _carried_by(path: TubePath) -> tuple[float, float]:
-    """Factor of a velocity, and what is taken from it, for how far it carries gas out from over the crest."""
+    """Constants a, s/m, and b of a u - b, the position of a flow's Froude number in `CLEARING`, 0 to 1."""
     low, high = CLEARING
     froude = path.froude_velocity * (high - low)
     return (1.0 / froude, low / (high - low)) if froude else (0.0, -1.0)

@@ -1,4 +1,4 @@
-"""Reading a law back from its file, with every error reported as errors of a scene are."""
+"""Reader of a law's file; its errors are reported together, in the form of a scene's."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _LONGEST_VALUE: Final = 40
 
 
 class _Reader:
-    """Collects the errors of one file while its records are built."""
+    """Reader of one file that collects its errors while it builds the records."""
 
     def __init__(self, file: str) -> None:
         self.file = file

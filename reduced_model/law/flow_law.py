@@ -1,4 +1,4 @@
-"""The one interface of every flow law, and its arguments, checked once and brought to one shape.
+"""Interface of every flow law, and its arguments, checked and broadcast.
 
 A law's file is JSON: records by their type and field names, floats by their shortest exact decimals.
 """
@@ -48,7 +48,7 @@ class Regime(IntEnum):
 
     @property
     def label(self) -> str:
-        """As it stands in JSON: the lower-case name."""
+        """Lower-case name, as in JSON."""
         return self.name.lower()
 
 
@@ -90,7 +90,7 @@ class FlowLaw(Protocol):
 
     @property
     def max_fill_ratio(self) -> float:
-        """Liquid of the pair as a share of one chamber's volume."""
+        """Liquid of the pair as a fraction of one chamber's volume."""
         ...
 
     def evaluate(
@@ -233,7 +233,7 @@ class MomentCurve(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class BalancerModel:
-    """One balancer as the closed loop sees it."""
+    """Model of one balancer for the closed loop."""
 
     name: str
     """ "paper", "calibrated", ..."""
@@ -303,7 +303,7 @@ _OF_BALANCER: Final = ("max_fill_ratio", "moment", "chamber_volume", "tube_area"
 
 @dataclass(frozen=True, kw_only=True)
 class _Velocities:
-    """The velocities of a law, and the two attributes that every law has."""
+    """Flow of a law, its shapes checked, and the two attributes that every law has."""
 
     law: Any
     name: str
@@ -325,14 +325,14 @@ class _Velocities:
 
 
 def lacking(law: object) -> tuple[str, ...]:
-    """Names of what a law does not give of what a balancer needs besides its velocities."""
+    """Names of the attributes that a law lacks and a balancer needs besides its velocities."""
     return tuple(name for name in _OF_BALANCER if not hasattr(law, name))
 
 
 def completed_model(law: object, *, by: CompleteLaw) -> BalancerModel:
-    """The balancer of a law of the caller's own; what it lacks is that of `by`.
+    """Balancer of a law of the caller's own; attributes that the law lacks come from `by`.
 
-    A law that wraps one of the program's does not go by the name of that one.
+    A law that bears the name of a law of the program, as a wrapper may, is named by its class instead.
 
     Raises: TypeError: a law without velocities.
     """

@@ -11,11 +11,11 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HalfWidths:
-    """Expanded uncertainties (95 %) over fill and pressure, linear between nodes and level beyond them.
+    """Expanded uncertainties (95 %) over fill and pressure, linear between nodes and constant beyond.
 
     The opposite chamber holds the rest of the pair's liquid.  The pressure is that of gas and liquid together
-    at the driven chamber's outer wall: columns part, and gas leaves the crest, at nearly the same for all
-    fills.  Where a port is uncovered a half-width steps, and the table goes from one node's to the other's.
+    at the driven chamber's outer wall, because columns separate, and gas leaves the crest, at nearly equal
+    wall pressures for all fills.  Where a port is uncovered a half-width jumps; the table interpolates there.
     """
 
     fill_ratio: FloatArray
@@ -25,8 +25,8 @@ class HalfWidths:
     velocity: FloatArray
     """Half-width of the velocity, m/s, shape (2 n m,): of a tube that is not primed, then of a primed one."""
     margin: FloatArray
-    """Half-width of the pressure that drives a column up to the crest less what a full siphon loses up to
-    there, Pa, likewise; zero without a crest."""
+    """Half-width of the margin over the crest, Pa, in the order of `velocity`: the pressure that drives a
+    column up to the crest less the loss of a full siphon up to it; zero without a crest."""
 
     def at(
         self, fill_ratio: FloatArray, wall_pressure: FloatArray, primed: BoolArray
@@ -44,6 +44,6 @@ class HalfWidths:
 
 
 def _cell(nodes: FloatArray, x: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Number of the interval that holds x, or of the nearest one, and the way through it from 0 to 1."""
+    """Index of the interval that holds x, or of the nearest one, and the position in it from 0 to 1."""
     cell = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
     return cell, np.clip((x - nodes[cell]) / (nodes[cell + 1] - nodes[cell]), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""The calibrated law made: of a chamber and a tube with uncertainties, or of many scenes without."""
+"""Construction of calibrated laws: of one chamber and tube with uncertainties, of many scenes without."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 
 _SYMMETRIC_ANGLE_RAD: Final = 1e-4
-"""Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
+"""Angle of a moment below which a chamber counts as symmetric, rad: meshes are never quite symmetric."""
 
 
 def calibrated_law(
     *, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads, varied: bool = True
 ) -> CalibratedLaw:
-    """Put the flow law together.
+    """Assemble the flow law.
 
-    Args: `varied`: whether it has half-widths.
+    Args: `varied`: true if the law gets half-widths.
 
     Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
     """
@@ -74,7 +74,7 @@ def side_laws(scene: Scene) -> tuple[CalibratedLaw, ...]:
     laws = nominal_laws(sides, gravity=False, waves=waves)
     if not scene.gas.pressure:
         return laws
-    # A side's gas pressure is reached by its factor on the pressure of the scene.
+    # The gas pressure of a side becomes a factor on that of the scene.
     factors = [
         law.gas_factor * side.gas.pressure / scene.gas.pressure for law, side in zip(laws, sides, strict=True)
     ]
@@ -84,9 +84,9 @@ def side_laws(scene: Scene) -> tuple[CalibratedLaw, ...]:
 def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
     """The calibrated law without finite elements and without uncertainties, in a few milliseconds.
 
-    Its velocities are within 1e-4 of those of `calibrated_law`, by fewer nodes of the heads; half-widths are
-    zero.  For the many scenes that differ from a calibrated one in their values, such as those of a fit.
-    Args: `gravity`: whether the chamber's values hold gravity, as `calibrate` decides for the scene.
+    Its velocities differ by at most 1e-4 from those of `calibrated_law`, because the heads have fewer nodes;
+    half-widths are zero.  Meant for many scenes that differ from a calibrated one in values, as in a fit.
+    Args: `gravity`: true if the chamber's values include gravity, as `calibrate` decides for the scene.
     Raises: ValueError: bends that do not fit into the tube.
     Source: Eqs. 13 to 18 of the liquid-ring paper; `RingValues.of`, `TubeHeads.nominal`.
     """
@@ -94,7 +94,7 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
 
 
 Rings: TypeAlias = MutableMapping[Hashable, RingValues]
-"""Values of chambers under gravity, by all that they depend on."""
+"""Values of chambers under gravity by disc, liquid density, rotor speed and environment."""
 
 
 def nominal_laws(
@@ -104,10 +104,10 @@ def nominal_laws(
     waves: Sequence[float] | None = None,
     rings: Rings | None = None,
 ) -> tuple[CalibratedLaw, ...]:
-    """`nominal_law` of many scenes; those that differ in numbers alone, and not in their fills, at once.
+    """Nominal laws of many scenes; those that differ in numbers alone, but not in fills, are made together.
 
-    Args: `waves`: error of each one's levels by what no model holds, in standard deviations. `rings`: of
-        laws made before, to which those that are lacking are added.
+    Args: `waves`: error of each scene's levels by unmodelled effects, in standard deviations. `rings`: values
+        of chambers from earlier calls; missing ones are added.
     """
     rings = {} if rings is None else rings
     laws: dict[int, CalibratedLaw] = {}
@@ -121,7 +121,7 @@ def nominal_laws(
 def _nominal(
     scenes: Sequence[Scene], rings: Rings, *, gravity: bool, waves: Sequence[float] | None
 ) -> list[CalibratedLaw]:
-    """Laws of scenes that are alike, with their constants, which are found faster together."""
+    """Laws of scenes that differ in numbers alone, with their constants, which is faster than one by one."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
     heads = TubeHeads.nominal(designs)
     if gravity:
@@ -179,9 +179,9 @@ def _assembled_law(
 
 
 def _across_table(scene: Scene, fills: FloatArray) -> Table | None:
-    """W(x), the moment across a chamber's middle, kg m; None where it turns moments by next to nothing.
+    """Moment across a chamber's middle, W(x), kg m; None where it turns the moment by a negligible angle.
 
-    Gravity is left out, whose mean changes U and W alike in the first place.
+    Gravity is left out, because its mean changes U and W essentially alike.
     Args: `fills`: nodes, equally spaced from zero.
     Source: rho int y dV over the liquid, times the scene's factor on moments.
     """

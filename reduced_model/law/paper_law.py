@@ -54,10 +54,10 @@ class PaperMoment:
 class PaperLaw:
     """Eq. 19 as a flow law: u = sqrt(2/(rho (k+1)) [p0 + rho omega^2 V (x_A - x_C)/(B theta)]).
 
-    With the gas on and the bracket positive the tube is a full siphon; otherwise it is blocked, for the paper
-    has the column part with the gas off.  That takes a crest which holds the liquid: from a chamber whose
-    level is beyond `return_pressure` the same equation, reversed, lets it run back.  The paper states no
-    uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
+    With the gas on and the bracket positive the tube is a full siphon; otherwise it is blocked, because in
+    the paper the column separates when the gas is off.  This needs a crest that holds the liquid: from a
+    chamber with a level above `return_pressure` liquid runs back by the reversed equation.  The paper states
+    no uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
 
     `table()` holds `velocity_squared_per_pressure` 2/(rho (k+1)), m^3/kg, and `pressure_per_fill_difference`
     rho omega^2 V/(B theta), Pa: u^2 = the first times (p0 + the second times (x_A - x_C)).
@@ -78,14 +78,14 @@ class PaperLaw:
     drag_coefficient: float
     """k."""
     max_fill_ratio: float
-    """Liquid of the pair as a share of one chamber's volume; the paper's 0.5."""
+    """Liquid of the pair as a fraction of one chamber's volume; 0.5 in the paper."""
     ambient_pressure: float
     """Absolute, Pa."""
     moment: PaperMoment
     """The moment that goes with this law."""
     return_pressure: float | None = None
     """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa; None:
-    never, as the paper has it."""
+    no liquid returns, as in the paper."""
 
     def __repr__(self) -> str:
         return law_text(self)
@@ -113,7 +113,7 @@ class PaperLaw:
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
-        """Flow by Eq. 19; at and below the stall pressure and with the gas off blocked, or reverse."""
+        """Flow by Eq. 19; blocked or reverse up to the stall pressure and with the gas off."""
         conditions = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
@@ -139,7 +139,7 @@ class PaperLaw:
         )
 
     def holds(self, fill_ratio: float) -> bool:
-        """True if a chamber of that fill keeps its liquid against a lower one with the gas off."""
+        """True if a chamber keeps its liquid with the gas off, against a chamber with less."""
         level = self.pressure_per_fill_difference * fill_ratio
         return self.return_pressure is None or level <= self.return_pressure
 
@@ -184,7 +184,7 @@ def paper_law(scene: AnyScene) -> PaperLaw:
 
 
 def paper_model(scene: Scene) -> BalancerModel:
-    """The balancer as the paper has it: Eq. 19, V of Eq. 4, lambda = 72 mm per transferred mass.
+    """Balancer of the paper: Eq. 19, V of Eq. 4, lambda = 72 mm per transferred mass.
 
     Source: sections 3 and 5 of the liquid-ring paper.
     """

@@ -1,4 +1,4 @@
-"""Half-widths of the flow from laws at both sides of each uncertainty, and the table of them."""
+"""Half-widths of the flow, from laws with each uncertain input at its low and its high side, as a table."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ringbalance.scene.errors import larger
 from ringbalance.scene.registry import registered
 
 _FILLS: Final = 25
-"""Closer to the ends, where a port is uncovered."""
+"""Number of fills, denser towards the ends, where a port is uncovered."""
 _PRESSURES: Final = 41
-"""Evenly up to `_HIGHEST`, then `_DOUBLINGS` more, each twice the one before."""
+"""Number of even pressures up to `_HIGHEST`; `_DOUBLINGS` more follow, each twice the one before."""
 _HIGHEST: Final = 2.0
-"""Highest even pressure over the largest of gas pressure, the crest's column and a full chamber's level."""
+"""Ratio of the highest even pressure to the largest of gas pressure, D_m and level of a full chamber."""
 _DOUBLINGS: Final = 4
 _NEAR: Final = np.concatenate(
     [-np.geomspace(0.1, 3e-4, 6), [0.0, 3e-4, 1e-3, 2e-3], np.linspace(4e-3, 0.08, 24)]
 )
-"""Distances of further nodes from the crest's column, over the highest even pressure; most where gas is
-carried out."""
+"""Distances of further nodes from D_m, over the highest even pressure; densest where the flow carries gas
+out."""
 _DIGITS: Final = 4
 """Significant digits of a half-width in the table."""
 
@@ -33,7 +33,7 @@ _DIGITS: Final = 4
 def half_width_table(laws: Sequence[CalibratedLaw], *, gas_pressure: float) -> HalfWidths:
     """Tabulate `half_widths_of` over fill and pressure.
 
-    Args: `gas_pressure`: the scene's, Pa, around which the table is finest.
+    Args: `gas_pressure`: the scene's, Pa; the even pressures reach at least twice as high.
     """
     law, top = laws[0], laws[0].max_fill_ratio
     crest, full = law.path.column_pressure, float(law.hydrostatic_pressure(top))
@@ -59,13 +59,13 @@ def half_widths_of(
 ) -> FloatArray:
     """Half-widths of the velocity, m/s, and of the margin over the crest, Pa, shape (2, ...).
 
-    The larger change by each uncertainty counts, all as the root of the sum of squares.
+    Each uncertainty counts with the larger of its two changes; they combine as root sum of squares.
     Args: `laws`: the nominal one, then those at the low and the high side of each uncertainty in turn.
     Source: ASME V&V 20-2009, one input at a time.
     """
     answer_each = registered("function", "answer_each")
     shape = np.shape(fill_ratio)
-    # Copies: compiled code is made for arrays that may be written.
+    # Copies: the code is compiled for writeable arrays.
     conditions = [np.array(each).ravel() for each in (fill_ratio, opposite, gas_pressure, primed)]
     query, size = np.zeros(point.PLACES_OF_QUERY), conditions[0].size
     answers = np.empty((len(laws), 2, *shape))

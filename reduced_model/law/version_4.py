@@ -1,4 +1,4 @@
-"""Half-widths of a law's file of version 4, which stood beside its numbers: as a table of version 5."""
+"""Conversion of the half-widths in a law's file of version 4 to the table of version 5."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ringbalance.scene.arrays import FloatArray
 
 _HEADS: Final = ("siphon", "hump", "return_hump")
 _LEAST_HEAD_FACTOR: Final = 0.1
-"""Least factor on a head by an error."""
+"""Smallest factor on a head by an error."""
 
 
 def split(document: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The document of a calibrated law as version 5 has it, and what it held of half-widths.
+    """Document of a calibrated law in the form of version 5, and the half-widths that it held.
 
     Raises: KeyError, TypeError, ValueError: a document that is no such law.
     """
@@ -35,19 +35,19 @@ def split(document: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     law["heads"] = dict(law["heads"])
     for name in _HEADS:
         if (table := law["heads"].get(name)) is not None:
-            # Behind the loss's half-width stood that of the share, in the whole tube's table.
+            # In the whole tube's table the half-width of the share follows that of the loss.
             law["heads"][name], held[name] = _without(table, slice(3, 5))
     return law, held
 
 
 def _without(table: Mapping[str, Any], numbers: slice) -> tuple[dict[str, Any], FloatArray]:
-    """A table without some columns, and the first of these."""
+    """Table without some columns, and the first column removed."""
     columns = np.reshape(np.array(table["columns"], dtype=np.float64), (-1, len(table["knots"])))
     return {**table, "columns": np.delete(columns, numbers, axis=0).ravel().tolist()}, columns[numbers][0]
 
 
 def half_widths(law: CalibratedLaw, held: Mapping[str, Any], variants: Sequence[CalibratedLaw]) -> HalfWidths:
-    """The table, by laws at both sides of all that the file held."""
+    """Table of half-widths, from laws at both sides of every uncertainty in the file."""
     sides = [replace(law, path=path) for path in _paths(law.path, held)]
     levels, scaled = law.levels, {"density": held["relative_density"], "speed": 2 * held["relative_speed"]}
     moved = (levels.with_column(0, levels.column(0) + sign * held["levels"]) for sign in (-1, 1))
@@ -71,7 +71,7 @@ def half_widths(law: CalibratedLaw, held: Mapping[str, Any], variants: Sequence[
 
 
 def _paths(path: TubePath, held: Mapping[str, Any]) -> Iterator[TubePath]:
-    """Both sides of what acts at the crest alone."""
+    """Paths at both sides of each uncertainty that acts at the crest alone."""
     if not path.crest:
         return
     for name in ("hump_pressure", "vapour_pressure"):
@@ -84,7 +84,7 @@ def _paths(path: TubePath, held: Mapping[str, Any]) -> Iterator[TubePath]:
 
 
 def _lost(way: Table, factor: FloatArray) -> Table:
-    """A table of heads times a factor at each knot."""
+    """Table of heads multiplied by a factor at each knot."""
     root = np.maximum(factor, _LEAST_HEAD_FACTOR) ** 0.125
     powers = [4, 5, 6, *(number % 2 for number in range(way.count - 3))]
     columns = [way.column(number) / root**power for number, power in enumerate(powers)]

@@ -1,4 +1,4 @@
-"""The compact law at many points, and where its inverse looks, compiled; with the bits of plain Python."""
+"""The compact law at many points, and search tables of its inverse; compiled, bit for bit as in Python."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def answer_each(
     w: FloatArray,
     answers: tuple[FloatArray, IntArray, BoolArray, FloatArray],
 ) -> None:
-    """Answer n queries of fill, opposite fill, pressure and primed, with `w` to work in.
+    """Answer n queries of fill, opposite fill, pressure and primed, with `w` as workspace.
 
     Args: `answers`: velocity, regime, primed afterwards, and margin over the crest.
     """

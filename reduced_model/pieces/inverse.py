@@ -1,6 +1,6 @@
-"""Pressure from velocity, and slopes, which an accelerated column needs of the law beyond a query.
+"""Pressure from velocity, and slopes: what an accelerating column needs of the law beyond a query.
 
-Plain numbers, interpreted and compiled from one source, of the numbers `c` and pieces `p` of `point`.
+Plain arithmetic, interpreted and compiled from one source, on the numbers `c` and pieces `p` of `point`.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.both_ways import both_ways
 
 _NEWTON_STEPS: Final = 60
-"""At the most; each that leaves the interval known to hold the root is replaced by half of that."""
+"""Largest number of steps; a step that leaves the bracket of the root is replaced by a bisection."""
 _CONVERGED: Final = 1e-6
-"""Change over the length of a piece after which Newton's next one would be next to round-off."""
+"""Newton step, over the length of a piece, after which the next one would be near round-off."""
 ROOT_CELLS: Final = 512
 ROOT_HEAD: Final = 4
 """Numbers that stand before the cells."""
@@ -59,7 +59,7 @@ def growth(p: Pieces, row: int, t: float) -> float:
 
 @both_ways
 def level_with_slope(c: Law, p: Pieces, fill: float) -> tuple[float, float]:
-    """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; it goes on straight beyond the fills."""
+    """Hydrostatic pressure of a chamber's liquid, Pa, and its slope; linear beyond the range of fills."""
     x = max(0.0, min(fill, c[LARGEST_FILL]))
     row = int(c[PLACES + int(x * c[LEVEL_SCALE])])
     t = x - p[row][END]
@@ -80,14 +80,14 @@ def velocity_under(c: Law, p: Pieces, way: int, pressure: float) -> float:
 
 @both_ways
 def set_roots(c: Law, p: Pieces, way: int, cells: Filled, roots: Sequence[Filled] | FloatArray) -> None:
-    """Write where `root_of_velocity` looks on a way, and from what it begins.
+    """Write the search cells and starting values of `root_of_velocity` on a way.
 
     Args:
-        cells: cells of equal length in the fourth root of the velocity; cells per fourth root, the place of
-            zero, the smallest and the largest velocity, then the piece at the start of each cell; shape
+        cells: cells of equal length in the fourth root of the velocity: cells per unit of it, position of
+            zero, smallest and largest velocity, then the piece at the start of each cell; shape
             (`ROOT_PLACES`,).
-        roots: by the rows of `p`, the eighth root of the pressure over the fourth root of the velocity,
-            cubic by the values and slopes at both ends of the piece; shape (rows, `WIDTH_OF_ROOT`).
+        roots: eighth root of the pressure as a cubic in the fourth root of the velocity, in the rows of `p`,
+            from values and slopes at both ends of each piece; shape (rows, `WIDTH_OF_ROOT`).
     """
     s = sqrt(sqrt(sqrt(p[way][SLOWEST])))
     first = int(c[PLACES + int(s * p[way][SCALE] + p[way][CELLS])])

@@ -18,15 +18,15 @@ _EDGE: Final = 1e-9
 
 
 CELLS: Final = 1024
-"""Cells of a way in a law inside the program."""
+"""Number of cells of a way in a law that the program itself evaluates."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LawRows:
-    """The law's numbers and rows of pieces, as far as they are; of a stack of laws along a first axis."""
+    """Numbers and rows of pieces of a law under construction; a stack of laws has a first axis."""
 
     ways: FloatArray
-    """Rows that say where velocities are found, shape (..., ways, `WIDTH_OF_ROW`)."""
+    """Rows that locate the pieces of each way's velocities, shape (..., ways, `WIDTH_OF_ROW`)."""
     edge: float = _EDGE
     """Distance from the edge of a cell, over its length, below which the next cell counts."""
     numbers: list[FloatArray]
@@ -44,22 +44,22 @@ class LawRows:
         )
 
     def add(self, *columns: FloatArray) -> None:
-        """Pieces by what stands in their rows, each of shape (..., powers, pieces)."""
+        """Append pieces by the columns of their rows, each of shape (..., powers, pieces)."""
         table = np.swapaxes(np.concatenate(columns, axis=-2), -1, -2)
         rows = np.zeros((*table.shape[:-1], WIDTH_OF_ROW))
         rows[..., : table.shape[-1]] = table
         self.pieces.append(rows)
 
     def add_cells(self, knots: FloatArray, *, cells: int) -> tuple[FloatArray, FloatArray]:
-        """Cells for the pieces that are added next, equally long, that say at which piece to begin looking.
+        """Append cells of equal length for the pieces added next; each holds the piece where a search begins.
 
-        Returns: Cells for one of x, and the offset of x = 0, counted from the first of all cells.
+        Returns: Cells per unit of x, and the position of x = 0, counted from the first of all cells.
         """
         start, end = knots[..., 0], knots[..., -1]
         offset = sum(each.shape[-1] for each in self.numbers[1:])
         first = sum(each.shape[-2] for each in (self.ways, *self.pieces))
         scale = np.asarray(cells / (end - start))
-        # What is next to an edge counts as beyond it.
+        # An x next to an edge counts as beyond it.
         beyond = np.linspace(start, end, cells + 1, axis=-1) + (2.0 * self.edge / scale)[..., None]
         self.numbers.append(first + pieces_of(knots, beyond).astype(np.float64))
         return scale, offset - start * scale + self.edge
@@ -73,9 +73,9 @@ class LawRows:
         *,
         cells: int = CELLS,
     ) -> None:
-        """Pieces of a way: velocity over the root of a pressure, along the eighth root of that.
+        """Append the pieces of a way, u/sqrt(p) over the eighth root of the pressure p.
 
-        Args: `ratios`: shape (..., 6, pieces). `more`: behind the cells in the way's own row, numbers of the
+        Args: `ratios`: shape (..., 6, pieces). `more`: numbers that follow the cells in the way's row, of the
             law or of the laws.
         """
         ends = []
@@ -92,7 +92,7 @@ class LawRows:
         self.add(knots[..., None, 1:], ratios)
 
     def add_levels(self, levels: Table) -> None:
-        """Hydrostatic pressure over the fill, the first table; cells end at its equally spaced knots."""
+        """Append the hydrostatic pressure over the fill, as first table; cells end at its even knots."""
         cells = levels.knots.shape[-1] - 1
         self.numbers[0][..., point.LEVEL_SCALE] = self.add_cells(levels.knots, cells=cells)[0]
         self.add(levels.knots[..., None, 1:], levels.quintics)
@@ -100,13 +100,13 @@ class LawRows:
     def add_way(
         self, way: int, table: Table, density: npt.ArrayLike, *, more: Sequence[npt.ArrayLike] | FloatArray
     ) -> None:
-        """A table over the eighth root of a head, of a liquid's density, kg/m^3."""
+        """Append a table over the eighth root of a head, for a liquid's density, kg/m^3."""
         root, half = _powers_of(density, 0.125), _powers_of(density, 0.5)
         ratios = table.quintics / half[..., None, None] / _powers_of(root, np.arange(6))[..., None]
         self.add_ratios(way, root[..., None] * table.knots, ratios, more)
 
     def add_shares(self, table: Table, density: npt.ArrayLike) -> None:
-        """Beside the pieces of the whole tube: from column 3 on, see `TubeHeads`."""
+        """Append the shares of the whole tube's pieces, from column 3 on of its table; see `TubeHeads`."""
         powers = _powers_of(density, 0.125 * np.arange(3))[..., None]
         length = np.diff(table.knots)
         shares = []
@@ -118,7 +118,7 @@ class LawRows:
         self.add(*shares)
 
     def arrays(self, scalars: Mapping[int, npt.ArrayLike]) -> tuple[FloatArray, FloatArray]:
-        """Numbers, with those of the law or laws at their places, and pieces, (..., rows, `WIDTH_OF_ROW`)."""
+        """Numbers, with `scalars` at their indices, and pieces of shape (..., rows, `WIDTH_OF_ROW`)."""
         numbers = np.concatenate(self.numbers, axis=-1)
         for index, value in scalars.items():
             numbers[..., index] = value
@@ -126,7 +126,7 @@ class LawRows:
 
 
 def _powers_of(bases: npt.ArrayLike, exponents: npt.ArrayLike) -> FloatArray:
-    """Powers of each base, of their shape and that of the exponents, with the bits of one base alone."""
+    """Powers of each base, shape of bases and exponents, bit for bit as of each base alone."""
     bases = np.asarray(bases, dtype=np.float64)
     powers = [each**exponents for each in bases.ravel().tolist()]
     return np.reshape(powers, (*bases.shape, *np.shape(exponents)))

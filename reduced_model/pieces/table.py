@@ -1,4 +1,4 @@
-"""Quantities of one argument in pieces between knots that stand where a tolerance asks for them."""
+"""Functions of one argument in pieces between knots, which a tolerance places."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, clipped
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Table:
-    """Columns over knots: values with slopes and curvatures, or values that are straight between knots.
+    """Columns over knots: values with slopes and curvatures, or values that are linear between knots.
 
-    A stack of tables has its tables on a first axis; of such, columns and coefficients alone are asked for.
+    A stack of tables has them on a first axis and gives columns and coefficients only.
     """
 
     knots: FloatArray
@@ -86,7 +86,7 @@ class Table:
         return piece, np.asarray(inside - self.knots[piece + 1])
 
     def quintic(self, x: npt.ArrayLike) -> FloatArray:
-        """The first column at any x, level beyond the ends."""
+        """The first column at any x, constant beyond the ends."""
         piece, t = self.locate(x)
         c = self.quintics[:, piece]
         return np.asarray(c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5])))))
@@ -98,18 +98,18 @@ class Table:
         return np.asarray(c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5])))))
 
     def cubic(self, x: npt.ArrayLike, number: int) -> FloatArray:
-        """A column with slopes behind it at any x, level beyond the ends."""
+        """Column followed by its slopes, at any x, constant beyond the ends."""
         piece, t = self.locate(x)
         c = self.cubics(number)[:, piece]
         return np.asarray(c[0] + t * (c[1] + t * (c[2] + t * c[3])))
 
     def straight(self, x: npt.ArrayLike, number: int) -> FloatArray:
-        """A column at any x, level beyond the ends."""
+        """Column at any x, linear between knots and constant beyond the ends."""
         return np.asarray(np.interp(np.asarray(x, dtype=np.float64), self.knots, self.column(number)))
 
 
 def pieces_of(knots: FloatArray, x: npt.ArrayLike) -> IntArray:
-    """Pieces that hold some x, each with its end; of a stack of knots, the x of each on a first axis."""
+    """Piece that holds each x, its end included; for a stack of knots, x has a first axis too."""
     if knots.ndim == 1:
         return np.asarray(np.searchsorted(knots[1:-1], x))
     return np.stack([np.searchsorted(*each) for each in zip(knots[:, 1:-1], np.asarray(x), strict=True)])
@@ -129,17 +129,20 @@ def _polynomial(h: Any, value: tuple[Any, Any], *derivatives: tuple[Any, Any]) -
 
 
 def spline(x: npt.ArrayLike, y: npt.ArrayLike) -> BSpline:
-    """Through samples: of degree five, of fewer than six one polynomial. Source: not-a-knot, O(step^6)."""
+    """Interpolating spline of degree five, for fewer than six samples one polynomial.
+
+    Source: not-a-knot, O(step^6).
+    """
     return make_interp_spline(x, y, k=min(5, np.size(x) - 1))
 
 
 def smooth_table(x: FloatArray, y: npt.ArrayLike) -> Table:
-    """Values, slopes and curvatures of `spline`, with every sample a knot."""
+    """Table of values, slopes and curvatures of `spline`, with every sample a knot."""
     return smooth_tables(x, np.asarray(y, dtype=np.float64)[:, None])[0]
 
 
 def smooth_tables(x: FloatArray, y: FloatArray) -> list[Table]:
-    """`smooth_table` of many quantities at once. Args: `y`: shape (samples, quantities)."""
+    """Make the `smooth_table` of many quantities. Args: `y`: shape (samples, quantities)."""
     # A large common value would cost digits.
     curve = spline(x, y - y[0])
     columns = np.concatenate([y, curve(x, nu=1), curve(x, nu=2)])
@@ -148,14 +151,14 @@ def smooth_tables(x: FloatArray, y: FloatArray) -> list[Table]:
 
 @dataclass(frozen=True, kw_only=True)
 class TableColumn:
-    """A quantity over samples, with derivatives by the table's x as far as its pieces need them."""
+    """Quantity at samples, with the derivatives by x that its pieces need."""
 
     value: FloatArray
     """Shape (samples,)."""
     allowed: FloatArray
     """Largest error, shape (samples,)."""
     derivatives: tuple[FloatArray, ...] = ()
-    """Slope, or slope and curvature; none: straight between the knots."""
+    """Slope, or slope and curvature; none: linear between the knots."""
 
     @property
     def stored(self) -> tuple[FloatArray, ...]:
@@ -178,9 +181,9 @@ _LONGEST_PIECE: Final = 128
 
 
 def knots_of(x: FloatArray, columns: Sequence[TableColumn], *, shortest: int = 1) -> IntArray:
-    """Samples at which pieces meet, each halved until its errors are allowed or it is as short as can be.
+    """Samples at which pieces meet; each is halved until its errors are allowed or it has the least length.
 
-    Args: `x`: a power of two samples and one more, at least. `shortest`: samples from end to end of a piece.
+    Args: `x`: 2^n + 1 samples. `shortest`: samples from end to end of such a piece.
     """
     length = min(_LONGEST_PIECE * shortest, x.size - 1)
     starts, knots = np.arange(0, x.size - 1, length), [np.array([x.size - 1])]

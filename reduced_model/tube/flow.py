@@ -1,4 +1,4 @@
-"""Flow through the tubes of one scene or of many designs at once, each velocity found on the loss itself."""
+"""Flow through the tubes of one scene or of many designs, each velocity solved from the loss itself."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ from ringbalance.scene.uncertain import NORMAL_95
 
 Radius = TypeVar("Radius", float, FloatArray)
 _LEAST, _MOST = np.log(1e-9), np.log(1e6)
-"""ln u between which velocities are looked for, u in m/s."""
+"""Bounds of ln u for the search of velocities, u in m/s."""
 _NODES: Final = np.linspace(-8.0, 0.2, 22)
-"""ln u of the nodes from which roots start, from that of a loss of all the pressure in one velocity head."""
+"""ln u of the nodes for starting values, relative to the velocity whose head takes the whole pressure."""
 _COMMON: Final = 18
-"""Number of the node about which most velocities lie."""
+"""Index of the node near which most velocities lie."""
 _SLOPES: Final = (0.3, 5.0)
-"""d ln(head)/d ln u, between which steps are taken."""
+"""Smallest and largest d ln(head)/d ln u at the nodes; the former also of a step of the search."""
 _STEEPEST_SLOPE: Final = 50.0
-"""Largest d ln(head)/d ln u within a transition, of a step of the search."""
+"""Largest d ln(head)/d ln u of a step of the search, within a transition."""
 _HEAD_ERROR: Final = 1e-6
-"""Relative error of a head that belongs to a velocity, of which the last step leaves a thousandth."""
+"""Relative error of a head below which one last step follows, which leaves about a thousandth of it."""
 _LEAST_STEP: Final = 1e-14
 _STEPS: Final = 80
 
@@ -53,7 +53,7 @@ def tube_path(scene: Scene) -> TubePath:
     hump, error = scene.tube.hump_radius, scene.tube.model_error
     crest = 0.0 if hump is None else hump
     froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
-    # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
+    # With dissolved gas the uncertainty spans the whole range of the cavity's pressure.
     released = plain(np.clip(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0, 1.0))
     return TubePath(
         density=scene.liquid.density,
@@ -84,7 +84,7 @@ def column_radius(*, scene: Scene, pressure: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Inverse:
-    """ln u over ln of a head, in cubic pieces between nodes, for a start near a root; shape (nodes, n)."""
+    """ln u over ln(head), in cubic pieces between nodes, for starting values of roots; shape (nodes, n)."""
 
     log_velocity: FloatArray
     log_head: FloatArray
@@ -102,11 +102,11 @@ class _Inverse:
         return _Inverse(**{name: table[:, rows] for name, table in vars(self).items()})
 
     def through_head(self, node: int, log_head: FloatArray) -> _Inverse:
-        """Every head times what gives another one at a node."""
+        """Scale the heads of each design by the factor that gives `log_head` at a node."""
         return replace(self, log_head=self.log_head + (log_head - self.log_head[node]))
 
     def __call__(self, log_head: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """ln u, and the slope of ln of the head there."""
+        """ln u and d ln(head)/d ln u at a head."""
         last = self.log_head.shape[0] - 2
         cell = np.clip(np.count_nonzero(self.log_head < log_head, axis=0) - 1, 0, last)
         column = np.arange(log_head.size)
@@ -137,21 +137,21 @@ def _log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Effects on the chambers' liquid that no model holds, as a factor on its levels."""
+    """Unmodelled effects on the chambers' liquid, as a factor on its levels."""
 
     fill_ratio: FloatArray
-    """Nodes."""
+    """Fill ratios of the nodes of `share`."""
     share: FloatArray
-    """Expanded uncertainty (95 %) there, relative."""
+    """Relative expanded uncertainty (95 %) of the level at each node."""
     deviation: FloatArray
-    """In standard deviations, of n designs."""
+    """Error of each of n designs, in standard deviations."""
 
     def take(self, rows: IntArray) -> Waves:
         """Select the waves of some of the designs."""
         return replace(self, deviation=self.deviation[rows])
 
     def factor(self, fill_ratio: FloatArray) -> FloatArray:
-        """On the level at fills whose last axis runs over the designs."""
+        """Factor on the level at fills, whose last axis runs over the designs."""
         share = np.interp(fill_ratio, self.fill_ratio, self.share)
         return 1.0 + self.deviation / NORMAL_95 * share
 
@@ -168,7 +168,7 @@ class TubeFlow:
     to_crest: _Inverse | None = None
     """Velocity over the head from the driven chamber to the lowest pressure at a crest; None without one."""
     waves: Waves | None = field(default=None, kw_only=True)
-    """Error of the chambers' levels; None: none is supposed."""
+    """Error of the chambers' levels; None: no error."""
     curve: Callable[[FloatArray], FloatArray] | None = field(default=None, kw_only=True)
     """Level over the fill ratio with gravity, Pa, of a single scene; None: the closed form."""
 
@@ -180,7 +180,7 @@ class TubeFlow:
         waves: Waves | None = None,
         curve: Callable[[FloatArray], FloatArray] | None = None,
     ) -> TubeFlow:
-        """Make the tubes of designs, with the nodes that roots start from."""
+        """Make the tubes of designs, with the nodes for starting values of roots."""
         scene, path, factor = designs.scene, tube_path(designs.scene), pressure_factor(designs.scene)
         highest = factor * np.abs(scene.gas.pressure) + chamber_pressure(
             scene=scene, fill_ratio=scene.disc.max_fill_ratio
@@ -191,7 +191,7 @@ class TubeFlow:
         return cls(designs, path, factor, *heads, waves=waves, curve=curve)
 
     def of_neighbours(self, designs: Designs, rows: IntArray) -> TubeFlow:
-        """Make the tubes of designs that differ little from some of these, whose tables roots start from."""
+        """Make the tubes of designs that differ little from some of these, with starting values by these."""
         log_velocity = self.between.log_velocity[_COMMON, rows]
         tables = (self.between, self.to_crest) if self.to_crest else (self.between,)
         pairs = zip(tables, _log_heads(designs.scene, log_velocity), strict=True)
@@ -211,7 +211,7 @@ class TubeFlow:
     def level(self, fill_ratio: FloatArray) -> FloatArray:
         """Hydrostatic pressure of a chamber's liquid at the outer radius, Pa, with the error of `waves`."""
         if self.curve is not None:
-            # Rounding of an empty chamber's would leave a port on the wall open.
+            # A level of an empty chamber rounded below zero would leave a port on the wall open.
             return np.maximum(self.curve(fill_ratio), 0.0)
         level = chamber_pressure(scene=self.designs.scene, fill_ratio=fill_ratio)
         return level if self.waves is None else level * self.waves.factor(fill_ratio)
@@ -241,7 +241,7 @@ class TubeFlow:
     def velocity(
         self, pressure: FloatArray, where: BoolArray, *, to_crest: bool, exactly: bool = True
     ) -> FloatArray:
-        """Velocity that belongs to a fall of pressure, zero where the second argument is false, m/s."""
+        """Velocity under a pressure difference, m/s; zero where the second argument is false."""
         head, inverse = pressure / self.path.density, self.to_crest if to_crest else self.between
         assert inverse is not None
         flows = where & (head > 0)
@@ -282,11 +282,11 @@ def growing_root(
     slope: FloatArray,
     where: BoolArray,
 ) -> FloatArray:
-    """Arguments at which growing functions reach values, by safeguarded secant steps.
+    """Roots x of growing functions, y(x) = `target`, by safeguarded secant steps.
 
-    Args: `function_of`: y(x) of some rows, by number. `slope`: dy/dx about `start`. `where`: rows that count.
-    Returns: x after the step that follows a miss of y below 1e-6, which leaves about a thousandth of it;
-        each row by itself; elsewhere `start`.
+    Args: `function_of`: y(x) of rows with some numbers. `slope`: dy/dx near `start`. `where`: rows to solve.
+    Returns: x one step after the error of y falls below 1e-6, with about a thousandth of that error left;
+        every row independent of the others; `start` where `where` is false.
     """
     x, rows = start.copy(), np.flatnonzero(where)
     low, high = np.full(start.shape, _LEAST), np.full(start.shape, _MOST)
@@ -307,7 +307,7 @@ def growing_root(
         left = (np.abs(miss) > _HEAD_ERROR) & (high[rows] - low[rows] > _LEAST_STEP)
         before[rows], missed[rows] = point, miss
         following = np.where(inside, following, np.where(left, (low[rows] + high[rows]) / 2, point))
-        # A row that has arrived stays, whatever others still do.
+        # A converged row stays, while others still step.
         x[rows] = np.where(done[rows], point, following)
         done[rows] |= ~left
         left = ~done[rows]

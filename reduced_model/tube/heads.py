@@ -1,4 +1,4 @@
-"""The tube's loss as the law holds it: velocity over the root of a head, along the head's eighth root."""
+"""Tables of the tube's loss for the law: u/sqrt(head) over the eighth root of the head."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.toml import toml_text
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
-"""m/s; below, the flow creeps and the head is proportional to u; above, to its square."""
+"""Range of the tables, m/s: below, the flow creeps and the head is proportional to u; above, to u^2."""
 _SAMPLES: Final = 2049
-"""At which knots may stand; more sharpen nothing but the bend where the flow turns turbulent."""
+"""Number of possible knots; more would only sharpen the kink where the flow turns turbulent."""
 _NOMINAL_KNOTS: Final = 257
 SHARE, BACK_SHARE = 3, 5
-"""Columns of the whole tube's table behind the ratio with its derivatives: the share and its slope, and the
-same of the way back."""
+"""Columns of the whole tube's table with the share lost up to the crest, each followed by its slope: from the
+driven chamber, and from the opposite one."""
 _OF_TOLERANCE: Final = 1e-7
-"""Largest relative error of a velocity between knots, of the scene's tolerance."""
+"""Largest relative error of a velocity between knots, over the scene's tolerance."""
 _FINEST_TOLERANCE: Final = 1e-5
-"""Tolerance below which knots do not become more."""
+"""Tolerance below which the number of knots stays the same."""
 _OF_SHARES: Final = 1000.0
-"""Times that of a share, which decides on nothing but the regime."""
+"""Allowed relative error of a share over that of a velocity: a share decides on the regime only."""
 _OF_HEAD: Final = 2.0
-"""Relative error of a head over that of the velocity that it drives, at the most."""
+"""Largest ratio of a head's relative error to that of the velocity that it drives."""
 _NEWTON_STEPS: Final = 30
 _ROUND_OFF: Final = 1e-15
 _LEVELLED: Final = 0.05
-"""Largest fall of ln(head) that is levelled: a few percent, a fraction of what such errors change it by."""
+"""Largest fall of ln(head) that is levelled: a few percent, less than model errors change a head by."""
 _RISE: Final = 1e-9
 """Slope d ln(head)/d ln u of a levelled head, below what tables resolve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TubeHeads:
-    """Heads of the full tube in tables of `point`, along the eighth root of a head, (m/s)^(1/4)."""
+    """Heads of the full tube in tables for `point`, over the eighth root of a head, (m/s)^(1/4)."""
 
     siphon: Table
     """Table of (k + 1) u^2/2, between the chambers: u/sqrt(head), and with a crest the share
@@ -56,20 +56,20 @@ class TubeHeads:
     return_hump: Table | None
     """Table as `hump` from the opposite chamber, for reverse flow; None: an equal one, or no crest."""
     interpolation_error: float = 0.0
-    """Largest relative error of a head found between knots; zero where none was looked for."""
+    """Largest relative error of a head between knots; zero where it was not checked."""
 
     @classmethod
     def nominal(cls, designs: Designs) -> tuple[TubeHeads, ...]:
-        """The heads of every design on few knots.
+        """Heads of every design, on few knots.
 
-        These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values. Drawn
-        errors of models, and those that a fit tries, may make a head fall: it is then level.
+        The knots lie at the same velocities in every scene, so that their error, below 1e-4 of a head, is
+        smooth in the scene's values.  Where sampled or fitted model errors make a head fall, it is levelled.
         Raises: ValueError: as `TubeHeads.of`. SceneError: a head that falls without such errors.
         """
         log_u = _places(_NOMINAL_KNOTS)
         lost = [_Lost.of(log_u[:, None], value) for value in _sampled(designs.scene, log_u, falls=np.inf)]
         tables = []
-        # One column where nothing that a head depends on differs between designs.
+        # A head that is equal in all designs has a single column.
         shape = log_u.size, designs.size
         for way, columns in _columns(lost, 0.0):
             stored = [np.broadcast_to(values, shape) for each in columns for values in each.stored]
@@ -108,7 +108,7 @@ class TubeHeads:
         return tuple(each for each in (self.siphon, self.hump, self.return_hump) if each is not None)
 
     def to_crest(self, *, reverse: bool) -> Table | None:
-        """From the chamber that gives liquid; None without a crest."""
+        """Table of the head from the giving chamber to the crest; None without a crest."""
         return self.return_hump or self.hump if reverse else self.hump
 
     def velocity(self, head: npt.ArrayLike, table: Table | None = None) -> FloatArray:
@@ -130,17 +130,17 @@ class _Lost:
     slope: FloatArray
     """d ln(head)/d(ln u)."""
     curvature: FloatArray
-    """Its own derivative by ln u."""
+    """Derivative of `slope` by ln u."""
 
     @classmethod
     def of(cls, log_u: FloatArray, log_head: FloatArray) -> _Lost:
-        """Args: shapes (samples, 1 or designs), or (samples,) both."""
+        """Derive a head by ln u; shapes (samples, 1) and (samples, 1 or designs), or both (samples,)."""
         at = np.ravel(log_u)
         curve = spline(at, log_head)
         slope, curvature = curve(at, nu=1), curve(at, nu=2)
         rise = np.diff(log_head, axis=0) / np.diff(log_u, axis=0)
         steepest = np.maximum(np.concatenate([rise[:1], rise]), np.concatenate([rise, rise[-1:]]))
-        # Where a head is next to level, a spline may fall: one velocity belongs to each head.
+        # The spline of a nearly level head may fall, but every head must have a single velocity.
         falls = slope < steepest / 3
         return cls(
             root=np.exp(log_head / 8),
@@ -151,21 +151,21 @@ class _Lost:
         )
 
     def ratio(self, allowed: float) -> TableColumn:
-        """u/s^4 over s, by the derivatives of ln u over ln s."""
+        """Column of u/s^4 over s, by the derivatives of ln u over ln s."""
         ratio, rise = self.over_root, 8 / self.slope - 4
         turn = -64 * self.curvature / self.slope**3
         slope, curvature = ratio * rise / self.root, ratio * (rise * (rise - 1) + turn) / self.root**2
         return TableColumn(value=ratio, allowed=allowed * ratio, derivatives=(slope, curvature))
 
     def share(self, way: _Lost, allowed: float) -> TableColumn:
-        """Share of this head that is lost on the way to the crest, over s."""
+        """Column of the share of this head that is lost on the way to the crest, over s."""
         share = np.exp(way.log_head - self.log_head)
         slope = share * (way.slope / self.slope - 1) * 8 / self.root
         return TableColumn(value=share, allowed=_OF_SHARES * allowed * share, derivatives=(slope,))
 
 
 def _columns(lost: list[_Lost], allowed: float) -> list[tuple[_Lost, list[TableColumn]]]:
-    """Columns of the table of each way; both ways to the crest where they differ."""
+    """Each head with the columns of its table; the way back to the crest only where it differs."""
     siphon, *ways = lost
     alike = len(ways) == 2 and np.array_equal(ways[0].root, ways[1].root)
     ways = ways[:1] if alike else ways
@@ -174,7 +174,7 @@ def _columns(lost: list[_Lost], allowed: float) -> list[tuple[_Lost, list[TableC
 
 
 def _places(count: int) -> FloatArray:
-    """Even in ln u."""
+    """Evenly spaced ln u over `TABLE_VELOCITIES`."""
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
     return np.linspace(start, stop, count)
 
@@ -185,9 +185,9 @@ def velocities_of(table: Table) -> FloatArray:
 
 
 def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
-    """Eighth roots of the heads that velocities above zero lose, m/s.
+    """Eighth roots of the heads that velocities above zero lose, (m/s)^(1/4).
 
-    Args: `velocity`: of a stack of tables those of each, shape (tables, n).
+    Args: `velocity`: m/s; for a stack of tables of shape (tables, n).
     """
     velocity = np.asarray(velocity, dtype=np.float64)
     knots, at = np.atleast_2d(table.knots), np.atleast_2d(velocities_of(table))
@@ -208,7 +208,7 @@ def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
         ratio = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
         slope = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * (5.0 * c5))))
         change = (inside - root**4 * ratio) / (root**3 * (4 * ratio + root * slope))
-        # Each table ends its own steps, whatever stands beside it.
+        # Each table ends its own steps, whatever tables are stacked with it.
         root = np.where(near, np.minimum(np.maximum(root + change, low), high), root)
         near &= np.any(np.abs(change) > _ROUND_OFF * root, axis=1, keepdims=True)
         if not near.any():
@@ -218,10 +218,11 @@ def roots_of(table: Table, velocity: npt.ArrayLike) -> FloatArray:
 
 
 def _inconsistent(scene: Scene) -> SceneError:
-    """Error of a head that falls where the velocity grows, by the scene's model errors or without any.
+    """Error of a head that falls with growing velocity, by the scene's model errors or without any.
 
-    A bend's friction at rest belongs to its leg, and what rotation adds is spread along the path: where bends
-    are nearly the whole tube, rotation's share of a leg falls at the transition faster than its head grows.
+    A bend's friction without rotation counts in its leg; the friction added by rotation is spread along the
+    path.  Where bends are nearly the whole tube, its part in a leg falls at the transition faster than the
+    leg's head grows.
     """
     problem = "the tube's head does not grow with the velocity"
     if not scene.tube.model_errors:
@@ -240,14 +241,14 @@ def _inconsistent(scene: Scene) -> SceneError:
 
 
 def _sampled(scene: Scene, log_velocity: FloatArray, *, falls: float = _LEVELLED) -> list[FloatArray]:
-    """`log_heads` over even places, shape (samples, designs).
+    """`log_heads` at samples of ln u, shape (samples, designs).
 
     Raises: as `TubeHeads.nominal`.
     """
     places = log_velocity[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         values = log_heads(scene, places)
-    # Heads that nothing differs in have one column beside those of many designs.
+    # A head that is equal in all designs may have a single column.
     if scene.tube.model_errors and all(np.all(np.isfinite(value)) for value in values):
         values = [_growing(scene, places, value, falls) for value in values]
     if not all(np.all(np.isfinite(value)) and np.all(np.diff(value, axis=0) > 0) for value in values):
@@ -256,11 +257,11 @@ def _sampled(scene: Scene, log_velocity: FloatArray, *, falls: float = _LEVELLED
 
 
 def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray, falls: float) -> FloatArray:
-    """A head with supposed errors of models, level where these make it fall a little.
+    """Head with model errors, levelled where these make it fall a little.
 
-    Sizes of errors change fast where the flow turns turbulent. Its largest value up to a velocity is taken,
-    rising by `_RISE` per unit of ln u, so that one velocity belongs to each.
-    Raises: SceneError: ln of it falls by more than `falls`, or it is none.
+    Model errors change fast where the flow turns turbulent.  The result is the largest head up to each
+    velocity, rising by `_RISE` per unit of ln u, so that every head has a single velocity.
+    Raises: SceneError: ln(head) falls by more than `falls`, or is not a number.
     """
     highest = np.maximum.accumulate(log_head, axis=0)
     if not np.all(highest - log_head <= falls):

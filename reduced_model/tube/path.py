@@ -1,4 +1,4 @@
-"""The tube's path as a line of radii, and what of the loss lies before each place on it.
+"""Path of the tube as radii over its length, and the part of the loss before each point of it.
 
 A crest shaped as an arc: straight legs from the ports touch the crest's circle, which the tube follows in
 between, as the shortest path between opposite ports does; a longer tube is taken as that path stretched.  A
@@ -26,24 +26,24 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Places:
-    """Places along the path in its order; where something is lumped the same share stands twice."""
+    """Points along the path, in order; a point with a lumped loss stands twice."""
 
     share: FloatArray
-    """s/L, from the giving chamber."""
+    """Fraction s/L of the path, from the giving chamber."""
     after: BoolArray
-    """At a doubled share: whether this entry lies behind what is lumped there."""
+    """True for the second entry of a doubled point, behind the loss lumped there."""
 
     @classmethod
     def even(cls, *, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
-        """Even places along the path, with its crest, and doubled at both ends, at the bends and where asked.
+        """Evenly spaced points and those of the crest, doubled at both ends, at the bends and at `doubled`.
 
-        Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
+        Args: `points`: number of evenly spaced points. `doubled`: fractions s/L of further jumps.
         """
         twice = np.unique(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
         crest = () if tube.hump_radius is None else crest_span(tube)
         exact = np.append(twice, crest)
         even = np.linspace(0.0, 1.0, points)
-        # An even place that differs from another by rounding only would stand for nothing.
+        # An even point that differs from another only by rounding is left out.
         even = even[np.min(np.abs(even[:, None] - exact), axis=1) > _SAME]
         once = np.concatenate([even, np.unique([share for share in crest if share not in twice])])
         share = np.concatenate([once, twice, twice])
@@ -52,10 +52,10 @@ class Places:
         return cls(share=share[order], after=after[order])
 
     def loss_before(self, *, tube: Tube, state: TubeState) -> FloatArray:
-        """Fall of pressure from the giving chamber to each place, over rho u^2/2, but for the radius.
+        """Pressure drop from the giving chamber to each point, over rho u^2/2, without that by the radius.
 
-        Zero before the entrance; inside, alpha and what of k lies before; behind the exit k + 1.  In
-        turbulent flow the "+1" counts alpha as 1, so the pressure there rises by the small rest at the exit.
+        Zero before the entrance; inside, alpha and the part of k before the point; behind the exit k + 1.  In
+        turbulent flow the "+1" takes alpha as 1, so the pressure rises at the exit by the small difference.
         Source: energy balance; at the crest it is alpha and `upstream_loss`.
         """
         entrance = float(state.terms.get("entrance", np.zeros(())))
@@ -83,9 +83,9 @@ def crest_span(tube: Tube) -> tuple[float, float]:
     """Fractions of the path between which the tube lies on the crest's circle; equal for a point.
 
     The arc takes r_m (pi - 2 acos(r_m/r_p)) of the shortest path, and `hump_position` divides what is left.
-    Friction goes on at the crest's radius, so the pressure falls up to the second of the two.  By how much
-    the tube is longer than its shortest path may lie anywhere, at the most all of it before the crest or
-    behind: the error of `CREST_ERROR`, from -1.96 to 1.96.
+    Friction continues at the crest's radius, so the pressure falls up to the second fraction.  The length
+    beyond that of the shortest path may lie anywhere, in the extreme all of it before or all of it behind the
+    crest: model error `CREST_ERROR`, from -1.96 to 1.96.
     """
     if tube.hump_radius is None or tube.hump_shape == "point":
         return tube.hump_position, tube.hump_position
@@ -97,7 +97,7 @@ def crest_span(tube: Tube) -> tuple[float, float]:
     if np.all(error == 0) or np.all(arc == 0):
         return span
     slack, error = np.maximum(1 - shortest / tube.length, 0.0), np.clip(error, -1.0, 1.0)
-    # A parabola through both ends and what the stretched path has, smooth where no error is supposed.
+    # Parabola through both extremes and the stretched path, smooth at zero error.
     start, end = (
         plain(
             np.clip(
@@ -112,7 +112,7 @@ def crest_span(tube: Tube) -> tuple[float, float]:
 
 
 def crest_middle(tube: Tube) -> float:
-    """Fraction of the path that halves the crest: where liquid parts that nothing pulls to either side."""
+    """Fraction of the path at the middle of the crest, where liquid that is pulled to neither side parts."""
     return sum(crest_span(tube)) / 2
 
 
@@ -149,14 +149,14 @@ def lowest_place(tube: Tube, loss: float, square: float) -> float:
 def _far_leg(
     tube: Tube, loss: FloatArray, square: float | FloatArray
 ) -> tuple[FloatArray, float | FloatArray]:
-    """A and B; a leg that runs straight in r rises at once."""
+    """A and B of `head_behind_crest`; A is zero for a leg that runs straight in r and so rises at once."""
     if tube.hump_radius is None or tube.hump_shape == "point":
         return np.zeros_like(loss), 1.0
     return loss * (1 - crest_span(tube)[1]), square * (tube.port_radius**2 - tube.hump_radius**2)
 
 
 def _bend_shares(tube: Tube) -> tuple[FloatArray, FloatArray]:
-    """Places of both halves of every bend, s/L: (i + 1/2)/n of the legs put together, or of a plain tube.
+    """Fractions s/L of both halves of every bend: (i + 1/2)/n of both legs, or of a tube without a crest.
 
     The halves of a bend in the middle sit at both ends of the crest.
     """

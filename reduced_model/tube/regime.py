@@ -22,17 +22,17 @@ from ringbalance.scene.platform.both_ways import both_ways, chosen
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
-flow carries it out: the span of what is measured on air pockets in pipes that slope down.
+flow carries it out: the span measured on air pockets in pipes that slope down.
 
 Source: May, Allen and Nelson, "Hydraulic Investigation of Air in Small Diameter Pipes", Int. J. Hydraul. Eng.
 7 (2018) 51, doi:10.5923/j.ijhe.20180703.02; Pothof, "Co-current air-water flow in downward sloping pipes",
 thesis, Delft (2011), ISBN 978-90-8957-018-5.
 """
 CLEARING_UNCERTAINTY: Final = (CLEARING[1] - CLEARING[0]) / (CLEARING[1] + CLEARING[0])
-"""Relative, of the Froude number in the middle: that span (95 %)."""
+"""Relative expanded uncertainty (95 %) of the middle Froude number: the span of `CLEARING`."""
 RELEASED: Final = 0.5
-"""Position of the cavity's pressure from vapour, 0, to the downstream gas, 1, with dissolved gas: the
-middle, with both ends in the uncertainty.
+"""Position of the cavity's pressure from vapour pressure, 0, to downstream gas pressure, 1, with dissolved
+gas: the middle; the uncertainty covers both ends.
 
 A siphon of untreated water (1.5 m high, a height recalled) choked with bubbles at 37.6 kPa, where vapour
 pressure alone allows 17 kPa; raised slowly, so that gas could leave, it ran free of bubbles down to 23.8 kPa
@@ -114,14 +114,14 @@ class TubePath:
     def holds(self, level: float) -> bool | None:
         """True if a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off.
 
-        None: likely, under the pressure of a cavity over the crest that runs take, and not under every one.
+        None: likely; it lasts at the cavity pressure over the crest that runs assume, but not at every one.
         """
         if not self.crest or level > self.return_pressure:
             return False
         return True if self.column_pressure >= self.holding_pressure(level) else None
 
     def holding_pressure(self, level: float) -> float:
-        """D_m of a crest from which on it lasts whatever the pressure of a cavity over the crest, Pa."""
+        """Smallest D_m at which a correction lasts whatever the pressure of a cavity over the crest, Pa."""
         return level - min(self.vapour_pressure, 0.0)
 
 
@@ -162,7 +162,7 @@ def discharges_openly(path: Any, ends: Any) -> Any:
 def cavity_bounds(path: Any, ends: Any) -> Any:
     """Lowest and highest pressure of a cavity in a primed tube, Pa.
 
-    Vapour alone, and, with dissolved gas, the downstream chamber's gas: more would leave into it.
+    Vapour pressure and, with dissolved gas, that of the downstream chamber, into which excess gas leaves.
     """
     low = chosen(discharges_openly(path, ends), ends[1], path.vapour_pressure)
     return low, chosen(path.released == 0.0, low, np.maximum(ends[1], low))
@@ -183,7 +183,7 @@ def resting_pressure(path: Any, ends: Any) -> Any:
 
 @both_ways
 def gas_over_crest(path: Any, ends: Any) -> Any:
-    """Pressure of gas not carried out, Pa: the downstream chamber's; trapped, what displaces it."""
+    """Pressure of gas left over the crest, Pa: p_C, plus P_C - D_p if trapped behind a covered port."""
     return ends[1] + chosen(path.trapped, np.maximum(ends[3] - path.port_pressure, 0.0), 0.0)
 
 
@@ -191,7 +191,7 @@ def gas_over_crest(path: Any, ends: Any) -> Any:
 def crest_margins(path: Any, ends: Any) -> Any:
     """Crest pressure at rest less that of a primed tube's cavity, and less that of gas there, Pa.
 
-    Each drives a separated column of its tube; where it is not positive, no column holds.
+    The former drives a separated column in a primed tube, the latter in an unprimed one, if positive.
     """
     resting, cavity = resting_pressure(path, ends), cavity_pressure(path, ends)
     return resting - cavity, resting - np.maximum(gas_over_crest(path, ends), cavity)
@@ -199,9 +199,9 @@ def crest_margins(path: Any, ends: Any) -> Any:
 
 @both_ways
 def cleared(path: Any, velocity: Any) -> Any:
-    """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity.
+    """Position of the crest pressure from gas, 0, to cavity, 1, by the spilling liquid's velocity.
 
-    Zero below and one above `CLEARING`, smooth between: which of both holds there is not known.
+    Zero below and one above `CLEARING`; smooth between, where it is unknown which of the two acts.
     """
     froude = velocity / chosen(path.froude_velocity == 0.0, 1.0, path.froude_velocity)
     part = np.minimum(np.maximum((froude - CLEARING[0]) / (CLEARING[1] - CLEARING[0]), 0.0), 1.0)
@@ -220,7 +220,7 @@ def can_flow(path: Any, ends: Any, primed: Any) -> Any:
 
 @both_ways
 def holds_at_rest(path: Any, ends: Any, primed: Any) -> Any:
-    """True where a column in which nothing flows stays: below a level, or in exact balance."""
+    """True where a primed column at rest stays: without a crest, or with one in exact balance."""
     held = primed & covered(path, ends)
     if not path.crest:
         return held
@@ -246,7 +246,7 @@ class ColumnFlow(Generic[Pressure]):
     separation_velocity: Pressure
     """Velocity of a column that is separated at the crest, m/s; without a crest that of the siphon."""
     spill_velocity: Pressure
-    """Velocity of a column separated by what lay over the crest before: gas in an unprimed tube, m/s."""
+    """Velocity of a column separated at the crest pressure before the flow (unprimed: of gas), m/s."""
     holding: Pressure
     """Pressure that drives the column up to the crest, Pa; without a crest that of the siphon."""
     separated: Truth
@@ -297,7 +297,7 @@ def column_flow(
         margin = chosen(primed, margin, margin + more)
         broken = chosen(primed, spill, separation(margin, flows))
     separated = broken < full
-    # Gas stays over the crest of a tube that was unprimed until what flows through it carries the gas out.
+    # In an unprimed tube gas stays over the crest until the flow carries it out.
     swept = (carried > 0.5) & (cleared(path, full) > 0.5)
     keeps = (primed | swept) & ((broken >= full) | (ends.downstream_hydrostatic >= path.port_pressure))
     return ColumnFlow(

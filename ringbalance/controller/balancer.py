@@ -1,7 +1,7 @@
 """Interface of every balancer, and the balancer of a scene.
 
-`simulate`, `tune`, `compare` and the first half of `fit` are written against `Balancer` alone.  A further one
-is a sub-package with its scene's keys and a subclass, and one line that registers it
+`simulate`, `tune`, `compare` and the first half of `fit` use `Balancer` alone.  A further balancer is a
+sub-package with its scene's keys and a subclass, and one line that registers it
 (`ringbalance.scene.registry`).
 """
 
@@ -30,11 +30,11 @@ from ringbalance.scene.registry import registered
 from ringbalance.scene.units import DIMENSIONS
 
 WATCH_TIME_S: Final = 60.0
-"""s, for which a run that has held its limit is watched."""
+"""Time for which a run is watched after it has held its limit, s."""
 REQUIRED_FRACTION: Final = 0.9
-"""Fraction of the devices that must meet every demand where a scene states none."""
+"""Fraction of the devices that must meet every demand, unless the scene states another."""
 Settings = Mapping[str, Any]
-"""Values of a controller's or designer's choice by path in a scene file, SI; those of text as they are."""
+"""Values that a controller or designer may choose, by path in a scene file; numbers in SI."""
 Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
@@ -44,13 +44,13 @@ class Input:
     """A quantity of a balancer that is not known exactly."""
 
     path: str
-    """In a scene file, such as "tube.bore"."""
+    """Path in a scene file, such as "tube.bore"."""
     value: float
     """SI."""
     half_width: float
     """Expanded uncertainty (95 %), SI; zero: the scene states none."""
     unit: str
-    """Unit in which it is written, "1" for a number without unit."""
+    """SI unit; "1" for a number without unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,31 +59,31 @@ class Setting:
 
     path: str
     value: float
-    """SI, of the scene."""
+    """Value of the scene, SI."""
     lowest: float
     highest: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class Draws:
-    """Which devices a balancer is run as; a number is the same device and noise under every setting.
+    """Numbers of the devices to run; a number stands for the same device and noise under every setting.
 
-    `ringbalance.scene.draws` says where in its distribution each input of a numbered device lies.
+    `ringbalance.scene.draws` gives the quantile of each input of a numbered device.
     """
 
     numbers: tuple[int, ...]
     devices: bool = True
     """True if the inputs are drawn; False: each is as in the scene, and the noise alone differs."""
     complete: bool = True
-    """True if every run is carried out; False: one that is known not to settle ends with the least vibration
-    that the device can come to."""
+    """True if every run is carried out; False: the result of a run that is known not to settle is the least
+    vibration that the device can reach."""
     deadline: float = math.inf
-    """s, at which a run that is above its limit may end undecided; where runs are watched to their end, none
-    does."""
+    """Time at which a run above its limit may end undecided, s; without effect where every run is watched to
+    its end."""
 
     @classmethod
     def first(cls, count: int, *, devices: bool = True) -> Draws:
-        """The first `count` of them."""
+        """Devices 0 to `count - 1`."""
         return cls(numbers=tuple(range(count)), devices=devices)
 
     @classmethod
@@ -93,11 +93,11 @@ class Draws:
 
 
 AS_GIVEN: Final = Draws.first(1, devices=False)
-"""The scene as it says, with its own seed."""
+"""The scene as stated, with its own seed."""
 
 
 class Run(Protocol):
-    """One traced run: what `simulate` answers with."""
+    """One traced run, the result of `simulate`."""
 
     @property
     def status(self) -> str:
@@ -125,15 +125,15 @@ class RunResult:
     energy: float
     """Energy that the run took, J."""
     usable_moment: float
-    """Largest unbalance that the device cancels where its own lies, kg m."""
+    """Largest unbalance that the device cancels in the direction of its own, kg m."""
     unbalance: float
     """Unbalance of its rotor, kg m."""
     ended: str
     """Code of the finding on what ended the run."""
     run: Any = None
-    """A `Run`; None: it left no trace."""
+    """The `Run`; None: it was not traced."""
     worst_amplitude: float = math.nan
-    """Largest while balancing, m zero-to-peak, of a run with a trace."""
+    """Largest amplitude while balancing, m zero-to-peak; NaN if not traced."""
 
     @property
     def settled(self) -> bool:
@@ -154,9 +154,9 @@ class Outcomes:
     numbers: tuple[int, ...] = ()
     """Numbers of the draws."""
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
-    """Place of every drawn input in its distribution, in (0, 1); empty where no device is drawn."""
+    """Quantiles of every drawn input by its name, in (0, 1); empty where no device is drawn."""
     clipped: Mapping[str, int] = field(default_factory=dict)
-    """Number of devices by input that cannot have it as drawn."""
+    """Number of devices, by input, that cannot have its drawn value."""
     traced: tuple[RunResult, ...] = ()
 
     @property
@@ -176,8 +176,8 @@ class Outcomes:
     ) -> Outcomes:
         """Join runs that were made one by one.
 
-        Args: `inputs`: place of every drawn input, by device. `clipped`: inputs that some device cannot have
-            as drawn, for each. `trace`: whether the runs are kept.
+        Args: `inputs`: quantile of every drawn input, by device. `clipped`: name of an input for each device
+            that cannot have its drawn value. `trace`: true if the runs are kept.
         """
         return cls(
             **{name: np.array([getattr(each, name) for each in results]) for name in ARRAYS},
@@ -189,7 +189,7 @@ class Outcomes:
         )
 
     def joined(self, more: Outcomes) -> Outcomes:
-        """Join the outcomes of these and of further draws."""
+        """Add the outcomes of further draws."""
         return Outcomes(
             **{name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in ARRAYS},
             ended=self.ended + more.ended,
@@ -211,7 +211,7 @@ class Demand:
     code: str
     """Code of the finding on it, such as "settling_time"."""
     outcome: str
-    """Name of the number of `Outcomes` that it is about."""
+    """Name of the array of `Outcomes` that is compared with `required`."""
     sense: str
     """`AT_LEAST` or `AT_MOST`."""
     required: float
@@ -223,47 +223,47 @@ class Demand:
     """Vibration at or below which a device counts as settled, m zero-to-peak, where [requirement] says so."""
 
     def met(self, outcomes: Outcomes) -> BoolArray:
-        """By each device."""
+        """True for each device that meets the demand, shape (n,)."""
         reached = getattr(outcomes, self.outcome)
         return np.asarray(reached >= self.required if self.sense == AT_LEAST else reached <= self.required)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Remedy:
-    """A change of the scene that may mend what its devices do not meet."""
+    """A change of the scene by which more devices may meet its demands."""
 
     code: str
     """Code of the sentence that names it, such as "bore"."""
     changes: Settings
-    """By path, SI, as `SceneFile.with_values` takes them."""
+    """New values by path, SI, as in `SceneFile.with_values`."""
     name: str = ""
-    """Name of a thing that can be bought; else empty."""
+    """Name of a part that can be bought; else empty."""
     continuous: bool = False
-    """True if a value between this and another of its kind can be had as well."""
+    """True if values between this and another of its kind are possible as well."""
 
 
 class Balancer(ABC):
     """A balancer on its rotor, as a scene describes both: the interface that every command uses.
 
-    Made by `balancer_of`; immutable, so that the same balancer gives the same rows in every process.  What is
-    not abstract here suits a balancer whose runs are watched to their end and whose scene states nothing
-    else.
+    Made by `balancer_of`; immutable, so that a balancer gives the same rows in every process.  Methods that
+    are not abstract suit a balancer whose runs are watched to their end and whose scene states no more than
+    that they settle.
     """
 
     scene: Any
-    """Scene that it was made of, of the type of its kind."""
+    """Scene of the balancer, of the type of its kind."""
     options: frozenset[str] = frozenset()
-    """Arguments besides the scene that it can be made with, such as "flow_law"."""
+    """Names of further arguments besides the scene, such as "flow_law"."""
     verdict_draws: tuple[int, int] = (16, 64)
-    """Devices of a verdict, at first and at the most."""
+    """Numbers of devices of a verdict, first and largest."""
     energy_kind: str
-    """Code of the sentence that says what its runs count as energy."""
+    """Code of the sentence that names the energy that runs count."""
     watched_to_end: bool = True
-    """True if every run is watched to its time limit, whatever the arguments say."""
+    """True if every run is watched to its time limit, whatever the arguments."""
 
     @property
     def models_used(self) -> tuple[Any, ...]:
-        """Every physical term, with its model and its estimated contribution; empty: one model has all."""
+        """Every physical term, with its model and its estimated contribution; empty: one model covers all."""
         return ()
 
     def inputs(self) -> tuple[Input, ...]:
@@ -283,9 +283,9 @@ class Balancer(ABC):
         trace: bool = False,
         progress: Progress | None = None,
     ) -> Outcomes:
-        """Closed-loop runs, one a draw. Args: `settings`: by path, SI; the scene's where none is given.
+        """Closed-loop runs, one for each draw. Args: `settings`: by path, SI; default the scene's.
 
-        `trace`: whether the runs themselves are kept; what they come to is the same.
+        `trace`: true if the runs themselves are kept; their results are the same.
         """
 
     def run_all(
@@ -297,7 +297,8 @@ class Balancer(ABC):
     ) -> tuple[Outcomes, ...]:
         """Run several settings, without traces.
 
-        Args: `watch_time`: s, for which a run is watched after it has held its limit, unless to its end.
+        Args: `watch_time`: time for which a run is watched after it has held its limit, s, unless every run
+            is watched to its end.
         """
         return tuple(self.run(each, draws) for each in settings)
 
@@ -306,7 +307,7 @@ class Balancer(ABC):
         return REQUIRED_FRACTION
 
     def demands(self) -> tuple[Demand, ...]:
-        """Demands on every device: first that it settles in time, then what else the scene states."""
+        """Demands on every device: first that it settles in time, then any others of the scene."""
         return (settles_within(self.span(), stated=False),)
 
     def trials(self) -> tuple[Trials, ...]:
@@ -316,22 +317,22 @@ class Balancer(ABC):
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes of the scene to try where too few devices meet its demands, each by itself.
 
-        Those of one kind follow each other with the smallest change first.
+        Changes of one kind follow each other, the smallest first.
         """
         return ()
 
     def choices(self) -> tuple[Remedy, ...]:
-        """Parts that can be bought where the scene leaves them open; results do without them."""
+        """Parts that can be bought for what the scene leaves open; results do not include them."""
         return ()
 
     def information(self, scene: SceneFile) -> Information:  # noqa: ARG002
-        """Information on its loop without a run, under a scene with other settings."""
+        """Information on the loop that needs no run, for the scene with other settings."""
         return Information()
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:  # noqa: ARG002
-        """Findings on devices whose runs ended for want of capacity, under a scene with other settings.
+        """Findings on devices whose runs ended for lack of capacity, for the scene with other settings.
 
-        Args: `settings`: what to call these.
+        Args: `settings`: name of these settings in the findings.
         """
         return ()
 
@@ -345,18 +346,18 @@ class Balancer(ABC):
 
     @abstractmethod
     def rotor(self, number: int | None = None) -> CommonRotor:
-        """The rotor alone. Args: `number`: of a drawn device; default as the scene says.
+        """The rotor alone. Args: `number`: of a drawn device; default the scene's rotor.
 
-        Raises: SceneError: it stands still, or never vibrates steadily.
+        Raises: SceneError: the rotor stands still, or never vibrates steadily.
         """
 
     @abstractmethod
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> Self:
-        """This balancer on a rotor at constant speed in its steady vibration, with nothing required but to
-        come below that rotor's limit.
+        """This balancer on a rotor at constant speed in steady vibration, with one requirement: to come below
+        that rotor's limit.
 
-        Args: `rotors`: of the drawn devices; default its own. Raises: SceneError: the rotor cannot be this
-            balancer's.
+        Args: `rotors`: of the drawn devices; default the balancer's own. Raises: SceneError: the balancer
+            cannot work on the rotor.
         """
 
     @abstractmethod
@@ -369,23 +370,23 @@ class Balancer(ABC):
 
     @abstractmethod
     def lasting(self, span: float) -> Self:
-        """Balancer with runs that balance for `span`, s, and go on when they have settled."""
+        """Balancer whose runs balance for `span`, s, and continue when they have settled."""
 
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
-        """Quantities known without a run; among them "reach", the largest unbalance, kg m, that it cancels
-        wherever that lies."""
+        """Quantities known without a run; among them "reach", the largest unbalance that the balancer cancels
+        in every direction, kg m."""
 
     @abstractmethod
     def rows(self, run: Any) -> Rows:
-        """One of its traced runs as `simulate` prints it.
+        """Rows of a traced run, as `simulate` prints them.
 
-        A finding has the changes of the scene that would mend it (`Finding.changes`).
+        A finding has the changes of the scene that would remedy it (`Finding.changes`).
         """
 
     @abstractmethod
     def history(self, run: Any) -> Mapping[str, Sequence[Any]]:
-        """Every instant of one of its traced runs by name of its column, with the unit in the name."""
+        """Histories of a traced run by the name of their column, with the unit in the name."""
 
 
 def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
@@ -408,7 +409,7 @@ def takes(scene: SceneFile, option: str) -> bool:
 
 
 def quick_balancer(scene: SceneFile) -> Balancer:
-    """Balancer for runs of many designs: under a law that nothing else has checked, where it has one."""
+    """Balancer for runs of many designs; under the unchecked flow law if it has a flow law."""
     return balancer_of(scene, flow_law=UNCHECKED) if takes(scene, "flow_law") else balancer_of(scene)
 
 
@@ -428,9 +429,9 @@ def balancer_under(law: str, scene: SceneFile) -> Balancer:
 
 
 def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = None) -> tuple[Input, ...]:
-    """Every value of a scene that its schema lets be uncertain.
+    """Every value of a scene that may be uncertain by its schema.
 
-    Args: `width`: half-width, SI, by path and value; default what the scene states by path.
+    Args: `width`: half-width, SI, by path and value; default that of the scene.
     """
     stated = {each.quantity: each for each in scene.uncertainty}
 

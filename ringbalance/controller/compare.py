@@ -218,7 +218,7 @@ class Comparison(Result):
         ]
         of_sides = [tuple(side.quantities(f"{number}.")) for number, side in enumerate(sides, start=1)]
 
-        # The verdict on both, how each settles, and what each one's energy is.
+        # The verdict on both, then settling and kind of energy of each.
         fewer, more = sorted((self.paired.first_alone, self.paired.second_alone))
         values: dict[str, Value] = {"of": sides[0].fraction.of, "fewer": fewer, "more": more}
         code = "compared_alike"

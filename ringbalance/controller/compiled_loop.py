@@ -1,7 +1,7 @@
 """The closed loop in plain numbers: sample, command, gas on, gas off, wait, sample again.
 
-One source for one run and for a thousand: runs are continued up to a sample, so that between two samples
-Python can be a run's sensor and its algorithm.
+One source serves a single run and a thousand: runs are continued up to a sample, so that between two samples
+Python code can act as a run's sensor and algorithm.
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ def continue_runs(
 
     Args:
         loops: one for each of some settings, type `LOOP`. plants: one for each device, type `PLANT`.
-        assumed: the device that the law-based algorithm assumes; the others do not read it.
+        assumed: the device that the law-based algorithm assumes; not read by the others.
         runs: of type `RUN`, shape (n,), changed; each names its settings and its device.
-        motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the pairs as they are and, with
-            one more, as the law-based algorithm estimates them.
+        motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the true pairs and, with a
+            spare one, the pairs as the law-based algorithm estimates them.
         noise: of every device, amplitude and phase in standard deviations, shape (devices, samples, 2).
-        until: number of samples; with none runs begin.
+        until: number of samples; with 0 the runs are started.
         instants, injections, samples: rows of the trace of a single run (time and every pair's fill;
-            `INJECTION`; `SAMPLE`); none are kept where they have no rows.
+            `INJECTION`; `SAMPLE`); an array without rows keeps none.
         notes: shape (2, 1 + pairs, points), room for the instants of a valve-open time and of a wait.
         w: a workspace.
     """
@@ -96,7 +96,7 @@ def continue_runs(
 
 @in_place
 def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: FloatArray) -> None:
-    """Level chambers, vented, no tube full."""
+    """Start a run with level, vented chambers and no tube full."""
     half, ambient, fill = loop.chambers // 2, plant.ambient_pressure, plant.total / 2.0
     for i in range(motions.size):
         motion = motions[i]
@@ -152,7 +152,7 @@ def decide(
 
 @in_place
 def _watch(loop: Record, run: Record) -> None:
-    """Count overshoots, rises in a row and misadjustments; a sample that shows nothing is passed over."""
+    """Count overshoots, rises in a row and misadjustments; a sample without an amplitude is skipped."""
     if run.usable >= NO_PHASE:
         if run.samples == 1:
             run.first_seen = run.seen_amplitude
@@ -186,9 +186,10 @@ def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
 
 @in_place
 def _hold(loop: Record, run: Record) -> None:
-    """Note if the run has settled: within the limit for the hold time, then but for few samples further.
+    """Record if the run has settled: within the limit for the hold time, and then, but for a few samples, for
+    the watch time.
 
-    A hold that is lost is forgotten, and the next one is looked for.
+    A lost hold is discarded, and the next one is awaited.
     """
     if run.settled > 0:
         return
@@ -224,7 +225,7 @@ def _act(
     notes: FloatArray,
     w: FloatArray,
 ) -> None:
-    """All valves of the command open together; after the last one has closed the loop waits."""
+    """Open all valves of the command together, and wait after the last one has closed."""
     commanded, before, start = limit_to_time(loop, run), run.vibration, run.time
     if commanded > 0 or not _rests(loop, plant, run, motions):
         move(loop, plant, run, motions, commanded, notes, w)

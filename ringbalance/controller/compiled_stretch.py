@@ -26,7 +26,7 @@ def vibration(loop: Record, plant: Record, run: Record) -> complex:
 
 @in_place
 def time_left(loop: Record, run: Record) -> float:
-    """Time until the run ends undecided, s: one within its limit in time is watched until it has settled."""
+    """Time until the run ends undecided, s; a run that came within its limit in time gets time to settle."""
     watched = min(run.since, run.held_since) <= loop.time_limit and run.settled == 0
     more = loop.hold_time + loop.watch_time + 2.0 * loop.period if watched else 0.0
     return float(loop.time_limit + more - run.time)
@@ -58,9 +58,10 @@ def move(
     notes: FloatArray,
     w: FloatArray,
 ) -> None:
-    """Let time pass to the next sample; from its residual fill on a driven chamber gives gas, no liquid.
+    """Integrate to the next sample; at its residual fill a driven chamber gives gas, not liquid.
 
-    The motion is tried as commanded, and made again with the times that drive liquid where those are shorter.
+    The motion is integrated as commanded, and again with shorter driving times where a chamber would fall
+    below its residual fill.
     """
     half = loop.chambers // 2
     guarded = commanded > 0 and run.residual_fill > 0.0
@@ -86,7 +87,7 @@ def _driven_fill(plant: Record, run: Record, pair: int) -> float:
 
 @in_place
 def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> bool:
-    """True if each driven chamber has kept its residual fill and will, with the tail of its injection."""
+    """True if each driven chamber keeps its residual fill, the tail of its injection included."""
     spare, keeps = loop.chambers // 2 * 2, True
     for i in range(loop.chambers // 2):
         if run.drives[i] > 0.0:
@@ -98,7 +99,7 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
 
 @in_place
 def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> None:
-    """Shorten the times that drive liquid to what leaves the residual fill."""
+    """Shorten the times that drive liquid so that the residual fill remains."""
     half = loop.chambers // 2
     for i in range(half):
         if run.drives[i] > 0.0:
@@ -110,7 +111,7 @@ def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: Float
 
 @in_place
 def _gas_in_port(loop: Record, run: Record, pair: int, time: float) -> None:
-    """Let a pair's gas drive liquid for a time, s; then it enters the port of the driven chamber."""
+    """Set the time for which a pair's gas drives liquid, s; then gas enters the driven chamber's port."""
     run.shortened += 1
     run.refused[pair + loop.chambers // 2 * run.side[pair]] = 1
     run.drives[pair] = time
@@ -120,9 +121,9 @@ def _gas_in_port(loop: Record, run: Record, pair: int, time: float) -> None:
 def _pass(
     loop: Record, plant: Record, run: Record, motions: Record, notes: FloatArray, w: FloatArray
 ) -> float:
-    """Move all pairs through the valve-open times and the wait, with their fills at the instants in `notes`.
+    """Integrate all pairs over the valve-open times and the wait, with fills at the instants in `notes`.
 
-    Returns: fill that ran back with the gas off, the most of any pair and interval.
+    Returns: largest fill of any pair and interval that ran back with the gas off.
     """
     half, on, drift = loop.chambers // 2, 0.0, 0.0
     for i in range(half):
@@ -174,7 +175,7 @@ def note_stretch(
     start: float,
     instants: FloatArray,
 ) -> None:
-    """Note since when the amplitude is not above the limit, and the trace, of an interval from `start` on."""
+    """Record the trace of an interval from `start` on, and since when the amplitude is within the limit."""
     lowest, largest = plant.lowest_fill, plant.total - plant.lowest_fill
     for k in range(count):
         for i in range(loop.chambers // 2):
@@ -187,7 +188,7 @@ def note_stretch(
 
 @in_place
 def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
-    """Note the disc at the next sample, and if liquid still runs back that would take it above the limit."""
+    """Record the disc at the next sample, and if liquid still runs back that would lead above the limit."""
     half, back = loop.chambers // 2, False
     for i in range(half):
         motion = motions[i]
@@ -204,7 +205,7 @@ def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
 
 @in_place
 def keep_instant(loop: Record, run: Record, instants: FloatArray, time: float) -> None:
-    """Add a row to the trace, one for one time: a valve may open for less than the clock resolves."""
+    """Add a row to the trace, one for each time: a valve may open for less than the clock resolves."""
     if run.instants < instants.shape[0] and (time > run.noted or run.samples == 0):
         instants[run.instants, 0] = time
         for i in range(loop.chambers // 2):
@@ -228,7 +229,7 @@ def keep_injections(
         moved = abs(fill - motion.fill_before) > NOTICEABLE_CHANGE
         filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
         run.gas += motion.closing_pressure * filled
-        # Noise keeps opening the other valve a little.
+        # Shorter injections do not count: noise keeps opening the other valve a little.
         if run.asked[pair] > longest:
             longest, working = run.asked[pair], moved
         if run.injections < injections.size:

@@ -1,7 +1,7 @@
-"""A finished run as the JSON document that scripts rely on, as a table of its histories, and for a person.
+"""A finished run as a JSON document for scripts, as a table of its histories, and as text.
 
 Where a scene gives no gas line, runs at both ends of the default range are reported as well.
-`conventions` has the run in the quantities and units of balancing shops and of operators of machines.
+`conventions` gives the run in the quantities and units of balancing shops and machine operators.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from ringbalance.scene.keys.derivations import permissible_unbalance
 def simulation_document(simulation: Simulation) -> dict[str, Any]:
     """A run as a JSON document in SI.
 
-    `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
-    the samples of the sensor are under `samples`, null where one was dropped or not a number.
+    `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` have one length and hold the true
+    state; the samples of the sensor are under `samples`, null where one was dropped or not a number.
     """
     scene, gas = simulation.scene, simulation.gas
     measurements = [sample.measurement for sample in simulation.samples]
@@ -107,7 +107,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
 
 
 def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
-    """Every instant of a run, by name of its column; None at those at which the sensor shows nothing."""
+    """Histories of a run by column name; None at instants without a measurement."""
     time = simulation.time
     shown = {sample.time: sample.measurement for sample in simulation.samples}
     seen = [shown.get(instant) for instant in time.tolist()]
@@ -216,7 +216,7 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
 
 
 def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> str:
-    """Bars of an amplitude at equal steps of time up to `end`, s, by straight lines; logarithmic."""
+    """Amplitude up to `end`, s, as a line of bars, logarithmic; linear between instants."""
     return f"{_sparkline(np.interp(np.linspace(0.0, end, _SPARK_WIDTH), time, amplitude))} to {end:.3g} s"
 
 
@@ -230,8 +230,8 @@ def _sparkline(values: FloatArray) -> str:
 
 
 def line_runs(nominal: Simulation) -> dict[str, Simulation]:
-    """Runs of the same scene and law with all terms of an injection modelled, "slow" and "fast"; none where
-    the scene gives its gas line, the law no forces, or algorithm or sensor are the caller's own."""
+    """Runs of the same scene and law with a "slow" and a "fast" gas line, all terms of an injection modelled;
+    empty if the scene gives its gas line, the law no forces, or algorithm or sensor are the caller's own."""
     scene, flow = nominal.scene, nominal.model.flow
     ends = line_ends(scene)
     if len(ends) == 1 or not gives_forces(flow) or not nominal.as_scene:
@@ -247,7 +247,7 @@ def line_runs(nominal: Simulation) -> dict[str, Simulation]:
 
 
 def line_runs_table(runs: Mapping[str, Simulation]) -> Table:
-    """Table of the ends of the runs."""
+    """Table of the results of runs with both gas lines."""
     return Table(
         caption="The scene gives no gas line; with both ends of its default range",
         heads=("line", "run", "settling time", "amplitude at the end"),
@@ -289,7 +289,7 @@ _HOUR_S: Final = 3600.0
 
 def conventions(run: Simulation) -> tuple[Quantity, ...]:
     """Unbalances and vibrations of the run as ISO 21940 and ISO 20816 name them, the loop's peak sensitivity,
-    gas used, and down to which speed the correction lasts without gas.
+    gas used, and lowest speed at which the correction lasts without gas.
     """
     return tuple(
         Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
@@ -324,11 +324,11 @@ def _vibration_rows(run: Simulation) -> Iterator[_Row]:
 
 
 def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
-    """Peak sensitivity of a stable loop with a gain, gas used, and speeds to which the correction lasts.
+    """Peak sensitivity of a stable loop with a gain, gas used, and lowest speeds for a lasting correction.
 
-    Down to these speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: whatever the
-    pressure of a cavity over the crest, and under the one that runs take.  Restarts find what the run-down
-    has left: below, opposite chambers level out.
+    Down to these speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: to the first
+    at any pressure of a cavity over the crest, to the second at the pressure that runs assume.  Below them
+    opposite chambers level out, and a restart begins with the fills that the run-down has left.
     """
     factor, controller = run.loop.value, run.scene.controller
     if run.loop.fixed and factor is not None and factor < run.loop.limit:

@@ -153,7 +153,7 @@ class _Outside:
             self.memory = self.controller.start()
 
     def answer(self, run: np.void) -> None:
-        """Write a sample, and the command that answers it, into an element of type `RUN`."""
+        """Write a sample and the command that follows into an element of type `RUN`."""
         seen = self.sensor(float(run["time"]), complex(run["vibration"]))
         show(run, seen)
         self.measurements.append(seen)

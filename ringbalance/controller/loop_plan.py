@@ -32,11 +32,11 @@ from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 
 SAMPLES_AT_FIRST: Final = 256
-"""Samples up to which runs are continued at once; then twice as many."""
+"""Number of samples to which runs are continued first; doubled each time."""
 ALLOWED: Final = 0.01
-"""Fraction of the samples in the time after the hold that may be above the limit."""
+"""Fraction of the samples in the watch time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
-"""Commands in a row, beyond one for each chamber, from which on a run that ends is said to move nothing."""
+"""Commands in a row without movement, beyond one for each chamber, with which a run ends as idle."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,13 +56,13 @@ class LoopPlan:
     """Settings of one kind of algorithm, ready for compiled code."""
 
     loops: Records
-    """Type `LOOP`, one for each."""
+    """Type `LOOP`, one for each choice of settings."""
     starts: Records
     """Type `RUN`, with the memory of the algorithm at the start."""
     assumed: Records | None
     """Type `PLANT`, shape (1,): device that the law-based algorithm assumes; None: another algorithm."""
     liquid: Records
-    """Type `MOTION`: the pairs as the law-based algorithm estimates them, and one more; else empty."""
+    """Type `MOTION`: the pairs as the law-based algorithm estimates them, and a spare one; else empty."""
 
     @classmethod
     def of(
@@ -79,10 +79,10 @@ class LoopPlan:
 
         Args:
             controllers: of each; those of the law-based algorithm assume the same device.
-            most_samples: after which a run ends undecided.
-            sensed: whether the caller's sensor writes its samples into the run.
-            to_time_limit: whether a settled run continues.
-            watch_time: s, for which a run is watched after it has held its limit.
+            most_samples: number of samples after which a run ends undecided.
+            sensed: true if the caller's sensor writes its samples into the run.
+            to_time_limit: true if a settled run continues.
+            watch_time: time for which a run is watched after it has held its limit, s.
         """
         loops, starts = np.zeros(len(scenes), dtype=LOOP), np.zeros(len(scenes), dtype=RUN)
         starts["loop"], starts["speed"] = np.arange(len(scenes)), 1.0
@@ -112,7 +112,7 @@ class LoopPlan:
         )
 
     def runs(self, devices: int, **values: npt.ArrayLike) -> Records:
-        """Type `RUN`: every device under the first settings, then under the next.
+        """Runs, type `RUN`: every device under the first settings, then under the next.
 
         Args: `values`: of each device, by field.
         """
@@ -134,8 +134,8 @@ class LoopPlan:
 
         Args:
             plants: of the devices, type `PLANT`.
-            noise: of every device, at least so many samples, as `continue_runs` takes it.
-            traced: whether the trace of the run, which is the only one, is kept.
+            noise: noise of every device for at least a number of samples, as in `continue_runs`.
+            traced: true if the trace is kept, of a single run.
             watch: called before each sample, as it may write into the run.
         Returns: that trace; else an empty one.
         """

@@ -1,6 +1,6 @@
 """Records of the closed loop: a record of settings, one for each run, rows of a trace.
 
-Compiled functions take a record as a single pointer, where arrays and tuples of arrays are taken apart and
+A compiled function takes a record as a single pointer; arrays and tuples of arrays would be unpacked and
 counted at every call, which costs more than the work itself.
 """
 
@@ -21,18 +21,18 @@ TAIL_POINTS: Final = 12
 """Instants recorded within a wait, in which an operation continues after its valve has closed."""
 PAIRS: Final = MAX_CHAMBERS // 2
 MEMORY: Final = max(FIRST_CHANGE + PER_CHANGE * PAIRS, FIRST_CHAMBER + PER_CHAMBER * MAX_CHAMBERS)
-"""Numbers that an algorithm remembers."""
+"""Length of an algorithm's memory."""
 TARGET_VECTOR: Final = 0
 TRIAL: Final = 1
 LAW_BASED: Final = 2
 OWN: Final = 3
-"""Algorithms by number; the last is the caller's, who writes its command into the run."""
+"""Algorithms by number; the last is the caller's, whose command is written into the run."""
 NO_PHASE: Final = 1
 USABLE: Final = 2
 """Content of a sample: nothing (0), an amplitude, or a phase as well."""
 UNUSABLE: Final = 1
 TOO_SHORT: Final = 2
-"""Reasons for which no valve opens though the algorithm is not content."""
+"""Reasons for which no valve opens although the algorithm does not rest."""
 NOTICEABLE_CHANGE: Final = 1e-12
 """Change of a fill ratio that counts as movement."""
 NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
@@ -55,7 +55,7 @@ _LOOP_REALS: Final = (
     "allowed",  # samples above the limit in that time
     "amplitude_noise",  # standard deviation, m
     "phase_noise",  # standard deviation, rad
-    "rest_limit",  # algorithm: amplitude at which it is content, m
+    "rest_limit",  # algorithm: amplitude at which it rests, m
     "minimum_gas_time",  # s
     "maximum_gas_time",  # s
     "probe",  # law-based: valve-open time where the law says that nothing flows, s
@@ -93,12 +93,12 @@ _RUN_REALS: Final = (
     "proportional",  # Kc, s/m
     "time",  # s
     "since",  # s, from which on the amplitude was not above the limit; infinite while it is
-    "held_since",  # the same of the hold that is watched, or has settled; infinite for none
-    "held",  # s, when the hold time of that was over
-    "above",  # samples above the limit since
+    "held_since",  # s, start of the hold that is watched or has settled; infinite for none
+    "held",  # s, end of the hold time of that hold
+    "above",  # samples above the limit since then
     "amplitude",  # true, m
     "initial_amplitude",  # m
-    "drift",  # how far liquid has run back with the gas off
+    "drift",  # largest fill that has run back with the gas off
     "on",  # s, from the last command to the closing of its last valve
     "off",  # s, from then to the next sample
     "noted",  # s, of the last instant of the trace
@@ -107,18 +107,18 @@ _RUN_REALS: Final = (
     "first_seen",  # m, of the first sample; not a number where that showed none
     "last_seen",  # m, of the last sample that showed one
     "last_phase",  # rad, of the last one with a phase
-    "before_time",  # target vector: of its last sample above the limit, s, infinite for none; law-based: last
+    "before_time",  # s, of the last sample; target vector: of the last above the limit, infinite for none
     "before_amplitude",  # m
     "before_phase",  # law-based: rad
-    "gas",  # what vented chambers have released, above ambient pressure, Pa m^3
+    "gas",  # p V above ambient that vented chambers have released, Pa m^3
 )
 _RUN_INTEGERS: Final = (
-    "loop",  # number of its settings
-    "plant",  # and of its device
+    "loop",  # index of its settings
+    "plant",  # index of its device
     "settled",  # 1 if a hold was followed by the watch time
-    "lost",  # holds that were not
+    "lost",  # holds that were lost in the watch time
     "usable",
-    "resting",  # 1 if the algorithm is content
+    "resting",  # 1 if the algorithm rests
     "reason",
     "floods",  # 1 if liquid runs through an empty tube with the gas off
     "cut",  # 1 if the time limit has shortened a valve-open time or a wait
@@ -127,12 +127,12 @@ _RUN_INTEGERS: Final = (
     "idle",
     "overshoots",
     "misadjustments",
-    "shortened",  # injections that gas in the port has ended before their valves
+    "shortened",  # injections ended by gas in the port before their valves closed
     "samples",
     "cause",
-    "drains",  # 1 if what still runs back would take the vibration above the limit
-    "on_points",  # instants noted within each of these
-    "off_points",
+    "drains",  # 1 if liquid that still runs back would take the vibration above the limit
+    "on_points",  # instants recorded within the valve-open time
+    "off_points",  # instants recorded within the wait
     "instants",  # rows of the trace in use
     "injections",
 )
@@ -140,7 +140,7 @@ _RUN_PAIRS: Final = (
     "fill",  # x of the chamber on the positive side
     "asked",  # valve-open time of the command, s, zero for none
     "drives",  # part of it in which gas drives liquid, s: until gas enters the port
-    "lowest",  # fill that the driven chamber reaches by it
+    "lowest",  # least fill of the driven chamber after it, tail included
     "given",  # law-based: valve-open time of the last command, s
 )
 _RUN_FLAGS: Final = (
@@ -157,12 +157,12 @@ RUN: Final = np.dtype(
     + [(name, np.int64, (MAX_CHAMBERS,)) for name in ("at_residual", "refused")]
     + [("memory", np.float64, (MEMORY,))]
 )
-"""One run: what differs between runs, its state and what its algorithm remembers.
+"""One run: what differs between runs, its state and its algorithm's memory.
 
 `start`: vibration with level chambers, m; `gain`: vibration per balancing moment, m/(kg m).
-`at_residual`: of every chamber, whether a sensor of the caller's says that it has no more liquid to give;
-`refused`: whether gas has entered its port in the last command. `memory`: of `target_steps`, `trial_steps` or
-`law_steps`.
+`at_residual`: 1 for every chamber that a sensor of the caller's reports to have no more liquid to give;
+`refused`: 1 for every chamber whose port gas has entered in the last command. `memory`: of `target_steps`,
+`trial_steps` or `law_steps`.
 """
 INJECTION: Final = np.dtype(
     [

@@ -30,7 +30,7 @@ _TURNED: Final = math.sqrt(2.0)
 
 
 def run_findings(run: Simulation) -> tuple[Finding, ...]:
-    """The first says how the run ended, the others what stands behind it and what to change."""
+    """Findings on a run: first on its end, then on causes and what to change."""
     code = run.outcome.value
     if not _moves(run):
         unmoved = {Outcome.STALLED: "stalled_at_start", Outcome.GAS_TIME_TOO_SHORT: "injection_too_short"}
@@ -100,7 +100,7 @@ def _numbers(run: Simulation) -> dict[str, Value]:
 
 
 def _causes(run: Simulation) -> Iterator[Finding]:
-    """Causes that a formula or a count explains; runs of drawn devices tell what to change."""
+    """Causes that a formula or a count explains; runs of drawn devices show what to change."""
     outcome, scene, loop = run.outcome, run.scene, run.loop
     if outcome is Outcome.HOVERING:
         sigma, deviation = scene.sensor.amplitude_noise, loop.deviation
@@ -132,7 +132,7 @@ def _causes(run: Simulation) -> Iterator[Finding]:
 
 
 def _dead_time(run: Simulation) -> list[Finding]:
-    """Finding that an amplitude above the limit stands still, as its valve-open time moves nothing."""
+    """Finding that the amplitude stays above the limit, since its valve-open time moves no liquid."""
     scene, loop = run.scene, run.loop
     if _is_foreign(run) or scene.controller.kind == "trial" or loop.rate == 0.0:
         return []
@@ -159,7 +159,7 @@ def _pressures(run: Simulation) -> dict[str, Value]:
     law, total = plant.model.flow, plant.total
 
     def pressure_from(fill: float) -> float | None:
-        """Pressure from which an injection begins, over an empty crest, as all short ones do, Pa."""
+        """Least pressure that starts an injection over an empty crest, as with all short ones, Pa."""
         return starting_pressure(
             law=law,
             fill=fill,

@@ -1,4 +1,4 @@
-"""The rotor as balancers see it: what those on one rotor share, and frames and signs of the closed loop.
+"""The rotor that several balancers have in common, and frames and signs of the closed loop.
 
 Chamber A lies at angle 0, angles grow with the rotation, letters go counter-clockwise, and the opposite of
 chamber i is i + n/2.  Vectors are complex numbers in the frame of the disc; amplitudes are zero-to-peak.
@@ -104,9 +104,9 @@ def noisy_sensor(*, sensor: loop_models.Sensor, seed: int | np.random.Generator)
 class CommonRotor:
     """Rotor that balancers have in common.
 
-    A balancer sees of a rotor at constant speed its vibration before balancing and its vibration per
-    unbalance, V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex
-    alpha, the same U_0, the same sensor and the same amplitude to come below.
+    For a balancer, vibration before balancing and vibration per unbalance describe a rotor at constant speed,
+    V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex alpha, the same
+    U_0, the same sensor and the same amplitude to come below.
     """
 
     source: str
@@ -139,7 +139,7 @@ _COMPARED_DEVICES: Final = 16
 
 
 class _Drawn(Protocol):
-    """`Balancer.rotor`."""
+    """Type of `Balancer.rotor`."""
 
     def __call__(self, number: int | None = None) -> CommonRotor: ...
 
@@ -168,15 +168,15 @@ def joined_rotor(rotor: CommonRotor, other: CommonRotor) -> CommonRotor:
 
 
 def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
-    """A rotor, drawn as widely as any of the scenes draws its own.
+    """Rotors of drawn devices, each quantity drawn as in the scene that draws it most widely.
 
-    Each of speed, magnitude and angle of alpha, and size and direction of the unbalance deviates by what that
-    scene draws which is least sure of it: the order of the scenes does not matter to the deviations.
+    These quantities are speed, magnitude and angle of alpha, and size and direction of the unbalance; the
+    order of the scenes does not change their deviations.
     """
     deviations = []
     for scene in scenes:
         with suppress(SceneError):
-            # A rotor that stands still or does not vibrate says nothing of this one.
+            # A scene whose rotor stands still or does not vibrate is left out.
             if (described := scene()).amplitude > 0.0:
                 deviations.append(_deviations(described, scene))
     spread = np.array([np.std([of(n) for n in range(_COMPARED_DEVICES)], axis=0) for of in deviations])

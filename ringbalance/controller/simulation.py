@@ -39,11 +39,11 @@ class Injection:
     """One opening of one valve, and its effect by the next sample."""
 
     time: float
-    """s, at which the valve opens."""
+    """Time at which the valve opens, s."""
     chamber: str
     """Letter of the driven chamber."""
     duration: float
-    """Commanded, s."""
+    """Commanded valve-open time, s."""
     fill_before: float
     """x of the driven chamber at the command."""
     fill_after: float
@@ -54,7 +54,7 @@ class Injection:
     energy: float
     """Work of the driven chamber's gas against the surroundings, integral of (p - ambient) dV, J."""
     closing_pressure: float
-    """Gauge, of the driven chamber's gas when its valve closed, Pa."""
+    """Gauge pressure of the driven chamber's gas when its valve closed, Pa."""
     run_dry: float
     """Time for which the valve stayed open to an empty chamber, s."""
 
@@ -73,15 +73,15 @@ class GasUse:
     """Gas from the supply: content of the chambers above ambient pressure as their valves close, all of which
     is vented, and gas that passed through, normal m^3."""
     energy: float
-    """Least work that compresses it, p V ln(p_1/p_a) a filling, J."""
+    """Least work of compressing this gas, p V ln(p_1/p_a) for each filling, J."""
     run_dry: int
     """Injections that ran their chamber dry."""
     passed_through: float
-    """Upper bound on the gas that passed through those, normal m^3; part of `normal_volume`."""
+    """Upper bound on the gas that passed through dry chambers, normal m^3; part of `normal_volume`."""
     residual_fill_ratio: float
     """Fill of a driven chamber below which gas enters its port."""
     below_residual: int
-    """Injections that left their chamber below it, those that ran it dry included."""
+    """Injections that left their chamber below `residual_fill_ratio`, or ran it dry."""
 
     @property
     def finding(self) -> Finding | None:
@@ -161,7 +161,7 @@ class RunVerdict(StrEnum):
     SETTLED = "settled"
     """The amplitude has held within its limit and stayed there, or nothing can change any more."""
     HOVERING = "hovering"
-    """It has held within the limit, and has left it again."""
+    """The amplitude has held within its limit, and has left it again."""
     NOT_SETTLED = "not settled"
     UNSTABLE = "unstable"
     """A small residual grows, or the amplitude did."""
@@ -223,7 +223,7 @@ class Simulation(PresentedResult):
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
-    """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
+    """Names of the terms that are modelled beyond the flow law; empty: the flow law alone."""
     again: Callable[[Scene, Sequence[str]], Simulation]
     """Runs another scene under the same law, with the named terms modelled."""
 
@@ -254,12 +254,12 @@ class Simulation(PresentedResult):
 
     @property
     def usable_moment(self) -> float:
-        """Largest unbalance that the disc cancels where the scene's lies, kg m."""
+        """Largest unbalance that the disc cancels in the direction of the scene's, kg m."""
         return self.plant.moment_towards(-self.scene.rotor.initial_unbalance)
 
     @property
     def settling_time(self) -> float | None:
-        """Time from which on it first held, whatever the time limit, s; None when not settled."""
+        """Time from which on the amplitude held within its limit, s; None: not settled."""
         first, last = float(self.state["held_since"]), float(self.state["since"])
         if self.state["settled"]:
             return first
@@ -273,7 +273,7 @@ class Simulation(PresentedResult):
 
     @cached_property
     def unreachable_amplitude(self) -> float:
-        """Vibration that remains with the liquid at its best, m."""
+        """Vibration that remains with the best fills, m."""
         return self.plant.unreachable_vibration(rotor=self.scene.rotor)
 
     @property
@@ -284,7 +284,7 @@ class Simulation(PresentedResult):
 
     @property
     def unusable(self) -> int:
-        """Number of samples that every algorithm passed over."""
+        """Number of samples that no algorithm can use."""
         return sum(sample.command.reason == NO_SAMPLE for sample in self.samples)
 
     @cached_property
@@ -320,7 +320,7 @@ class Simulation(PresentedResult):
         return Outcome.TOO_MANY_SAMPLES if cause == SAMPLES else self._out_of_time
 
     def _unmoved(self, last: Injection) -> Outcome:
-        """Cause of an injection that moved nothing; gas may have lacked the time to fill the chamber."""
+        """End of a run whose last injection moved nothing; gas may lack the time to fill the chamber."""
         plant = self.plant
         if last.event in {Event.EMPTY, Event.FULL}:
             return Outcome.CHAMBER_EMPTY
@@ -407,7 +407,7 @@ class Simulation(PresentedResult):
 
 
 ROUND_OFF: Final = 1e-9
-"""Relative to the initial amplitude: a smaller rise is arithmetic."""
+"""Rise of the amplitude that counts as round-off, relative to the initial amplitude."""
 NOISE_DEVIATIONS: Final = 3.0
 
 

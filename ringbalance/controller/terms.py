@@ -18,7 +18,8 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 
 VOLUME_TOLERANCE: Final = 0.05
-"""Relative: a flat-strip volume or an input's spread passes, another disc does not."""
+"""Relative tolerance of a chamber's volume: a flat-strip formula and an input's uncertainty stay within it,
+another disc does not."""
 
 
 def run_models(
@@ -40,7 +41,7 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
 
 
 def run_terms(*, scene: Scene, model: BalancerModel) -> tuple[str, ...]:
-    """`terms_modelled` of runs of a scene; estimates nothing of chamber and tube."""
+    """Names of the terms that runs of a scene model, without estimates for chamber and tube."""
     used = models_used(scene, law=model.name, obstacles=_obstacles(model), injections_only=True)
     return terms_modelled(used)
 
@@ -105,7 +106,7 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
     if abs(scene.disc.max_fill_ratio - largest) > 1e-9:
         problem = f"the {model.name} law was made for another fill"
         faults.append(scene_fault(scene, "disc.max_fill_ratio", problem=problem, allowed=f"{largest:.6g}"))
-    # Eq. 4 knows no rib, fillet or gas tube of an imported chamber, which can be much of it.
+    # Eq. 4 omits rib, fillet and gas tube of an imported chamber, which can be a large part of it.
     by_paper = isinstance(model.flow, PaperLaw) and scene.disc.geometry is not None
     volume = (paper.chamber_volume_paper if by_paper else chamber_volume)(disc=scene.disc)
     if abs(model.chamber_volume / volume - 1) > VOLUME_TOLERANCE:
@@ -120,9 +121,9 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
 
 
 def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
-    """Dead time of an injection of the limit's size at equal fills, while gas fills and liquid rises.
+    """Dead time, s, at equal fills of an injection that corrects the limit: gas fills, liquid rises.
 
-    At least the valve's lag and its shortest opening, s.
+    At least the valve's lag and its shortest opening.
     """
     modelled, total = run_terms(scene=scene, model=model), 2 * scene.disc.initial_fill
     least = max(scene.gas.valve_lag or 0.0, scene.controller.minimum_gas_time)

@@ -1,8 +1,8 @@
-"""Trials that a balancer offers to judge: its drawn inputs by kind, and settings to try, levels along axes.
+"""Settings of a balancer to try, as levels on axes, and kinds of its drawn inputs.
 
-A drawn input is spread from device to device, or one value that is not known.  Where all devices have a value
-alike, a fraction of drawn devices is the probability that the design conforms (JCGM 106:2012, section 9), and
-not the yield of a production.
+A drawn input varies from device to device, or is one unknown value.  Where all devices have the same value, a
+fraction of drawn devices is the probability that the design conforms (JCGM 106:2012, section 9), and not the
+yield of a production.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ class SearchAxis:
     name: str
     """Name of what varies, such as the path of a key."""
     levels: tuple[float, ...]
-    """All that may be tried, increasing."""
+    """All levels that may be tried, increasing."""
     first: tuple[int, ...]
-    """Places of those that are tried at first; their neighbours follow until the best is within them."""
+    """Indices of the levels that are tried first; the neighbours of the best follow."""
     unit: str = "1"
-    """SI."""
+    """SI unit of the levels."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,18 +41,18 @@ class Trials:
     kind: str
     axes: tuple[SearchAxis, ...]
     settings: Callable[[Point], Mapping[str, Any] | None]
-    """At a point, by path, SI, rounded as a scene file has them; None: there is none."""
+    """Settings at a point by path, SI, rounded as in a scene file; None: there are none."""
     stated: bool = True
     """True if the scene states settings of its own that can be judged."""
     kind_stated: bool = True
     """True if the scene gives this kind, so that a merely faster one does not replace it."""
     scan_axis: SearchAxis | None = None
-    """Axis chosen on only where the others do not suffice, or on request, with an answer at every level, such
-    as the supply's pressure; a point without it is at the scene's."""
+    """Axis, such as the supply's pressure, that is searched only where the others do not suffice, or on
+    request, with a result at every level; a point without it is at the scene's level."""
 
 
 def rounded(value: float, digits: int = 3) -> float:
-    """To significant digits."""
+    """Value rounded to significant digits."""
     return float(f"{value:.{digits}g}")
 
 
@@ -61,7 +61,7 @@ MEASURE_INPUT: Final = "measure_input"
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnInput:
-    """A drawn input."""
+    """Kind of a drawn input."""
 
     common: bool
     """True if all devices have the same unknown value; False if it varies between them."""
@@ -70,11 +70,12 @@ class DrawnInput:
     path: str = ""
     """Path of its key in the scene; empty: the scene has none."""
     name: str = ""
-    """Under which it is ranked with what belongs to it, as both parts of a model's error; empty: its own."""
+    """Name under which related inputs are ranked together, such as both parts of a model's error; empty: the
+    input's own."""
 
 
 def drawn_key(scene: SceneFile, path: str) -> DrawnInput:
-    """An input of a scene by its path, such as "rotor.mass", which is measured as it is."""
+    """Kind of an input by its path in the scene, such as "rotor.mass"; it can be measured itself."""
     table, _, key = path.split("[")[0].partition(".")
     declared = scene_kind(scene.balancer).schema.key_at((table, key))
     return DrawnInput(common=declared.common, measure=MEASURE_INPUT, path=path)

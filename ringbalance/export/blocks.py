@@ -1,6 +1,6 @@
 """Blocks that a host can run: law, disc in time, controller; each of constants and one row of numbers.
 
-A block's functions read the constants and change the row, in which each variable has its place; the source is
+A block's functions read the constants and change the row, in which each variable has its index; the source is
 the same for every host.
 """
 
@@ -35,14 +35,14 @@ from ringbalance.scene.models import Scene
 Kind = Literal["law", "disc", "controller"]
 Numbers = tuple[float, ...]
 _LONGEST_PART_S: Final = 1e-3
-"""Longest part of a step of the disc."""
+"""Longest part of a step of the disc, s."""
 _LONGEST_FOLLOWED_PART_S: Final = 5e-3
-"""Longest part of a step of the liquid that a controller follows."""
+"""Longest part of a step of the liquid that a controller estimates, s."""
 _SHORTEST_PART_S: Final = 1e-6
-"""Least value of the longest part: below it a host's step of 10 ms would take more than 10,000 parts."""
+"""Least value of the longest part, s: below it a host's step of 10 ms would take more than 10,000 parts."""
 _PART_OF_TIME_CONSTANT: Final = 0.04
-"""Longest part over the line's time constant: near its end a pressure changes some fifty times as fast, and
-the method is stable up to 2.8 of the reciprocal."""
+"""Longest part over the line's time constant: near the end of a filling a pressure changes some fifty times
+as fast, and the method is stable for parts up to 2.8 over that rate."""
 RANGE: Final = "{:g} to {:g} m/s".format(*VELOCITIES)
 
 
@@ -69,7 +69,7 @@ class Variable:
 
     @property
     def explained(self) -> str:
-        """Side, unit, bounds and meaning, in a line."""
+        """Direction (in or out), unit, bounds and meaning, in one line."""
         unit = self.range.get("unit", "1")
         of_unit = "" if unit == "1" else f"{unit}, "
         return f"{'in' if self.input else 'out'}, {of_unit}{self.bounds}: {self.description}"
@@ -82,7 +82,7 @@ class Block:
     kind: Kind
     title: str
     scene: str
-    """File that it was made from."""
+    """File of the scene that the block was made from."""
     facts: str
     """Contents and accuracy, in sentences."""
     constants: Numbers
@@ -92,13 +92,13 @@ class Block:
     """The row before the first step."""
     modules: tuple[ModuleType, ...]
     steps: str
-    """Function that lets a time pass and brings the outputs up to date; the law's does the latter alone."""
+    """Name of the function that advances by a time and updates the outputs; that of the law only updates."""
     timed: bool
-    """True if a time passes in a step."""
+    """True if a step advances by a time."""
     variables: tuple[Variable, ...]
 
     def source(self, entries: Sequence[str] = ()) -> Source:
-        """Source that some functions need; default the one that a host calls."""
+        """Source of some functions and all that they call; default of the one that a host calls."""
         return Source.of_modules(self.modules, entries or (self.steps,))
 
     @property
@@ -111,7 +111,7 @@ class Block:
         return {each.name: row[each.index] for each in self.variables if not each.input}
 
     def run(self, row: list[float], time: float, inputs: Mapping[str, float]) -> dict[str, float]:
-        """Set inputs, let a time pass, s, as a host does. Returns: the outputs."""
+        """Set inputs and advance by a time, s, as a host does. Returns: the outputs."""
         indices = {each.name: each.index for each in self.variables if each.input}
         for name, value in inputs.items():
             row[indices[name]] = float(value)
@@ -274,7 +274,7 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     compact, constants, row = _disc(scene, law, ())
     half, chambers = scene.disc.chambers // 2, scene.disc.chambers
     d, r = len(compact.constants), len(row)
-    # It follows the liquid of whole injections: none is cut, and parts may be long.
+    # The controller estimates whole injections: none is cut, and parts may be long.
     constants[d + disc.RESIDUAL], constants[d + disc.LONGEST] = -1.0, _LONGEST_FOLLOWED_PART_S
     loop, run = np.zeros(1, dtype=LOOP)[0], np.zeros(1, dtype=RUN)[0]
     LawBased(scene=scene, model=BalancerModel.of(law)).fill(loop, run)
@@ -334,7 +334,7 @@ def declared() -> dict[str, Any]:
 def _variables(
     kind: Kind, index_of: Callable[[str, int | None], int], *, most: float = 0.0, chambers: int = 2
 ) -> tuple[Variable, ...]:
-    """Variables as declared. Args: `place`: index by offset's name, and chamber where each has one."""
+    """Variables as declared. Args: `index_of`: index by name of the offset and, if any, chamber."""
     variables = []
     for each in declared()[kind]:
         limits = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}

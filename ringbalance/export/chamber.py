@@ -1,4 +1,4 @@
-"""Surface and moment of a chamber besides the law's answer, from the pieces of an export; as `point`."""
+"""Free surface and moment of a chamber from the pieces of an export, in the same operations as `point`."""
 
 from math import sqrt
 

@@ -1,8 +1,8 @@
 """The calibrated law as at most 4 kB of numbers, from which every host answers with the same bits.
 
-Velocity over the square root of its pressure stands as polynomials of degree five along the pressure's eighth
-root, levels alike along the fill ratio, each piece as long as the tolerance allows; beside them is what
-decides on regime and status.
+Velocity over the square root of its pressure is tabulated as polynomials of degree five in the pressure's
+eighth root, a chamber's hydrostatic pressure (its level) likewise in the fill ratio, each piece as long as
+the tolerance allows; further numbers decide on regime and status.
 """
 
 from __future__ import annotations
@@ -34,29 +34,30 @@ TOLERANCE: Final = 1e-4
 _HEAD_ERROR: Final = 0.25 * TOLERANCE
 """Relative error of a head, a part of the tolerance."""
 _LEVEL_ERROR: Final = 0.2 * TOLERANCE
-"""Error of a level over the head of the slowest velocity."""
+"""Error of a level over the pressure of the slowest velocity."""
 _MAX_LEVEL_PIECES: Final = 16
-"""Pieces of a level; one that needs more is less exact, and the export says so."""
+"""Largest number of pieces of a level; one that needs more is less exact; the export reports its error."""
 _SHARE_ERROR: Final = 5e-4
-"""Relative error of a share; where it decides if a column separates, `point` allows for more."""
+"""Relative error of the fraction of the pressure that is lost up to the crest; where it decides if a column
+separates, `point` allows for more."""
 _CHAMBER_ERROR: Final = 2e-6
 """Error relative to the largest squared radius and moment."""
 _EASES: Final = (1.0, 1.6, 2.5, 4.0)
-"""Factors on the errors of heads, in their cube on those of a chamber, where levels would have no room
-otherwise; the larger one is the fewer pieces of levels do, as `_MAX_LEVEL_PIECES` over its square."""
+"""Factors on the error of heads, cubed on that of a chamber, tried in turn until there is room for enough
+pieces of levels: `_MAX_LEVEL_PIECES` over the square of the factor."""
 _ROUNDING: Final = 0.2
-"""Part of a piece's error to which coefficients are rounded: numbers of few bits make small libraries."""
+"""Fraction of a piece's error to which coefficients are rounded: numbers of few bits make small libraries."""
 _END_BITS: Final = 18
-"""Bits of the ends at which pieces may meet, likewise."""
+"""Number of bits to which the ends of pieces are rounded, for small libraries."""
 _CELL_COUNTS: Final = (64, 128, 256)
-"""Numbers of cells of equal length, each of which holds the piece at which to begin looking; pieces end where
-cells do, and where these are too long for the tolerance, the next number is taken."""
+"""Numbers of cells of equal length, tried in turn until the tolerance is met; a cell holds the piece at which
+a search begins, and pieces end where cells do."""
 _LEVEL_CELLS: Final = 160
 MAX_BYTES: Final = 4096
-"""Size of all numbers; levels take what the rest leaves."""
+"""Largest size of all numbers, bytes; levels get what the rest leaves."""
 _SAMPLES_PER_CELL: Final = 10
 _EDGE: Final = 1e-3
-"""Part of a cell: more than rounding moves what lies next to its edge."""
+"""Margin at the edge of a cell, as a fraction of its length: more than rounding moves a value."""
 _COMPARED_CONDITIONS: Final = 4000
 """Drawn conditions in which the finished law is compared with the calibrated one."""
 
@@ -79,11 +80,11 @@ class Tables(NamedTuple):
     """Tables of a law's polynomials, as `point` reads them."""
 
     cells: tuple[int, ...]
-    """Rows at which to begin looking, each of a byte."""
+    """Rows at which a search begins, one byte each."""
     pieces: tuple[tuple[float, ...], ...]
     """Rows of eight numbers of single precision."""
     levels: tuple[tuple[float, ...], ...]
-    """Rows of eight numbers of double precision: near a stall two levels next to cancel."""
+    """Rows of eight numbers of double precision: near a stall two levels nearly cancel."""
 
     @property
     def size(self) -> int:
@@ -96,14 +97,14 @@ class CompactLaw:
     """Law of one scene in numbers that `point` reads."""
 
     scene: str
-    """File that it was calibrated from."""
+    """File of the scene that the law was calibrated from."""
     constants: tuple[float, ...]
     """Constants at the indices that `point` names."""
     tables: Tables
     level_error: float
     """Largest error of a level's pressure, Pa."""
     calibrated: CalibratedLaw
-    """The law that it tabulates, which has half-widths."""
+    """The tabulated law, which has half-widths."""
     departure: float = 0.0
     """Largest relative difference of a velocity from the calibrated law's, in drawn conditions."""
 
@@ -114,7 +115,7 @@ class CompactLaw:
 
     @property
     def max_fill_ratio(self) -> float:
-        """Liquid of the pair as a share of one chamber's volume."""
+        """Liquid of the pair as a fraction of one chamber's volume."""
         return self.constants[point.LARGEST_FILL]
 
     def answer(
@@ -125,7 +126,7 @@ class CompactLaw:
         gas_pressure: float,
         primed: bool = False,
     ) -> Answer:
-        """Answer one query; nothing is refused, the status tells how valid the answer is.
+        """Answer one query; nothing is refused, the status gives the validity of the answer.
 
         Args: as `FlowLaw.evaluate`.
         """
@@ -140,8 +141,8 @@ class CompactLaw:
 def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
     """Tabulate a calibrated law again, on as few knots as `TOLERANCE` allows.
 
-    Args: `scene`: whose law it is; its chamber gives the free surface.
-    Raises: SceneError: a law that takes more room than there is.
+    Args: `scene`: scene of the law; its chamber gives the free surface.
+    Raises: SceneError: a law that does not fit into `MAX_BYTES`.
     """
     tables = law.heads.tables
     for ease in _EASES:
@@ -201,7 +202,7 @@ def _tuples(rows: npt.NDArray[np.floating[Any]]) -> tuple[tuple[float, ...], ...
 
 @dataclass(frozen=True, kw_only=True)
 class _Piecewise:
-    """Quantity over samples, as polynomials."""
+    """Quantity at samples, approximated by piecewise polynomials."""
 
     value: FloatArray
     """Shape (samples,)."""
@@ -210,7 +211,7 @@ class _Piecewise:
     degree: int = point.C5 - point.C0
 
     def polynomial(self, x: FloatArray, first: int, last: int) -> FloatArray:
-        """Coefficients in powers of x - end from the samples between two, both of which are met.
+        """Coefficients in powers of x - x[last] from the samples `first` to `last`, both of which are met.
 
         The samples are those next to the extrema of a Chebyshev polynomial.  Coefficients are rounded to
         `_ROUNDING` of the piece's error.
@@ -230,7 +231,7 @@ class _Piecewise:
         return np.asarray(polyval(x[inside] - x[last], polynomial) - self.value[inside])
 
     def largest(self, x: FloatArray, ends: IntArray, of: FloatArray | float = 1.0) -> float:
-        """Error of all pieces. Args: `of`: values at the samples that it is relative to."""
+        """Largest error of all pieces. Args: `of`: values at the samples to which it is relative."""
         scale, pairs = np.broadcast_to(of, x.shape), pairwise(ends.tolist())
         return max(float(np.max(np.abs(self.errors(x, a, b) / scale[a : b + 1]))) for a, b in pairs)
 
@@ -240,7 +241,7 @@ class _Piecewise:
 
 
 def _add_levels(rows: LawRows, law: CalibratedLaw, *, most: int) -> float:
-    """Add the hydrostatic pressure over the fill ratio in at most so many pieces. Returns: error, Pa."""
+    """Add the hydrostatic pressure over the fill ratio in at most `most` pieces. Returns: error, Pa."""
     x = np.linspace(0.0, law.max_fill_ratio, _LEVEL_CELLS * _SAMPLES_PER_CELL + 1)
     slowest = float(roots_of(law.heads.siphon, VELOCITIES[0])) ** 8 * law.density
     level = _Piecewise(value=law.hydrostatic_pressure(x), allowed=np.full_like(x, _LEVEL_ERROR * slowest))
@@ -269,7 +270,7 @@ def _add_chamber(rows: LawRows, scene: Scene, law: CalibratedLaw, ease: float) -
 
 
 def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, ease: float) -> None:
-    """Add velocities over the eighth root of a pressure, and of a siphon the shares lost up to the crest."""
+    """Add velocities over the eighth root of a pressure, for a siphon also fractions lost to the crest."""
     root = law.density**0.125
     slowest, fastest = roots_of(table, VELOCITIES)
     for cells in _CELL_COUNTS:
@@ -279,7 +280,7 @@ def _add_way(rows: LawRows, law: CalibratedLaw, way: int, table: Table, ease: fl
         ratio = _Piecewise(value=value, allowed=ease * _HEAD_ERROR * value)
         shares = []
         if way == point.SIPHON and table.count > SHARE:
-            # Part of the pressure that is lost up to the crest, there and back.
+            # Fraction of the pressure that is lost up to the crest, forwards and backwards.
             for at in (SHARE, min(BACK_SHARE, table.count - 2)):
                 share = table.cubic(s, at)
                 shares.append(_Piecewise(value=share, allowed=_SHARE_ERROR * share, degree=2))
@@ -309,7 +310,7 @@ def _ends(x: FloatArray, columns: Sequence[_Piecewise]) -> IntArray:
 
     cells, last = [0], (x.size - 1) // _SAMPLES_PER_CELL
     while cells[-1] < last:
-        # The furthest end, by halving; one cell is taken to fit.
+        # The furthest end, by bisection; one cell is taken to fit.
         low, high = cells[-1] + 1, last
         while low < high:
             middle = (low + high + 1) // 2

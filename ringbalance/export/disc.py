@@ -1,10 +1,11 @@
 """The disc in time: fills and gas of every pair of chambers, in + - * / sqrt and comparisons alone.
 
 Liquid moves as the law says (`point`), without mass of its own; gas fills and vents at once, or through the
-scene's valve and line.  `c`, `k`, `p` and `q` are the law with the disc behind its numbers, `w` the disc's
-state with its inputs and outputs; the names below are places in them.  A step is cut where a valve moves and
-where a driven chamber comes to its residual fill, and then into parts of at most c[LONGEST], each of the
-classical Runge-Kutta method.  Source: `physics.gas` for the line, whose equations and names these are.
+scene's valve and line.  `c`, `k`, `p` and `q` are the law, with the disc's numbers behind its own, `w` the
+disc's state with its inputs and outputs; the names below are indices into them.  A step is cut where a valve
+moves and where a driven chamber comes to its residual fill, and then into parts of at most c[LONGEST], each
+integrated by the classical Runge-Kutta method.  Source: `physics.gas` for the line, with its equations and
+names.
 """
 
 from math import sqrt
@@ -35,15 +36,15 @@ from ringbalance.reduced_model.pieces.point import (
 from ringbalance.reduced_model.pieces.query import set_answer
 
 # fmt: off
-# Behind the place in c[BLOCK]; of each pair the direction of its positive chamber.
+# Constants from index c[BLOCK] on; from DIRECTIONS on, the direction of each pair's positive chamber.
 PAIRS, TOTAL, PER_SECOND, VOLUME, DEAD, SUPPLY, LAG, RESIDUAL, LONGEST = 0, 1, 2, 3, 4, 5, 6, 7, 8
 LINE, PASSING, CRITICAL, WARMTH, RATIO, TEMPERATURE_VARIES = 9, 10, 11, 12, 13, 14
 START_X, START_Y, INFLUENCE_X, INFLUENCE_Y, DIRECTIONS = 15, 16, 17, 18, 19
 
-# Of the disc; then in a part of a step.
+# State of the disc; then work values of a part of a step.
 MOMENT_X, MOMENT_Y, VIBRATION_X, VIBRATION_Y = 40, 41, 42, 43
 STATES, RATES, BEFORE, SUM, FIRST_PAIR, PER_PAIR = 5, 44, 49, 54, 59, 18
-# Of a pair: what moves by rates, the tube, and of both chambers each.
+# State of a pair: integrated states, tube, and values of both chambers.
 X, GAS, CONTENT, IS_PRIMED, ASKED, LIQUID, HELD, VALVE, OPENS, CLOSES = 0, 1, 3, 5, 6, 8, 10, 12, 14, 16
 # fmt: on
 

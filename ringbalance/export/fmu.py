@@ -1,8 +1,8 @@
 """A block as a functional mock-up unit (FMI 2.0 or 3.0, co-simulation), with the source inside.
 
 A host that has a compiler builds it from `sources/`; where this machine has one, the unit also runs as it is
-on machines like this one, and with a cross-compiler on all.  Two exports of one law are equal to the byte but
-for what the compiler makes.
+on machines like this one, and with a cross-compiler on all.  Two exports of one law are equal to the byte,
+apart from compiled libraries.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ def fmu_bytes(block: Block, name: str, version: Version, *, all_systems: bool = 
     """The unit, and true if it has a library.
 
     It holds the model description, the sources, reference results, and the library for machines like this one
-    where a compiler is, or, with `all_systems`, those for all that the standard names.
+    if there is a compiler, or, with `all_systems`, those for all machines that the standard names.
 
     Raises: OSError: no cross-compiler for all systems.
     """
-    # Counts and places of the variables, and how one is read: of a block without time from a fresh answer.
+    # Counts and indices of the variables, and code that reads one: a block without time is evaluated first.
     of = {kind: [each for each in block.variables if each.kind == kind] for kind in _KINDS}
     shown = "return s->block.w[PLACES[reference]];"
     if not block.timed:
@@ -117,7 +117,7 @@ def _model_3(block: Block, name: str) -> bytes:
 
 
 def _range(block: Block, variable: Variable) -> dict[str, str]:
-    """Unit and range, and of an input its value at the start."""
+    """Unit and range, and for an input its value at the start."""
     start = block.start[variable.index]
     text = number_text(start) if variable.kind == "Real" else str(bool(start)).lower()
     return {**variable.range, "start": text} if variable.input else dict(variable.range)
@@ -155,7 +155,7 @@ def _xml(root: ET.Element) -> bytes:
 
 
 def guid_of(block: Block) -> str:
-    """Identifier of a block's unit: other numbers make another one."""
+    """Identifier of a block's unit, which changes with any of its numbers."""
     tables = () if block.tables is None else (block.tables.cells, *block.tables.pieces, *block.tables.levels)
     text = ",".join(number_text(value) for value in (*block.constants, *chain(*tables), *block.start))
     return hashlib.sha256(f"{block.kind},{text}".encode()).hexdigest()[:32]

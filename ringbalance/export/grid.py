@@ -1,4 +1,4 @@
-"""The compact law as a table of values, for programs that interpolate, with the error of doing so."""
+"""The compact law as a table of values, for programs that interpolate, with the interpolation error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COLUMNS: Final = (
 def csv_files(law: CompactLaw, name: str, *, points: int, highest: float) -> dict[str, str]:
     """A grid of fills and pressures; the opposite chamber holds the rest of the pair's liquid.
 
-    Args: `points`: on each axis. `highest`: gas pressure that the grid ends at, gauge, Pa.
+    Args: `points`: number on each axis. `highest`: gauge pressure of the gas at the end of the grid, Pa.
     """
     fills, pressures = np.linspace(0.0, law.max_fill_ratio, points), np.linspace(0.0, highest, points)
     answers = {
@@ -34,7 +34,7 @@ def csv_files(law: CompactLaw, name: str, *, points: int, highest: float) -> dic
         for key in product(fills.tolist(), pressures.tolist(), (False, True))
     }
 
-    # Errors of interpolation in the middle of cells of one regime, m/s, and the number of the others.
+    # Errors of interpolation in the middle of cells of one regime, m/s, and number of cells with several.
     errors, mixed = [], 0
     cells = list(product(range(points - 1), range(points - 1), (False, True)))
     for i, j, primed in cells:

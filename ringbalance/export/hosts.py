@@ -1,4 +1,4 @@
-"""A block as files of other programs: a frame around one source."""
+"""A block as files for other programs: templates filled with one source."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _TAKEN: Final = frozenset(keyword.kwlist) | {"math", "collections"}
 
 
 def identifier(text: str) -> str:
-    """A name that every language takes."""
+    """Name that is valid in every language."""
     name = re.sub(r"_+", "_", re.sub(r"[^0-9a-z]", "_", text.lower())).strip("_") or "law"
     return f"law_{name}" if name[0].isdigit() or name in _TAKEN else name
 
@@ -45,7 +45,7 @@ def c_files(block: Block, name: str) -> dict[str, str]:
 
 
 def block_c_files(block: Block, name: str) -> dict[str, str]:
-    """Text of source and header by file name, with the names that all blocks have."""
+    """Text of source and header by file name, with the function names common to all blocks."""
     upper = name.upper()
     last = block.variables[-1]
     places = [
@@ -128,7 +128,7 @@ def python_files(block: Block, name: str) -> dict[str, str]:
 
 _C_TABLES: Final = "CONSTANTS, CELL_ROWS, PIECES, LEVELS"
 _TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
-"""Writer of a number by language; C's hexadecimal ones are short and leave nothing to round."""
+"""Writer of a number by language; C's hexadecimal numbers are short and leave nothing to round."""
 _NUMBERS: Final = {
     "Cells": {"c": "unsigned char", "st": "USINT", "st_name": "k"},
     "Pieces": {"c": "float", "st": "REAL", "st_name": "p"},
@@ -144,7 +144,7 @@ def _tables_of(block: Block) -> Iterator[tuple[str, Sequence[Any]]]:
 
 
 def _st_array(kind: str, rows: Sequence[Any]) -> str:
-    """Declaration of a table in structured text, behind ARRAY."""
+    """Declaration of a table in structured text, after ARRAY."""
     width = "" if kind == "Cells" else f", 0..{PER_PIECE - 1}"
     return f"[0..{len(rows) - 1}{width}] OF {_NUMBERS[kind]['st']}"
 
@@ -179,7 +179,7 @@ def template(name: str) -> str:
 
 
 def filled(frame: str, block: Block, name: str, **parts: str) -> str:
-    """A template with a block in it. Args: `parts`: further words of that template."""
+    """Template filled with a block. Args: `parts`: further substitutions of that template."""
     text = template(frame)
     language = next((each for each in ("st", "python") if frame.endswith(each)), "c")
     written = _TEXT[language]
@@ -203,7 +203,7 @@ def filled(frame: str, block: Block, name: str, **parts: str) -> str:
 
 
 def plain_name(scene: str) -> str:
-    """A scene's file without what could end a comment."""
+    """File name of a scene without characters that could end a comment."""
     return re.sub(r"[^\w./ -]", "_", scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 

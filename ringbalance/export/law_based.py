@@ -1,8 +1,8 @@
 """The law-based controller in time, in + - * / sqrt and comparisons alone.
 
 `c`, `k`, `p` and `q` are law and disc as the controller assumes them (`disc`, gas at once), with its settings
-behind; `w` is the disc's row, which follows the liquid from valve-open time to valve-open time, with the
-controller's memory behind its pairs.  It samples as `controller` does.  Source: `LawBased` of
+behind; `w` is the row of the disc, with the liquid as estimated, and with the controller's memory behind the
+pairs.  It samples as `target_steps` does.  Source: `LawBased` of
 `controller.algorithms.law_based`; a valve-open time is t = (V/S) integral dx/u(x), by Gauss's rule on equal
 parts of x.
 """
@@ -81,11 +81,11 @@ from ringbalance.reduced_model.pieces.point import (
 from ringbalance.reduced_model.pieces.query import set_answer
 
 # fmt: off
-# Behind the disc's numbers; then the offset of each chamber.
+# Settings behind the disc's numbers; the offsets of the chambers come last.
 LIMIT, LEAST_TIME, LONGEST_TIME, PERIOD, LEAST_FILL, ASSUMED = 0, 1, 2, 3, 4, 5
 LAW_SQUARE, AMPLITUDE_SQUARE, PHASE_SQUARE, OFFSETS = 6, 7, 8, 9
 
-# Behind the pairs the algorithm's own memory (`law_steps`), what a host sees beside, and of each chamber.
+# Row behind the pairs: the algorithm's memory (`law_steps`), further values for a host, and the chambers'.
 RESTS, SAMPLES, WAIT, OPENED, FLOW_PRIMED, FIRST_CHAMBER = 0, 1, 2, 3, 4, 5
 # fmt: on
 

@@ -28,7 +28,7 @@ _SMALL: Final = (
     *("-s", "-Os", "-fomit-frame-pointer", "-fno-math-errno", "-fno-ident"),
     *("-fno-vectorize", "-fno-slp-vectorize"),
 )
-"""Six libraries are most of a unit."""
+"""Options for small libraries: six of them are most of a unit."""
 _OF_PROCESSOR: Final = {"x86_64": ("-Xclang", "-Oz"), "aarch64": ()}
 _PLAIN: Final = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
 _OF_SYSTEM: Final = {
@@ -36,15 +36,15 @@ _OF_SYSTEM: Final = {
     "darwin": (*_PLAIN, "-Wl,-x"),
     "windows": ("-nostdlib", "-I.", "-lkernel32"),
 }
-"""Without what exceptions of other languages would need on their way through, which Windows asks for always,
-and without names that nothing outside asks for."""
+"""Options by system: no unwind tables, which only exceptions of other languages need, but Windows always
+requires; and no names that nothing outside needs."""
 _HEADERS: Final = {
     "math.h": "double sqrt(double);\n",
     "stdlib.h": "#include <stddef.h>\nvoid *malloc(size_t);\nvoid free(void *);\n",
     "string.h": "#include <stddef.h>\nvoid *memcpy(void *, const void *, size_t);\n"
     "int strcmp(const char *, const char *);\n",
 }
-"""For Windows, whose C library takes the cross-compiler minutes and a unit 30 kB."""
+"""C headers for Windows, whose C library would take the cross-compiler minutes and a unit 30 kB."""
 _PROCESSORS: Final = ("x86_64", "aarch64")
 _PYTHON_NAMES: Final = {"AMD64": "x86_64", "arm64": "aarch64"}
 _FOLDERS_2: Final = {"linux": "linux64", "darwin": "darwin64", "windows": "win64"}
@@ -88,7 +88,7 @@ def every_library(sources: Mapping[str, str], name: str, version: Version) -> di
 def _compiled(
     compiler: Sequence[str], sources: Mapping[str, str], library: str, further: Sequence[str]
 ) -> bytes:
-    """Args: `further`: options behind the sources. Raises: OSError: the compiler fails."""
+    """Compile a library. Args: `further`: options after the sources. Raises: OSError: the compiler fails."""
     with tempfile.TemporaryDirectory() as folder:
         for file, text in sources.items():
             Path(folder, file).write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
-"""Reference results inside a unit, to compare a host's own run of it with.
+"""Reference results inside a unit, for comparison with a host's own run of it.
 
-They stand where the layered standard FMI-LS-REF (1.0.0-alpha.1) puts them, in the form of the Reference FMUs:
-CSV with the time first, numbers in full; inputs hold from their row to the next.
+Their folder is that of the layered standard FMI-LS-REF (1.0.0-alpha.1), their form that of the Reference
+FMUs: CSV with the time first, numbers in full; inputs hold from their row to the next.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def reference_files(block: Block, name: str) -> dict[str, bytes]:
 
 
 def _csv(rows: list[Mapping[str, float]], later: int, integers: set[str]) -> bytes:
-    """Args: `later`: steps from the beginning to the first row."""
+    """CSV file of rows. Args: `later`: steps from the beginning to the first row."""
     times = [repr((row + later) * _STEP_S) for row in range(len(rows))]
     columns = {
         name: [str(int(row[name])) if name in integers else repr(row[name]) for row in rows]

@@ -1,6 +1,6 @@
-"""Writes functions of numbers in C99 and in structured text (IEC 61131-3), from their Python syntax tree.
+"""Write functions of numbers in C99 and in structured text (IEC 61131-3), from their Python syntax tree.
 
-What a language could take differently is refused: only +, -, *, /, sqrt, comparisons, `if`, `while`, whole
+Only what all languages evaluate alike is accepted: +, -, *, /, sqrt, comparisons, `if`, `while`, whole
 numbers that divide without remainder or towards zero, and rows of numbers.
 """
 
@@ -29,15 +29,15 @@ class Function:
     summary: str
     """First line of its docstring."""
     arguments: Mapping[str, str]
-    """Name to type."""
+    """Types by name."""
     result: str
     body: Sequence[ast.stmt]
     text: str
-    """In Python."""
+    """The function in Python."""
 
     @property
     def names(self) -> set[str]:
-        """Names that it uses."""
+        """Names used in the body."""
         nodes = [node for each in self.body for node in ast.walk(each)]
         return {node.id for node in nodes if isinstance(node, ast.Name)}
 
@@ -51,9 +51,9 @@ class Source:
 
     @classmethod
     def of_modules(cls, modules: Sequence[ModuleType], entries: Sequence[str]) -> Source:
-        """Source that some functions need, of modules that import each other's names, a later one's before.
+        """Source of some functions and all that they call; of functions with one name, the last module's.
 
-        Raises: ValueError: something in it that is not of the subset, or a constant of two values.
+        Raises: ValueError: code outside the subset, or a constant with two values.
         """
         sources = [cls.of_text(inspect.getsource(each)) for each in modules]
         functions = {name: each for source in sources for name, each in source.functions.items()}
@@ -80,7 +80,7 @@ class Source:
     def of_text(cls, text: str) -> Source:
         """Read the source of a module.
 
-        Raises: ValueError: something in it that is not of the subset.
+        Raises: ValueError: code outside the subset.
         """
         tree = ast.parse(text)
         constants = {
@@ -93,7 +93,7 @@ class Source:
         for node in tree.body:
             if isinstance(node, ast.FunctionDef):
                 docstring = ast.get_docstring(node) or ""
-                # What marks a function for the program's own compiled code is nothing to another host.
+                # Decorators serve only the program's own compiled code.
                 node.decorator_list = []
                 arguments = {
                     each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args
@@ -119,7 +119,7 @@ def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Language:
-    """Forms of one language."""
+    """Syntax of one language."""
 
     types: Mapping[str, str]
     """Format of a declared name."""
@@ -133,7 +133,7 @@ class Language:
     """Format of a variable's name."""
     function: str
     constants: bool
-    """True if constants go by their names."""
+    """True if constants are written by name."""
     assign: str
     open_if: str
     else_if: str
@@ -142,7 +142,7 @@ class Language:
     open_while: str
     close_while: str
     element: Mapping[str, str]
-    """Format of a number in rows, by their type, from their name and indices."""
+    """Format of an element of an array, by type of the array, from its name and indices."""
 
 
 C99: Final = Language(
@@ -231,7 +231,7 @@ def structured_text(prefix: str) -> Language:
 
 @dataclass(frozen=True, kw_only=True)
 class Writer:
-    """Writes one function."""
+    """Writer of one function."""
 
     language: Language
     source: Source
@@ -340,7 +340,7 @@ class Writer:
                 kind = self._expression(left)[1]
                 if isinstance(operator, _NOT_OF.get(kind, ast.operator)):
                     raise self._refused(left)
-                # Every operation in brackets of its own: no language's order of them matters.
+                # Every operation has its own brackets, so that operator precedence does not matter.
                 sign = _BINARY[type(operator)]
                 return f"{self._operand(left, kind)} {sign} {self._operand(right, kind)}", kind
             case ast.Compare(left=left, ops=[comparison], comparators=[right]):
@@ -433,7 +433,7 @@ def c_functions(source: Source) -> str:
 def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, str]) -> str:
     """All functions of a source in structured text.
 
-    Args: `prefix`: of their names. `sizes`: what each row is an array of, by its type.
+    Args: `prefix`: prefix of their names. `sizes`: bounds and element type of each array, by type of the row.
     """
     language = structured_text(prefix)
     parts = []

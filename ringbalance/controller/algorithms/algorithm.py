@@ -28,7 +28,7 @@ class Measurement:
     amplitude: float
     """m, zero-to-peak."""
     phase: float
-    """rad, any multiple of a full turn away."""
+    """rad, up to a multiple of a full turn."""
     at_residual: tuple[bool, ...] = ()
     """True for every chamber that a sensor reports as empty; an empty tuple: there is no such sensor."""
 
@@ -48,7 +48,7 @@ class ValveCommand:
     """s, above zero."""
 
     def __post_init__(self) -> None:
-        """Refuse a chamber or a time that no valve has."""
+        """Refuse a negative chamber index, and a duration that is not positive and finite."""
         if index(self.chamber) < 0:
             raise ValueError(f"chamber {self.chamber}: chambers are counted from 0, which is A")
         if not 0.0 < self.duration < inf:
@@ -67,9 +67,9 @@ class Command:
 
     valves: tuple[ValveCommand, ...] = ()
     resting: bool = False
-    """True when the algorithm is content: the amplitude is not above its limit."""
+    """True if the algorithm rests: the amplitude is not above its limit."""
     reason: str = ""
-    """Reason for which no valve opens although the algorithm is not content; empty otherwise."""
+    """Reason for which no valve opens although the algorithm does not rest; empty otherwise."""
 
 
 class Controller(Protocol[StateT]):
@@ -92,9 +92,9 @@ class Controller(Protocol[StateT]):
 
     @property
     def rises_tolerated(self) -> int:
-        """Operations in a row after which the amplitude may have risen without the loop diverging.
+        """Number of operations in a row, each followed by a rise of the amplitude, that a run tolerates.
 
-        As many rises that end above the first sample, or one more, end a run.
+        One rise more ends the run; so do this many if the amplitude is then above the first sample.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""Algorithms of the program: the common part, and the two that follow no liquid, target vector and trial."""
+"""Base of the program's algorithms, and the two that do not model the liquid: target vector and trial."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ class BuiltIn:
 
     @property
     def rises_tolerated(self) -> int:
-        """Rises in a row that are borne: one, and another after an assumption has been corrected."""
+        """Tolerated rises in a row: one, and another after an assumption has been corrected."""
         return 2
 
     def fill(self, loop: Record, run: Record) -> None:  # noqa: ARG002
-        """Write the settings into an element of type `LOOP`, and the first memory into one of type `RUN`."""
+        """Write the settings into an element of type `LOOP`, the initial memory into one of type `RUN`."""
         settings, chambers = self.scene.controller, self.scene.disc.chambers
         loop["chambers"], loop["rest_limit"] = chambers, settings.limit
         loop["minimum_gas_time"] = settings.minimum_gas_time
@@ -63,13 +63,13 @@ class BuiltIn:
         loop["offset"][:chambers] = settings.offsets(chambers)
 
     def liquid(self) -> Records:
-        """Pairs as the algorithm estimates them at the start; empty where it follows no liquid."""
+        """Pairs as estimated at the start; empty for an algorithm that does not model the liquid."""
         return np.zeros(0, dtype=MOTION)
 
 
 @in_place
 def open_valve(loop: Record, run: Record, chamber: int, share: float, offset: float) -> None:
-    """Command gas into a chamber for a share and its offset, s, unless the share is below the minimum."""
+    """Open a chamber's valve for its share of the time plus its offset, s, unless the share is too short."""
     if share > 0.0 and share >= loop.minimum_gas_time:
         half = loop.chambers // 2
         run.asked[chamber % half] = min(share + offset, loop.maximum_gas_time)
@@ -107,14 +107,14 @@ class TargetVector(BuiltIn):
     chambers on either side, each by its component, with both valves open together.  A chamber that has no
     more liquid to give is passed over for its neighbour.
 
-    Limits: T is held within [0, maximum_gas_time], which keeps the vector's direction; while it is cut the
-    integral stands still (anti-windup).  A valve whose share is below minimum_gas_time does not open;
-    another stays open for its offset, too, in which gas fills the chamber and moves nothing.
-    At or below `limit` the algorithm rests and forgets its integral.  A dropped sample or a NaN changes
-    nothing: no valve opens, the state is held, and the next usable sample sees the whole interval.
+    Limits: T is limited to [0, maximum_gas_time], which keeps the vector's direction; while it is limited the
+    integral is held (anti-windup).  A valve whose share is below minimum_gas_time does not open; any other
+    stays open longer by its offset, the time in which gas fills the chamber and moves no liquid.
+    At or below `limit` the algorithm rests and resets its integral.  A dropped sample or a NaN changes
+    nothing: no valve opens, the state is held, and the next usable sample covers the whole interval.
 
-    An amplitude has no sign, so its integral could only grow and would keep pushing after the residual has
-    turned round.  `on_reversal = "reset"` (default) therefore drops what was integrated when the residual has
+    An amplitude has no sign, so its integral could only grow and would still lengthen T after the residual
+    has reversed.  `on_reversal = "reset"` (default) therefore resets the integral when the residual has
     turned by more than 90 degrees, as a Clegg integrator does at a change of sign; "accumulate" is the
     literal formula.
     Source: section 4.2 of the liquid-ring paper; PID form of the LabVIEW PID and Fuzzy Logic Toolkit help;
@@ -122,7 +122,7 @@ class TargetVector(BuiltIn):
     """
 
     on_reversal: OnReversal = "reset"
-    """Treatment of the integral when the residual turns round."""
+    """Treatment of the integral when the residual reverses."""
 
     def fill(self, loop: Record, run: Record) -> None:
         """Write the settings, those of this algorithm included."""
@@ -133,7 +133,7 @@ class TargetVector(BuiltIn):
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """Constants of `target_steps`, in the order of their places."""
+        """Settings of `target_steps`, in the order of their indices there."""
         settings, chambers = self.scene.controller, self.scene.disc.chambers
         sensor = self.scene.sensor
         lag, axes = settings.assumed_lag_angle, chamber_directions(chambers).tolist()
@@ -172,7 +172,7 @@ def target_vector_step(loop: Record, run: Record) -> None:
 
 @in_place
 def _open_valves(loop: Record, run: Record, first: int) -> None:
-    """Command the open times that the memory holds for each chamber, from the place `first` on."""
+    """Command the valve-open times of the chambers, which the memory holds from index `first` on."""
     for chamber in range(loop.chambers):
         opened = run.memory[first + PER_CHAMBER * chamber + OPEN_TIME]
         if opened > 0.0:
@@ -184,8 +184,8 @@ def _open_valves(loop: Record, run: Record, first: int) -> None:
 class Trial(BuiltIn):
     """Gas into one chamber at a time, with a step that shrinks near the goal; the phase is not read.
 
-    The first trial of a chamber is short.  If the amplitude falls, the chamber stays and the step is long
-    while the amplitude is at or above `fine_below`, short below it; if it does not fall, the next chamber of
+    The first trial of a chamber is short.  If the amplitude falls, the chamber is kept, and the next step is
+    long if the amplitude is at or above `fine_below`, else short; if it does not fall, the next chamber of
     the sequence gets its first trial.  Below `fine_below` a first trial is no longer than the short step.
 
     At or below `limit` the algorithm rests and keeps its chamber.  A dropped sample or a NaN amplitude
@@ -195,7 +195,7 @@ class Trial(BuiltIn):
 
     @property
     def rises_tolerated(self) -> int:
-        """One round through the sequence: a rise is how this algorithm learns."""
+        """Length of the sequence: a trial on the wrong chamber raises the amplitude."""
         return len(self.scene.controller.sequence)
 
     def fill(self, loop: Record, run: Record) -> None:
@@ -206,7 +206,7 @@ class Trial(BuiltIn):
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """Constants of `trial_steps`, in the order of their places."""
+        """Settings of `trial_steps`, in the order of their indices there."""
         settings, letters = self.scene.controller, chamber_letters(self.scene.disc.chambers)
         return (
             float(len(letters)),

@@ -1,4 +1,4 @@
-"""The law-based algorithm: valve-open times straight from the flow law, and an influence that it learns."""
+"""The law-based algorithm: valve-open times from the flow law, and an estimated influence coefficient."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ from ringbalance.scene.platform.compiled import in_place
 PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""
 LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
-"""Standard deviation, relative, below which no flow law's velocity is trusted."""
+"""Lower bound of the relative standard deviation of a flow law's velocity."""
 FILL_ERROR: Final = 1e-3
-"""Error in fill ratio, over that allowed to a step, at which a valve-open time is good enough."""
+"""Tolerance in fill ratio of a valve-open time, as a multiple of the error allowed to a step."""
 _HALVINGS: Final = 60
 _BLOCKED: Final = EVENTS.index(Event.BLOCKED)
 _EMPTY: Final = EVENTS.index(Event.EMPTY)
@@ -65,26 +65,26 @@ _FULL: Final = EVENTS.index(Event.FULL)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LawBased(BuiltIn):
-    """Valve-open times that take the whole residual away in one operation, t = (V/S) integral dx/u(x) for
-    each pair.
+    """Valve-open times that remove the whole residual in one operation, t = (V/S) integral dx/u(x) for each
+    pair.
 
     The residual unbalance V/K needs a change of the disc's moment; the moment curve turns it into fill
-    ratios of the pairs, the flow law into valve-open times, with the chambers' fills followed by the same law
-    since the start.  After each operation K is estimated again from the vibration's response (`learn`), so a
-    wrong influence coefficient, lag angle or speed of the flow spoils only the first operation.  There is no
-    gain to tune.
+    ratios of the pairs, the flow law into valve-open times.  The chambers' fills are estimated by the same
+    law from the start on.  After each operation K is estimated again from the vibration's response (`learn`),
+    so a wrong influence coefficient, lag angle or speed of the flow spoils only the first operation.  There
+    is no gain to tune.
 
     Limits: a valve whose time is below minimum_gas_time does not open, one above maximum_gas_time is cut to
-    it.  Where the law says that nothing flows, or that a chamber is empty, gas is given all the same, since
-    fills and law are only assumed: a period long, or as long as the missing moment would take.
+    it.  Where by the law nothing flows, or a chamber is empty, its valve opens all the same, since fills and
+    law are only assumed: for one period, or for the time that the missing moment would take.
     At or below `limit` the algorithm rests.  A dropped sample or a NaN changes nothing: no valve opens, and
     the next usable sample shows the response.
     """
 
     model: BalancerModel
-    """Model that the algorithm assumes, which need not be the one that is controlled."""
+    """Model that the algorithm assumes; that of the controlled disc may differ."""
     relative_error: float = RELATIVE_ERROR
-    """Error allowed to a step of the liquid that it follows."""
+    """Relative error allowed to an integration step of the estimated liquid."""
 
     @cached_property
     def ring(self) -> LiquidRing:
@@ -118,7 +118,7 @@ class LawBased(BuiltIn):
         return max(relative, LEAST_LAW_STANDARD_DEVIATION)
 
     def fill(self, loop: Record, run: Record) -> None:
-        """Write the settings, the influence assumed and its variance included."""
+        """Write the settings, with the assumed influence coefficient and its variance."""
         super().fill(loop, run)
         scene, chambers, total = self.scene, self.ring.chambers, self.ring.total
         influence, sensor = scene.controller.assumed_influence, scene.sensor
@@ -135,7 +135,7 @@ class LawBased(BuiltIn):
         run["memory"][VARIANCE] = abs(PRIOR_STANDARD_DEVIATION * influence) ** 2
 
     def liquid(self) -> Records:
-        """Pairs at rest at equal fills, and a spare one to try."""
+        """Pairs at rest at equal fills, and a spare one for trial integrations."""
         return self._liquid.copy()
 
     @cached_property
@@ -145,7 +145,7 @@ class LawBased(BuiltIn):
 
 
 def first_memory(axes: ComplexArray) -> FloatArray:
-    """A row for `law_steps` with the directions of pairs and nothing else."""
+    """Memory of `law_steps` with the directions of the pairs, all else zero."""
     row = np.zeros(MEMORY)
     for pair, axis in enumerate(axes):
         row[change_of(0, pair) + AXIS_X], row[change_of(0, pair) + AXIS_Y] = axis.real, axis.imag
@@ -195,7 +195,7 @@ def _disc_moment(loop: Record, plant: Record, liquid: Record) -> complex:
 def _follow(
     loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
 ) -> None:
-    """Follow the liquid to the sample's time, and learn from the response."""
+    """Integrate the liquid to the sample's time, and update the influence coefficient by the response."""
     interval = run.time - run.before_time
     if not interval > 0.0:
         return
@@ -227,7 +227,7 @@ def _follow(
 
 @in_place
 def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray) -> None:
-    """Command the valve-open times that take the residual away."""
+    """Command the valve-open times that remove the residual."""
     half, lowest, m = loop.chambers // 2, loop.least_fill, run.memory
     highest = plant.total - lowest
     least, most = _along(plant, lowest), _along(plant, highest)
@@ -259,7 +259,7 @@ def _along(plant: Record, fill: float) -> float:
 def _fill_after(
     plant: Record, liquid: Record, pair: int, side: int, time: float, notes: FloatArray, w: FloatArray
 ) -> float:
-    """Fill of a driven chamber after a time of gas, s; a spare pair is tried."""
+    """Fill of a driven chamber after its valve has been open for a time, s, integrated on the spare pair."""
     trial = liquid.size - 1
     liquid[trial] = liquid[pair]
     motion = liquid[trial]
@@ -283,8 +283,8 @@ def _gas_time(
 ) -> float:
     """Valve-open time that brings a pair to a fill of its positive chamber, t = (V/S) integral dx/u(x), s.
 
-    At most the longest; the time of the stall when the flow stalls before; a try more below the smallest
-    possible fill; the probe's where nothing flows.
+    At most the longest.  If the flow stalls before the target, the time until it stalls; if a chamber is then
+    empty or full, the time of a try in addition.  The probe's time where nothing flows.
     """
     longest, fill = loop.maximum_gas_time, shown(plant, liquid[pair], liquid[pair].state[X])
     target, now = (plant.total - wanted, plant.total - fill) if side else (wanted, fill)
@@ -300,7 +300,7 @@ def _gas_time(
     flows = now > lowest
     if flows and motion.ended == 0.0:
         return float(longest)
-    # What an earlier command has emptied does not flow again.
+    # A chamber that an earlier command has emptied does not flow again.
     ended, more = motion.ended if flows else 0.0, 0.0
     if motion.event in (_EMPTY, _FULL):
         more = _try_time(loop, plant, reached - target)
@@ -309,9 +309,9 @@ def _gas_time(
 
 @in_place
 def _try_time(loop: Record, plant: Record, change: float) -> float:
-    """Valve-open time for a change of a fill where no more liquid is expected, s: as if chambers were level.
+    """Valve-open time for a change of a fill where no more liquid is expected, s, by the flow at equal fills.
 
-    At most the probe's, for it may be lost; where it is not, the response shows it.
+    At most the probe's time, for the gas may move nothing; if it moves liquid, the response shows it.
     """
     level = plant.total / 2.0
     speed = steady(plant, level, level, plant.gas_pressure, 0.0, True, 0.0)[0]
@@ -331,11 +331,11 @@ def _time_to(
     notes: FloatArray,
     w: FloatArray,
 ) -> float:
-    """Valve-open time, at most `longest`, s, after which a driven chamber is at a fill that it reaches.
+    """Valve-open time, at most `longest`, s, after which a driven chamber is at a fill within its reach.
 
-    Args: `now`, `reached`: its fill at first, and after the longest time.
+    Args: `now`, `reached`: fill of the chamber at first, and after the longest time.
 
-    By the secant within a bracket that shrinks, halving the weight of an end that stays (the Illinois rule).
+    By regula falsi, with the weight of an end that stays halved (Illinois rule).
     """
     low, high, stays = 0.0, longest, 0
     above, below = now - target, reached - target

@@ -1,8 +1,8 @@
 """Learning and splitting of a correction by the law-based algorithm, in + - * / sqrt and comparisons alone.
 
 The program's loop compiles these functions and an export translates them, see `reduced_model.pieces.point`.
-`m` is a row of numbers that has the algorithm's memory from the place `r` on; the names below are places in
-it, all SI.
+`m` is a row of numbers with the algorithm's memory from index `r` on; the names below are indices into that
+memory, all SI.
 """
 
 from math import sqrt
@@ -15,15 +15,15 @@ from ringbalance.scene.platform.both_ways import both_ways
 # with the mean square of its error, of both components together.
 SEEN_X, SEEN_Y, LAST_X, LAST_Y, NOW_X, NOW_Y, LAST_MOMENT_X, LAST_MOMENT_Y = 0, 1, 2, 3, 4, 5, 6, 7
 LEARNT_X, LEARNT_Y, VARIANCE, FIRST_CHANGE, PER_CHANGE = 8, 9, 10, 11, 9
-# Of each pair what is asked of its moment, bounds of that, at which of them it is, and its direction; then
-# its moment, what the last operation should have changed of it, and in which sense it gave nothing.
+# For each pair: requested change of its moment, bounds of this change, sign of the bound that it is at, and
+# direction; then moment, change expected of the last operation, and sense in which the pair gave nothing.
 CHANGE, LOWEST_CHANGE, HIGHEST_CHANGE, FIXED, AXIS_X, AXIS_Y = 0, 1, 2, 3, 4, 5
 MOMENT_NOW, SHOULD, GAVE_NOTHING = 6, 7, 8
 # fmt: on
 
 MAGNITUDE_RANGE, NEARLY = 10.0, 1e-12
-# Of squares: the vibration has not moved as it should where it is this many variances off, and a pair gave
-# nothing where it is that much nearer without the pair.
+# Ratios of squares: a response is not the expected one where it deviates by more than this many variances; a
+# pair gave nothing where the deviation from the response without that pair is smaller by this factor.
 DEVIATIONS, NEARER = 9.0, 9.0
 
 
@@ -201,7 +201,7 @@ def share(m: Query, r: int, half: int, x: float, y: float) -> None:
         m[last + CHANGE] = x * m[last + AXIS_X] + y * m[last + AXIS_Y]
     if free < 2:
         return
-    # Once round: from the last free axis, seen backwards, to the first one, and over the next to the last.
+    # One round over the free axes in both senses, from the negative last one to the first and onwards.
     sign = -1.0
     turn = 0
     while turn < 2 * half:

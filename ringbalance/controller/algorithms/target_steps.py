@@ -22,7 +22,7 @@ from ringbalance.reduced_model.pieces.point import Law, Query, larger, smaller
 from ringbalance.scene.platform.both_ways import both_ways
 
 # fmt: off
-# Settings; of each chamber its direction, twice, so that what follows the last is the first, and its offset.
+# Settings; from DIRECTIONS on, for each chamber both components of its direction, and its offset.
 CHAMBERS, LIMIT, GAIN, PER_TIME, DERIVATIVE, LEAST, MOST, PERIOD, RESETS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 LAG_COSINE, LAG_SINE, AMPLITUDE_SQUARE, PHASE_SQUARE, DIRECTIONS = 9, 10, 11, 12, 13
 
@@ -31,8 +31,8 @@ INTEGRAL, BEFORE_X, BEFORE_Y, BEFORE, SINCE, HAS_BEFORE, WANTED = 5, 6, 7, 8, 9,
 RESPONSE, FIRST_CHAMBER = 12, 13
 # fmt: on
 
-# A chamber is judged whose share is at least this part of the longest one and this multiple of noise; it
-# gives nothing where less than this part of the expected vibration goes.
+# A chamber is judged if its share is at least this fraction of the longest one, and its expected response at
+# least this multiple of the noise; it gave nothing if less than this fraction of that response came.
 OF_LONGEST, OF_NOISE, OF_EXPECTED = 0.5, 12.0, 0.1
 
 

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.pieces.point import Law, Query, smaller
 from ringbalance.scene.platform.both_ways import both_ways
 
 # fmt: off
-# Settings; the chambers of the sequence are the last.
+# Settings; the chambers of the sequence come last.
 CHAMBERS, LIMIT, LEAST, MOST, PERIOD, FIRST_TRIAL, LONG_STEP, SHORT_STEP = 0, 1, 2, 3, 4, 5, 6, 7
 FINE_BELOW, TRIALS, SEQUENCE = 8, 9, 10
 

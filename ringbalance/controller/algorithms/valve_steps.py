@@ -1,8 +1,8 @@
 """Valves and clock of the controllers, in + - * / and comparisons alone.
 
-`w` holds of each chamber, from the place `first` on, how long its valve stays open, whether a sensor says
-that it has no more liquid to give, what was asked of it last, and whether that moved nothing.  A vibration
-above `GREATEST` is none, a time up to `INSTANT` is over.
+`w` holds for each chamber, from index `first` on: time for which its valve stays open, s; 1 if a sensor
+reports that it has no more liquid to give; its share in the last command, s; 1 if that moved nothing.  A
+vibration above `GREATEST` counts as none, a time up to `INSTANT` as elapsed.
 """
 
 from ringbalance.reduced_model.pieces.point import Query, larger

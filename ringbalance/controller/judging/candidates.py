@@ -1,4 +1,4 @@
-"""Candidates of a search for settings, and which of them is better."""
+"""Candidates of a search for settings, and their comparison."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ringbalance.results.requirements import Paired
 from ringbalance.scene.arrays import BoolArray
 
 DEVICES: Final = 32
-"""On which settings are chosen."""
+"""Number of devices on which settings are chosen."""
 _BEHIND: Final = 0.2
-"""Level of the paired test by which a setting is worse than the best and does not run in the next heat."""
+"""Significance level of the paired test that drops settings worse than the best before the next heat."""
 _MORE: Final = 2 / DEVICES
-"""Fraction of the devices that another kind of controller serves beyond the scene's to be better."""
+"""Fraction of the devices that another kind of controller must serve beyond the scene's to replace it."""
 _AS_FAST: Final = 1.3
-"""Times the least settling time: as fast as the fastest."""
+"""Ratio of settling times up to which two settings count as equally fast."""
 _SETTLED: Final = 0.9
-"""Fraction of the devices that the best settings serve, whose settling time decides between equals."""
+"""Fraction of the served devices whose settling time decides between settings that serve as many."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchPoint:
-    """A point of a balancer's settings to try."""
+    """Candidate settings of a balancer: a level on each axis of its trials."""
 
     trials: Trials
     places: tuple[int, ...]
@@ -40,7 +40,7 @@ class SearchPoint:
 
     @cached_property
     def settings(self) -> Settings | None:
-        """By path; None: there are none."""
+        """Settings by path; None: there are none at this point."""
         levels = {axis.name: axis.levels[at] for axis, at in zip(self.trials.axes, self.places, strict=True)}
         if self.level is not None and self.trials.scan_axis is not None:
             levels[self.trials.scan_axis.name] = self.level
@@ -61,7 +61,7 @@ class SearchPoint:
         ]
 
     def at(self, level: float) -> SearchPoint:
-        """SearchPoint with another level of the scan axis."""
+        """This point at another level of the scan axis."""
         return replace(self, level=level)
 
     def is_beside(self, other: SearchPoint) -> bool:
@@ -72,7 +72,7 @@ class SearchPoint:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tried:
-    """A candidate and what became of it."""
+    """A candidate and its judgement."""
 
     candidate: SearchPoint
     judgement: Judgement
@@ -97,19 +97,19 @@ class Tried:
         return float(times[max(math.ceil(share * times.size * (1 - 1e-12)), 1) - 1])
 
     def replaces(self, scenes: Tried) -> bool:
-        """True if it is taken in place of the best of the scene's kind of controller.
+        """True if this candidate replaces the best of the scene's kind of controller.
 
-        It serves `_MORE` more of the devices, or no fewer, `_AS_FAST` times as fast, beside a kind that the
-        scene does not give.
+        It must serve `_MORE` more of the devices; or, where the scene does not give its kind, no fewer and be
+        `_AS_FAST` times as fast.
         """
-        # By shares: of a kind that serves no device fewer have run.
+        # Compared by fractions: a kind that serves no device has run on fewer.
         more, share = self.fraction - scenes.fraction, _SETTLED * scenes.fraction
         faster = _AS_FAST * self.time(share) < scenes.time(share)
         return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kind_stated)
 
 
 def chosen(tried: Iterable[Tried]) -> Tried | None:
-    """Most devices; of these as fast as the fastest; of these the one amid most others that are as good."""
+    """The candidate that serves most devices; among equals a fast one, with most good ones beside it."""
     every = list(tried)
     most = max((each.count for each in every), default=0)
     if most == 0:

@@ -19,10 +19,10 @@ from ringbalance.scene.arrays import BoolArray, finite
 MOST_DRAWS: Final = 1024
 """Devices after which an open verdict stays open, for a balancer whose runs are fast."""
 FIRST_VERDICT_DEVICE: Final = 1 << 20
-"""Number of the first device that judges; settings are chosen on the devices from 0 on."""
+"""Number of the first device of a verdict; settings are chosen on the devices from 0 on."""
 FIRST_CHOOSING_DEVICE: Final = 1 << 19
-"""Number of the first device that chooses between the settings, remedies or designs that a search ends with:
-the best of several on the devices that judge them would promise too much."""
+"""Number of the first device that serves to choose between the final settings, remedies or designs of a
+search: a choice on the devices of the verdict would make the verdict too favourable."""
 _MAX_CAUSES: Final = 3
 
 
@@ -155,7 +155,7 @@ def judged(
 def best_of(
     balancer: Balancer, settings: Sequence[Settings], *, progress: Callable[[str], None] | None = None
 ) -> Settings:
-    """Choose the settings that serve most devices, which judge nothing; the first of equals."""
+    """Choose the settings that serve most devices, apart from those of verdicts; the first of equals."""
     if len(settings) == 1:
         return settings[0]
     few = balancer.verdict_draws[0]

@@ -1,11 +1,12 @@
 """Sensitivity of a judgement to the drawn inputs: the input that decides, and the worthwhile measurements.
 
-The outcome is whether a device meets every demand; where all do, how soon it settles; where none does, the
-amplitude that remains.
+The outcome y of a device is 1 if it meets every demand, else 0; where all meet them, the rank of its settling
+time; where none does, that of its final amplitude.
 
-The first-order index of an input x is S = Var(E[y | x])/Var(y), here by eighths of its distribution: of n
-devices with m_i of mean y_i in each, S = (sum m_i (y_i - y)^2/n - 7 v/n)/Var(y), with the mean variance v
-within an eighth.  Without any effect it is 0 with a standard deviation of sqrt(2 * 7)/n, about 4/n.
+The first-order index of an input x is S = Var(E[y | x])/Var(y), here by eighths of its distribution: for n
+devices, m_i of them with mean y_i in eighth i, S = (sum m_i (y_i - y)^2/n - 7 v/n)/Var(y), with the mean
+variance v within an eighth.  Without any effect S is 0 with a standard deviation of sqrt(2 * 7)/n, about
+4/n.
 Source: Sobol', "Sensitivity estimates for nonlinear mathematical models", Math. Modelling and Computational
     Experiments 1 (1993); Archer, Saltelli and Sobol', J. Stat. Comput. Simul. 58 (1997).
 """
@@ -26,12 +27,12 @@ from ringbalance.results.requirements import Proportion
 from ringbalance.results.rows import Finding, Value
 
 MEETS: Final = "meets"
-"""Name of the outcome: whether a device meets every demand."""
+"""Name of the outcome that a device meets every demand."""
 _BINS: Final = 8
 _NOTABLE_INDEX: Final = 0.05
 """Index from which an input is worth a measurement."""
 _NOTABLE_SIGMA: Final = 3.0
-"""Standard deviations of the index of an input without effect, above which an index is no chance."""
+"""Standard deviations of the index of an input without effect, above which an index is significant."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,11 +54,11 @@ class Deciding:
     measure: str
     """Code of the finding that says what to measure; empty: nothing can be measured."""
     middle: Proportion
-    """Fraction that meets every demand if the input is known twice as well: in the middle half."""
+    """Fraction that meets every demand, of the devices with the input in the middle half of its range."""
 
     @property
     def decides(self) -> bool:
-        """True if the index is notable and no chance."""
+        """True if the index is notable and significant."""
         return self.index > max(_NOTABLE_INDEX, _NOTABLE_SIGMA * self.noise)
 
     def document(self) -> dict[str, Any]:
@@ -99,7 +100,7 @@ class Ranking:
 
 
 def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
-    """Rank the drawn inputs of judged devices by their first-order index; those of one name add up."""
+    """Rank the drawn inputs of judged devices by their first-order index; indices of one name are added."""
     meets, outcomes = judgement.meets, judgement.outcomes
     if meets.any() and not meets.all():
         name, values = MEETS, meets.astype(np.float64)

@@ -47,8 +47,8 @@ class Remedied:
     size: float
     """Sum of |ln(new/old)| over all changed numbers; 1 for a value that the scene does not have."""
     scan_path: str = ""
-    """Path of the axis along which settings may move, such as the supply's pressure: what they set is changed
-    by the remedy, too."""
+    """Path of the scan axis of the settings, such as the supply's pressure; its value counts as a change of
+    the remedy."""
 
     @property
     def code(self) -> str:
@@ -104,9 +104,9 @@ def tried_remedies(
     """Judge the remedies that a balancer offers, and sort them, the best first.
 
     The alternatives of one kind are tried in order of increasing change, until one meets the requirement, no
-    device meets it, or significantly fewer do than before; where no device of the scene as it is does, until
-    one kind meets.  Where no remedy is enough by itself, the best two are tried together.  The best, and all
-    that meet, are then judged on devices on which nothing was chosen.
+    device meets it, or significantly fewer do than before; where no device of the unchanged scene does, the
+    first kind that meets it is the last.  Where no remedy is enough by itself, the best two are tried
+    together.  The best, and all that meet, are then judged on devices on which nothing was chosen.
 
     Args: `unchanged`: judgement of the best settings of the unchanged scene. `search`: finds settings.
         `scan_path`: as in `Remedied`.
@@ -166,9 +166,9 @@ def tried_choices(
     progress: Progress | None = None,
     some: slice = slice(None),
 ) -> tuple[Remedied, ...]:
-    """Judge the things that can be bought for what a scene leaves open.
+    """Judge the parts that can be bought for what a scene leaves open.
 
-    Args: `some`: places of those to judge in the order of the balancer.
+    Args: `some`: slice of the balancer's choices to judge.
     """
     judge = partial(_judge, balancer, search=search, scan_path=scan_path, progress=progress)
     rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
@@ -212,7 +212,7 @@ def _changed(balancer: Balancer, changes: Settings) -> Balancer:
 
 
 def _judgement(changed: Balancer, settings: Settings, start: int) -> Judgement:
-    """Judge settings, on few devices where far too few of these meet the requirement."""
+    """Judge settings; on few devices only, if far too few of these meet the requirement."""
     (first,) = judged_all(changed, [settings], first=_FIRST_DEVICES, most=_FIRST_DEVICES, start=start)
     if first.verdict == MISSED and first.fraction.value < _GIVE_UP_SHARE * first.required_fraction:
         return first

@@ -1,9 +1,9 @@
 """Settings by runs: levels on the axes that a balancer offers, raced over few drawn devices.
 
-The fraction of devices that a setting serves is a plateau with steps of one device, so that nothing smooth is
-there to follow: coarse levels first, then the neighbours of the best until it is within them.  Settings that
-are surely worse than the best on the same devices are dropped after few.  Where the best serve too few, more
-devices choose between them.  What is chosen on these devices is judged on others.
+The fraction of devices that a setting serves changes by steps of one device, without a gradient to follow:
+coarse levels come first, then the neighbours of the best until all of these are tried.  Settings that are
+significantly worse than the best on the same devices are dropped after few.  More devices choose between the
+last few settings; other devices judge the choice.
 """
 
 from __future__ import annotations
@@ -32,14 +32,15 @@ from ringbalance.scene.origins import value_at
 Progress = Callable[[str], None]
 
 _HEATS: Final = ((0, 8), (8, 16), (16, DEVICES))
-"""Devices of the heats of a race, by first and last number."""
+"""Devices of the heats of a race: first number, and the number after the last."""
 _FINAL: Final = (DEVICES, 4 * DEVICES)
-"""Devices that choose between the last few settings, by first and last number."""
+"""Devices that choose between the last few settings: first number, and the number after the last."""
 _FINALISTS: Final = 8
 _CLEAR_FINALISTS: Final = 3
-"""Finalists where the best serve enough of the first devices: to tell a plateau's middle from its edge."""
+"""Finalists where the best serve enough of the first devices: they distinguish the middle of a plateau from
+its edge."""
 _GOOD_FRACTION: Final = 0.9
-"""Fraction of the devices from which on the best settings need not be looked for more widely."""
+"""Fraction of the devices that the best settings must serve to end the wider search."""
 _ROUNDS: Final = 6
 """Rounds in which neighbours are tried."""
 _ALONG: Final = 3
@@ -47,8 +48,8 @@ _ALONG: Final = 3
 _SCAN_DRAWS: Final = tuple(
     Draws.block(256 + first, count, complete=False) for first, count in ((0, 16), (16, 48))
 )
-"""Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
-none of the first settle is answered by them."""
+"""Devices that judge the levels of a scan, apart from those of the choice and of the verdict; the second
+block runs only at levels that serve a device of the first."""
 
 
 _Ran = dict[object, Tried | None]
@@ -63,9 +64,10 @@ def search(
     ran: Mapping[str, _Ran] | None = None,
     progress: Progress,
 ) -> tuple[Tried, ...]:
-    """The best settings of every kind of controller, the kind to take first.
+    """The best candidate of every kind of controller, the recommended kind first.
 
-    Args: `level`: on `Trials.scan_axis`; default the scene's. `ran`: by kind, what ran at that level.
+    Args: `level`: on `Trials.scan_axis`; default the scene's. `ran`: candidates already run at that level, by
+        kind.
     """
     winners: list[Tried] = []
     for space in trials:
@@ -88,7 +90,7 @@ def search(
 
 
 def _ordered(best: Iterable[Tried], trials: Sequence[Trials]) -> tuple[Tried, ...]:
-    """The best of every kind of controller, the kind to take first."""
+    """The best candidate of every kind of controller, the recommended kind first."""
     every = tuple(best)
     scenes = next((each for each in every if each.candidate.trials.kind == trials[0].kind), None)
 
@@ -115,11 +117,11 @@ def _climb(
     other: Tried | None = None,
     progress: Progress,
 ) -> None:
-    """Add the results of a field, and of the neighbours of the best again and again.
+    """Add the results of a field, and repeatedly those of the neighbours of the best.
 
-    Args: `wide`: follow a best that serves no device, too, and beside one that serves too few the best of
-        those that are not next to it. `other`: the best of another kind of controller; what is surely worse
-        than it is dropped.
+    Args: `wide`: continue from the best even if it serves no device; if it serves too few, also from the best
+        of those that are not next to it. `other`: the best of another kind of controller; candidates that are
+        significantly worse are dropped.
     """
     for _ in range(rounds):
         if not (fresh := [each for each in field if each.key not in tried]):
@@ -138,7 +140,7 @@ def _climb(
 
 
 def _on_more(balancer: Balancer, tried: Sequence[Tried]) -> list[Tried]:
-    """On the devices that choose between the last few, too."""
+    """Add the outcomes of the devices that choose between the last few settings."""
     first, end = _FINAL
     settings = [each.judgement.settings for each in tried]
     ran = balancer.run_all(settings, Draws.block(first, end - first, complete=False))
@@ -160,7 +162,7 @@ def _raced(balancer: Balancer, field: Sequence[SearchPoint], *, leading: Tried |
         ranked = [each.judgement.meets for each in (*running.values(), leading) if each]
         best = max((meets[:last] for meets in ranked), key=np.count_nonzero)
         if not best.any():
-            # None settles: one of them says why.
+            # None serves a device: one of them is enough to show the cause.
             return [each for each in running.values() if each][:1]
         running = {i: each for i, each in running.items() if each and not is_worse(each, best)}
     return [each for each in running.values() if each]
@@ -176,7 +178,7 @@ class ScanLevel:
 
     @property
     def usable_moment(self) -> tuple[float, float, float]:
-        """Usable moment of a tenth of the devices at most, of half of them, of a tenth at least, kg m."""
+        """Usable moment of the devices, kg m: quantiles of 10 %, 50 % and 90 %."""
         low, middle, high = np.quantile(self.judgement.outcomes.usable_moment, [0.1, 0.5, 0.9])
         return float(low), float(middle), float(high)
 
@@ -187,20 +189,20 @@ class Scan:
 
     levels: tuple[ScanLevel, ...]
     top: ScanLevel
-    """The level to take."""
+    """The recommended level."""
     searched: Sequence[Tried]
-    """The best of every kind of controller there, the kind to take first."""
+    """The best candidate of every kind of controller at that level, the recommended kind first."""
 
 
 def scanned(
     balancer: Balancer, trials: Sequence[Trials], winners: Sequence[Tried], *, progress: Progress
 ) -> Scan | None:
-    """The best settings at every level of an axis, on more levels until the best is within them; None: there
-    is no axis.
+    """The best settings at the levels of an axis, with more levels until both neighbours of the best are
+    among them; None: there is no axis.
 
-    The level to take is searched as widely as the scene's, and then the others once more from what serves
-    there, so that the answer does not depend on the level from which the search set out.
-    Args: `winners`: the best of every kind of controller at the scene's own level.
+    The recommended level is searched as widely as the scene's, and then the others again from its settings,
+    so that the result does not depend on the level at which the search began.
+    Args: `winners`: the best candidate of every kind of controller at the scene's own level.
     """
     axis = trials[0].scan_axis
     if axis is None:
@@ -238,16 +240,16 @@ class _Levels:
     trials: Sequence[Trials]
     axis: SearchAxis
     searched: dict[int, Sequence[Tried]]
-    """By place of a level that was searched widely: the best of every kind of controller."""
+    """The best candidates of all kinds of controller at widely searched levels, by index of the level."""
     ran: dict[int, dict[str, _Ran]] = field(default_factory=dict)
-    """By place of another level and kind of controller: what ran there."""
+    """Candidates that ran at the other levels, by index of the level and kind of controller."""
     serving: dict[int, dict[str, Tried]] = field(default_factory=dict)
-    """By place of another level and kind of controller: the best of it, where that serves any device."""
+    """The best candidates that serve any device at the other levels, by index of the level and kind."""
     more: dict[object, Tried] = field(default_factory=dict)
-    """By key: the best of kinds between which the devices of the search do not decide, on more devices."""
+    """The best candidates of the kinds on more devices, by key, where those of the search do not decide."""
 
     def add(self, places: Sequence[int]) -> None:
-        """Search levels from what serves at the nearest; then each from both beside it."""
+        """Search levels from the best settings of the nearest one, then from those of both neighbours."""
         for at in places:
             for trials in self.trials:
                 self._climb(at, trials, self._nearest(at, trials.kind))
@@ -265,7 +267,7 @@ class _Levels:
 
     @property
     def top(self) -> int | None:
-        """Place of the level that serves most of the devices of the search; None: none serves any."""
+        """Index of the level that serves most of the devices of the search; None: none serves any."""
         best = {at: chosen(self._serving(at).values()) for at in self._evaluated}
         counts = {at: each.fraction * DEVICES for at, each in best.items() if each}
         return _top(counts) if counts else None
@@ -275,17 +277,17 @@ class _Levels:
         return sorted({*self.searched, *self.ran})
 
     def _serving(self, at: int) -> dict[str, Tried]:
-        """The best of every kind of controller that serves any device."""
+        """The best candidates at a level by kind of controller, of the kinds that serve any device."""
         widely = {each.candidate.trials.kind: each for each in self.searched.get(at, ()) if each.count}
         return widely if at in self.searched else self.serving.get(at, {})
 
     def _nearest(self, at: int, kind: str) -> int | None:
-        """Place of the nearest level where a kind of controller serves."""
+        """Index of the nearest level at which a kind of controller serves any device; None: there is none."""
         serving = (each for each in self._evaluated if kind in self._serving(each))
         return min(serving, key=lambda each: abs(each - at), default=None)
 
     def _climb(self, at: int, trials: Trials, near: int | None) -> None:
-        """From what serves at another level; from all that is tried at first where nothing does."""
+        """Search a level from the best settings of level `near`; None: from the coarse levels of the axes."""
         level, kind = self.axis.levels[at], trials.kind
         if at in self.searched or (trials is not self.trials[0] and self._needless(at, kind, near)):
             return
@@ -299,14 +301,17 @@ class _Levels:
             return
         serving[kind] = best
         for each in self.trials[1:] if trials is self.trials[0] else ():
-            # Where these serve more, neighbours that are surely worse are left after few devices.
+            # Where the other kinds serve more, significantly worse neighbours are dropped after few devices.
             self._climb(at, each, self._nearest(at, each.kind))
         climb(best.candidate.neighbours(), rounds=_ALONG - 1, other=chosen(serving.values()))
         serving[kind] = chosen(each for each in ran.values() if each) or best
 
     def _needless(self, at: int, kind: str, near: int | None) -> bool:
-        """True if a kind of controller beside the scene's is not tried: the scene's serves enough, or too few
-        at every level from one on at which the other serves no more."""
+        """True if a kind of controller other than the scene's need not be tried at a level.
+
+        Either the scene's kind serves enough there; or it serves too few from level `near` to this one, and
+        at `near` the other kind does not replace it.
+        """
         required, scenes_kind = self.balancer.required_fraction(), self.trials[0].kind
         evaluated = self._evaluated
         fractions = {
@@ -322,7 +327,7 @@ class _Levels:
         return no_more and all(fractions.get(each, 0.0) < required for each in between)
 
     def answered(self, before: Mapping[int, ScanLevel]) -> dict[int, ScanLevel]:
-        """Levels on devices of their own, but those that have been under the same settings."""
+        """Judge levels on the devices of the scan, except those already judged under the same settings."""
         settings: dict[int, Settings] = {}
         for at in self._evaluated:
             level = self.axis.levels[at]
@@ -360,7 +365,7 @@ class _Levels:
 
 
 def _top(count: Mapping[int, float]) -> int:
-    """Place of the level to take: most devices, and then amid levels that serve about as many."""
+    """Index of the level to recommend: at most one device below the best, with most devices around it."""
     near = {at: sum(count.get(at + by, 0) for by in (-1, 0, 1)) for at in count}
     most = max(count.values())
     return max((at for at in count if count[at] >= most - 1), key=lambda at: (near[at], count[at]))
@@ -369,7 +374,7 @@ def _top(count: Mapping[int, float]) -> int:
 def searched(
     balancer: Balancer, *, level: float | None = None, progress: Progress = lambda _: None
 ) -> Settings:
-    """The best settings; none where nothing is to be tried. Args: `level`: as `search`."""
+    """The best settings; empty where there are none to try. Args: `level`: as in `search`."""
     offered = balancer.trials()
     if level is None and not any(each.axes for each in offered):
         return {}

@@ -64,7 +64,7 @@ def tuned(
         if chosen != best.settings:
             best, winners = judged(balancer, chosen, progress=report), winners_there
 
-    # Where no device settles, none stays so for longer.
+    # Where no device meets the demands, a longer watch time changes nothing.
     longer: Judgement | None = None
     if not balancer.watched_to_end and best.fraction.count:
         most = max(BLOCK, min(_MAX_LONGER_DEVICES, balancer.verdict_draws[1]))
@@ -72,7 +72,7 @@ def tuned(
             balancer, [best.settings], first=BLOCK, most=most, watch_time=LONG_WATCH_TIME_S, progress=report
         )
 
-    # What limits the capacity where that decides a verdict, of the scene's settings first.
+    # Findings on the capacity where it decides a verdict, for the scene's settings first.
     capacity: tuple[Finding, ...] = ()
     for name, each in (("the scene's settings", unchanged), ("the recommended settings", best)):
         if each is not None and each.verdict != MET and not capacity:
@@ -109,6 +109,6 @@ def tuned(
 
 
 def _worth_judging(winners: Sequence[Tried]) -> list[Settings]:
-    """Settings of the kind of controller to take first, and of other kinds that serve more devices."""
+    """Settings of the recommended kind of controller, and of other kinds that serve more devices."""
     first = [winner for i, winner in enumerate(winners) if i == 0 or winner.fraction > winners[0].fraction]
     return [winner.candidate.settings or {} for winner in first]

@@ -28,7 +28,7 @@ LONG_WATCH_TIME_S: Final = 300.0
 """Time for which settled devices are watched once more under the recommended settings, s."""
 _VERDICT_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
 _EXACT: Final = "_exact"
-"""End of the code of a verdict that is met by devices of which the scene states no uncertainty."""
+"""Suffix of the code of a met verdict where the scene states no uncertainty."""
 _CHOICES_CAPTION: Final = (
     "Valves that can be bought, their lags assumed, each with the best settings of a coarse grid"
 )
@@ -53,7 +53,7 @@ class Tuning(Result):
     longer: Judgement | None
     """Judgement of the recommended settings with a longer watch time; None: runs go to their end."""
     tried: Mapping[str, Judgement]
-    """Best settings of every kind of controller on the devices of the search."""
+    """Judgement of the best settings by kind of controller, on the devices of the search."""
     along: tuple[ScanLevel, ...] = ()
     """Best settings at every level of the scan axis, such as the gas pressure."""
     along_name: str = ""
@@ -67,9 +67,9 @@ class Tuning(Result):
     ranking: Ranking = field(default_factory=Ranking)
     """Influence of the drawn inputs under the recommended settings."""
     choices: tuple[Remedied, ...] = ()
-    """Judged things that can be bought for what the scene leaves open."""
+    """Judged parts that can be bought for what the scene leaves open."""
     open_choice: bool = False
-    """True if the scene leaves such a choice open."""
+    """True if the scene leaves the choice of a part open."""
 
     @property
     def scene(self) -> Any:
@@ -252,7 +252,7 @@ class Tuning(Result):
 
 
 def if_exact(scene: SceneFile, judgement: Judgement) -> str:
-    """End of the code of a verdict that rests on exact parts; empty for others."""
+    """Suffix of the code of a met verdict where the scene states no uncertainty; else empty."""
     return _EXACT if judgement.verdict == MET and not (scene.uncertainty or scene.fitted.quantities) else ""
 
 

@@ -1,1 +1,1 @@
-"""The liquid ring as a balancer, and what its liquid can do at best."""
+"""The liquid ring as a balancer, and the largest correction of its liquid."""

@@ -1,4 +1,4 @@
-"""The liquid ring behind the interface of every balancer."""
+"""The liquid ring as a `Balancer`."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class LiquidRingBalancer(Balancer):
     scene: Scene
     _: KW_ONLY
     flow_law: Any = None
-    """A law, or a name that `law_by_name` knows; None: calibrated from the scene."""
+    """A law, or a name for `law_by_name`; None: calibrated from the scene."""
     controller: Controller[Any] | None = None
     sensor: Sensor | None = None
     modelled: Collection[str] | None = None
@@ -270,8 +270,8 @@ class LiquidRingBalancer(Balancer):
         )
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> LiquidRingBalancer:
-        """Valve-open times are rescaled to the same valve-open time per unbalance; a wrong assumption stays
-        as wrong as it was. Raises: SceneError: the rotor is too slow to form a ring."""
+        """Balancer on another rotor, with the same valve-open time per unbalance and the same errors of
+        assumptions. Raises: SceneError: the rotor is too slow to form a ring."""
         before, control = self.scene.rotor, self.scene.controller
         after = rotor_like(before, rotor)
         share = after.influence_coefficient / before.influence_coefficient
@@ -306,7 +306,7 @@ class LiquidRingBalancer(Balancer):
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
     def information(self, scene: SceneFile) -> Information:
-        """Loop factor and margins without a run, and the spread of the devices."""
+        """Loop factor and margins, which need no run, and the drawn errors of the devices."""
         loop = loop_information(liquid_ring_scene(scene), self.model)
         return replace(loop, document={**loop.document, "drawn": self._drawn_runs.spread.document()})
 

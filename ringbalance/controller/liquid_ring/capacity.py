@@ -1,4 +1,4 @@
-"""Liquid that a machine moves beyond the fills at which runs end: a slope where runs have a wall."""
+"""Liquid that a machine moves beyond the fills at which simulated runs end."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ringbalance.results.rows import Finding, Value
 from ringbalance.scene.models import Scene
 
 _NOTICEABLE_FILL: Final = 1e-3
-"""Fill by which a running flow must go further to be reported."""
+"""Fill ratio by which a running flow must pass the stalled fill to be reported."""
 
 
 def beyond_capacity(
     scene: Scene, model: BalancerModel, ended: Sequence[str], *, settings: str = "these settings"
 ) -> Iterator[Finding]:
-    """Findings where devices end for want of capacity.
+    """Findings where devices end for lack of capacity.
 
-    Args: `ended`: codes of the ends of their runs. `settings`: what to call those of the scene.
+    Args: `ended`: codes of the ends of their runs. `settings`: name of the scene's settings in the findings.
     """
     which = {"settings": settings}
     total, law = 2 * scene.disc.initial_fill, model.flow
@@ -49,8 +49,8 @@ def beyond_capacity(
 
 
 def crest_fill(scene: Scene, model: BalancerModel) -> float:
-    """Fill of a chamber that lies on the far half of the siphon crest's circle as a pulse ends, with the tube
-    full there: what nothing pulls back runs over.  A crest shaped as a point keeps nothing.
+    """Liquid that runs over after a pulse, as a fill of a chamber: all on the far half of the siphon crest's
+    circle, with the tube full there.  Zero for a crest without a radius.
     """
     if scene.tube.hump_radius is None:
         return 0.0
@@ -59,10 +59,10 @@ def crest_fill(scene: Scene, model: BalancerModel) -> float:
 
 
 def running_fill(scene: Scene, model: BalancerModel) -> float:
-    """Fill down to which the gas at most drives a chamber whose flow never stops, with vapour alone in a
-    cavity over the crest; at equal fills where that flow does not carry the gas off the crest.
+    """Least fill to which the gas drives a chamber whose flow never stops, with vapour alone in a cavity over
+    the crest; the equal fill where that flow does not carry the gas off the crest.
 
-    Gas that a cavity holds besides stops it earlier, at its full pressure where a new injection stalls.
+    Other gas in the cavity stops the flow earlier; at its full pressure, where a new injection stalls.
     """
     total, law, gas = 2 * scene.disc.initial_fill, model.flow, scene.gas.pressure
     if isinstance(law, CalibratedLaw):

@@ -1,4 +1,4 @@
-"""Devices that a liquid ring's scene may be: every uncertain input drawn, and the law made for each."""
+"""Devices drawn from a liquid ring's scene: every uncertain input drawn, and the law made for each."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class Spread:
     """Differences between the devices of a scene under a law."""
 
     errors: tuple[Uncertainty, ...]
-    """All that is drawn."""
+    """Drawn inputs and model errors."""
     remade: bool
-    """True if a device has a law of its own, and not the scene's with another velocity."""
+    """True if each device has its own law; False: the scene's with a factor on the velocity."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ class Spread:
         return tuple(each.name for each in self.errors)
 
     def half_width(self, name: str) -> float:
-        """Relative expanded uncertainty (95 %) of what acts by a factor."""
+        """Relative expanded uncertainty (95 %) of an error that acts by a factor."""
         return next(each.half_width or 0.0 for each in self.errors if each.name == name)
 
     def factor(self, name: str, z: Mapping[str, float]) -> float:
@@ -82,7 +82,7 @@ class Spread:
             errors = [each for each in uncertainties(scene) if each.name != MOMENT]
             return cls(errors=(*errors, moment, *of_runs(scene)), remade=True)
 
-        # The velocity of a law that is not remade, by models alone of the paper's.
+        # Velocity of a law that is not remade; of the paper's law by models alone.
         if isinstance(law, PaperLaw):
             stated = any(each.quantity == "drag_coefficient" for each in scene.uncertainty)
             k = law.drag_coefficient
@@ -122,12 +122,12 @@ class RingDevice:
     inputs: Mapping[str, float]
     """Quantile of every drawn input, in (0, 1)."""
     clipped: tuple[str, ...]
-    """Inputs nearer to the scene's value than drawn, since no device has the drawn one."""
+    """Inputs nearer to the scene's value than drawn, since no device can have the drawn value."""
 
     def under(self, settings: Scene, *, of: Scene) -> Scene:
-        """The device with a scene's controller and gas pressure; its gauge is as wrong as it was.
+        """The device with a scene's controller and gas pressure; the error of its gauge is kept.
 
-        The factor on its moments is put into the influence coefficient, through which they act.
+        The factor on its moments is included in the influence coefficient, through which they act.
         Args: `of`: the scene that the device was drawn from.
         """
         rotor, gas = self.scene.rotor, self.scene.gas
@@ -152,7 +152,7 @@ def devices(
 ) -> tuple[RingDevice, ...]:
     """The devices of some numbers, with their laws made at once.
 
-    Args: `rotors`: that the devices run on; default their own, drawn.
+    Args: `rotors`: rotors of the devices; default their own, drawn.
     """
     places = {each.name: quantiles(each.name, numbers, seed=seed) for each in spread.errors}
     quantile = _rows(places)
@@ -172,7 +172,7 @@ def devices(
     elif not spread.remade:
         laws = [(model, spread.factor(LOSS, z)) for z in deviation]
     else:
-        # Whether the devices hold gravity is the scene's own question.
+        # The nominal scene decides if the laws of its devices include gravity.
         gravity, waves = gravity_shares(scene).mean > scene.tolerance, [z[WAVES] for z in deviation]
         laws = [(BalancerModel.of(law), 1.0) for law in nominal_laws(scenes, gravity=gravity, waves=waves)]
     return tuple(

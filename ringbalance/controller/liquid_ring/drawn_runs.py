@@ -1,4 +1,4 @@
-"""Closed-loop runs of drawn devices of a liquid ring, a device made once for all settings that are tried."""
+"""Closed-loop runs of drawn devices of a liquid ring, each made once for all settings that are tried."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import with_values_at
 
 RELATIVE_ERROR: Final = 1e-4
-"""Allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's, and
-within 3e-5 without inertia."""
+"""Error allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's,
+and within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Samples of one run without a trace, at the most."""
 _GROUPS: Final = (0, 4, 16, 32, 64)
-"""Between which numbers, of each 64 that follow each other, devices are made at once: each has the same bits
-whichever are asked for, and of a design that four devices refuse no more are made.
+"""Bounds, within each 64 consecutive numbers, of the groups of devices that are made together: a device has
+the same bits whichever others are requested, and a design that fails on four devices needs no more.
 """
 _CACHED_GROUPS: Final = 32
-"""Groups of devices that are cached, and groups under a pressure."""
+"""Size of each cache: groups of devices, and groups under a gas pressure."""
 _OUT_OF_REACH: Final = 2.0
-"""Times the limit that remain with chambers emptied to their residual fills, from which on a run need not
-be carried out: none settles, and each would take its whole time limit.  Beyond the fill where the gas stalls
-a long injection still takes some liquid."""
+"""Vibration that remains with chambers emptied to their residual fills, over the limit, above which runs need
+not be carried out: none settles, and each would take its whole time limit.  Beyond the fill where the gas
+stalls a long injection still moves some liquid."""
 
 
 _ENDS: Final = (
@@ -67,7 +67,7 @@ _ENDS: Final = (
     Outcome.GAS_TIME_TOO_SHORT,
     Outcome.TIME_LIMIT,
 )
-"""Ends of a run: the first that it shows, else the last."""
+"""Possible ends of a run; the first that applies counts."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,7 +78,7 @@ class DrawnRuns:
     model: BalancerModel
     spread: Spread
     limit: float
-    """Amplitude to come below, m, whatever the controller rests at."""
+    """Amplitude to come below, m; the controller may rest at another."""
     rotors: Rotors | None = None
     """Rotors of the devices; None: their own, drawn."""
     bare: bool = False
@@ -99,7 +99,7 @@ class DrawnRuns:
     ) -> tuple[Outcomes, ...]:
         """Outcomes of each setting.
 
-        Args: `settings`: of the gas pressure and of keys of [controller].
+        Args: `settings`: values of the gas pressure and of keys of [controller].
         Raises: SceneError: a rotor too slow to form a ring.
         """
         check_ring(self.scene)
@@ -150,7 +150,7 @@ class DrawnRuns:
         )
 
     def device(self, number: int) -> RingDevice:
-        """One of the devices."""
+        """Device with a number."""
         block = _group(number)
         return self._devices(block)[block.index(number)]
 
@@ -170,7 +170,7 @@ class DrawnRuns:
 
     @cached_property
     def _groups(self) -> Callable[[range, bool, float], _Group]:
-        """Groups by numbers, true for drawn devices, and gas pressure; the last ones are cached."""
+        """Function of numbers, true for drawn devices, and gas pressure that gives a group; cached."""
 
         def group(block: range, varied: bool, pressure: float) -> _Group:
             exact = RingDevice(
@@ -186,7 +186,7 @@ class DrawnRuns:
 
     @cached_property
     def _under(self) -> Callable[[range, bool, float], _Under]:
-        """Groups by numbers, true for drawn devices, and gas pressure of the settings; cached likewise."""
+        """Function of numbers, true for drawn devices, and settings' gas pressure that gives an `_Under`."""
 
         def under(block: range, varied: bool, pressure: float) -> _Under:
             stated = self.scene.gas.pressure
@@ -200,14 +200,14 @@ class DrawnRuns:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Group:
-    """Devices that are made at once, and what no gas pressure changes in them."""
+    """Devices that are made together, with all that does not depend on the gas pressure."""
 
     devices: tuple[RingDevice, ...]
-    """Devices of the group; those that differ in numbers alone follow each other."""
+    """Devices of the group; those that differ in numerical values alone are adjacent."""
     scenes: tuple[Scene, ...]
-    """Scenes as which the devices run."""
+    """Scenes of the devices, with their settings."""
     kinds: tuple[tuple[slice, Scene], ...]
-    """Rows of devices that differ in numbers alone, and these as one scene."""
+    """Rows of devices that differ in numerical values alone, and these as one scene."""
     plants: Records
     """Type `PLANT`."""
     fields: Mapping[str, Any]
@@ -220,12 +220,12 @@ class _Group:
     def of(
         cls, devices: Sequence[RingDevice], scenes: Sequence[Scene], *, modelled: Sequence[str], noise: Any
     ) -> _Group:
-        """Args: `scenes`: of the devices, with their settings. `noise`: as `noise_table`, by number."""
+        """Make a group. Args: `scenes`: those of the devices as run. `noise`: as `noise_table`, by number."""
         order = alike(scenes)
         indices = [index for kind in order for index in kind]
         some, scenes = tuple(devices[index] for index in indices), [scenes[index] for index in indices]
         plants, edges = empty_plants(len(some)), np.cumsum([0, *map(len, order)]).tolist()
-        # What is held in the tube follows from the other terms, of all devices at once.
+        # The liquid held in the tube follows from the other terms, for all devices at once.
         before = [term for term in modelled if term != HELD]
         for row, (device, scene) in enumerate(zip(some, scenes, strict=True)):
             total = 2 * scene.disc.initial_fill
@@ -307,15 +307,15 @@ class _Under:
     residual: FloatArray
     """Fill of a driven chamber at which gas enters its port."""
     unreachable: FloatArray
-    """Vibration that remains with the liquid where the gas can bring it, m."""
+    """Vibration that remains with the best fills that the gas can reach, m."""
     beyond_disc: FloatArray
-    """Vibration that remains with gas that empties a chamber to its residual fill, m."""
+    """Vibration that remains if the gas can empty each chamber to its residual fill, m."""
     usable_moment: FloatArray
     """Usable moment towards its own unbalance, kg m."""
     unbalance: FloatArray
     """Unbalance of the rotor, kg m."""
     work: FloatArray
-    """Least that compresses the gas, over its p V."""
+    """Least work of compressing the gas, over its p V."""
 
     def ran(
         self, plan: LoopPlan, rows: IntArray, *, complete: bool, limit: float
@@ -323,7 +323,7 @@ class _Under:
         """Results of runs of some devices, shape (`ARRAYS`, settings, rows), and indices into `_ENDS`."""
         shape, group = (plan.loops.size, rows.size), self.group
         numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
-        # With the liquid at its best, of devices whose chambers cannot bring it to the limit.
+        # Devices that cannot come to the limit: the vibration that remains with the best fills.
         numbers[0], numbers[1], numbers[2] = math.inf, self.unreachable[rows], math.nan
         numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
         carried = complete | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
@@ -357,7 +357,7 @@ class _Under:
 
 
 def _group(number: int) -> range:
-    """Numbers of the devices that are made with one."""
+    """Numbers of the devices that are made together with one."""
     start, within = number - number % _GROUPS[-1], number % _GROUPS[-1]
     after = next(each for each in range(len(_GROUPS)) if _GROUPS[each] > within)
     return range(start + _GROUPS[after - 1], start + _GROUPS[after])

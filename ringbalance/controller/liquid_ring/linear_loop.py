@@ -47,7 +47,7 @@ class StateSpace:
     outputs: tuple[str, ...]
     states: tuple[str, ...]
     dt: float
-    """Period of the samples with gas closed, s; valve-open times come on top."""
+    """Time from the closing of the valves to the next sample, s; valve-open times add to it."""
 
     def to_control(self) -> Any:
         """A `control.StateSpace` with these names. Raises: ImportError: python-control is not installed."""
@@ -73,15 +73,15 @@ class LinearLoop:
     plant: StateSpace
     """air_time_x, air_time_y (s) to vibration_x, vibration_y (m)."""
     controller: StateSpace
-    """The other way."""
+    """vibration_x, vibration_y (m) to air_time_x, air_time_y (s)."""
     gain: complex
-    """g of the pair whose mean of both chambers is the largest."""
+    """g = Kc b exp(j (lag' - lag)), with b of the fastest pair, the mean of its two chambers."""
     integral: float
     """i = dt/Ti."""
     derivative: float
     """q = Td/dt."""
     findings: tuple[Finding, ...]
-    """Findings that all results hold for a gain that the scene does not state."""
+    """Findings on a default gain, which the scene does not state."""
 
     def __repr__(self) -> str:
         """Results on the loop without its matrices, for JSON."""
@@ -135,13 +135,13 @@ class LinearLoop:
 
     @property
     def zone(self) -> str:
-        """A to D of ISO 14839-3 by the peak of the sensitivity, as far as a standard for magnetic bearings
-        says anything of a loop that is closed once in a period."""
+        """Zone A to D of ISO 14839-3 by the peak of the sensitivity; a standard for magnetic bearings, of
+        limited meaning for a loop that is closed once in a period."""
         return next((name for most, name in _ZONES if self.sensitivity_peak < most), "D")
 
     @property
     def disk_margin(self) -> float:
-        """0 to 2: gain and phase of both axes may change together, at every frequency by other amounts.
+        """Disk margin, 0 to 2: gain and phase of both axes may change together, differently by frequency.
 
         With P alone min |2 (1 + L)/(1 - L)| = 2 |z - 1 + g|/|z - 1 - g|, the nearest point of a circle:
         2 (2 - h)/(2 + h) for real g.
@@ -194,7 +194,7 @@ def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
         dt=dt,
     )
 
-    # States of the controller: w, where there is an integral part, and the vibration of the sample before.
+    # States of the controller: w, where there is an integral part, and the vibration of the previous sample.
     integral = 0.0 if settings.integral_time is None else dt / settings.integral_time
     derivative = settings.derivative_time / dt
     gain, half = cmath.rect(settings.proportional, settings.assumed_lag_angle), integral / 2.0

@@ -8,7 +8,7 @@ turns round from h = 1 / cos d on.  b differs from pair to pair, and with the ch
 driven.  A residual that turns round is driven by both in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2,
 so the mean of both counts; of all pairs the largest.
 
-`loop_information` has all numbers of the loop under its settings that take no run.
+`loop_information` gives all results on the loop that need no run.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
     the same bound on the noise is used for it.
     """
     rate, sensor = loop_rate(scene, model), scene.sensor
-    # Of the measured vibration where its amplitude is at the limit.
+    # Standard deviation of the measured vibration at an amplitude equal to the limit, m.
     noise = math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
     error = 0.0
     value: float | None = None
@@ -115,8 +115,8 @@ def default_gain(scene: Scene) -> Iterator[Finding]:
 
 
 def vibration_left(scene: Scene, loop: LoopFactor) -> float | None:
-    """Vibration that is left at most, m: three standard deviations of what noise sustains, or what the
-    shortest injections of two pairs leave, half a step each, where that is more; None where it grows.
+    """Largest vibration that remains, m: three standard deviations under noise or, if larger, half a step of
+    the shortest injection on each of two pairs; None for an unstable loop.
     """
     noise = loop.deviation or 0.0
     step = scene.controller.minimum_gas_time * loop.rate
@@ -189,12 +189,12 @@ def _stationary_deviation(
     derivative: float = 0.0,
     lag_error: float = 0.0,
 ) -> float:
-    """Standard deviation of the residual that noise of the sensor keeps up in the sampled loop.
+    """Standard deviation of the residual that sensor noise sustains in the sampled loop.
 
     With the measured m = x + n, i = dt/Ti (`integral`) and q = Td/dt (`derivative`) a step is
     w' = w + i (m + m_before)/2,  x' = x - h exp(j d) (m + w' + q (m - m_before)).
-    A residual that turns round at every sample (h cos d > 1) has its integral dropped each time, and its
-    amplitude has no sign: in y = (-1)^k x the same law with i = 0 reads
+    If the residual reverses at every sample (h cos d > 1), the integral is reset each time, and since an
+    amplitude has no sign, the law with i = 0 reads in y = (-1)^k x
     y' = h exp(j d) (m + q (m - m_before)) - y.
     With P alone both give noise sqrt(h/(2 cos d - h)).  An amplitude within the limit rests, and the first
     step after it is P alone.
@@ -232,9 +232,9 @@ class Margins:
     gain_factor: float
     """Factor by which the loop factor may grow with the right lag angle."""
     phase: float
-    """Error of the lag angle that the loop bears with the right loop factor, rad."""
+    """Error of the lag angle that the loop tolerates with the right loop factor, rad."""
     disk: float
-    """Disk margin, 0 to 2: gain and phase may change together, at every frequency by other amounts."""
+    """Disk margin, 0 to 2: gain and phase may change together, differently at each frequency."""
     disk_gain_factor: float
     """Factor by which the gain may then grow or fall, (2 + disk)/(2 - disk)."""
     disk_phase: float

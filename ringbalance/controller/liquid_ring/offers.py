@@ -53,14 +53,14 @@ _PRESSURES: Final = tuple(
 )
 """Levels, Pa, alike for all scenes: the series E24 of IEC 60063, of steps of about a tenth."""
 _REACH: Final = 3.2
-"""Times the scene's pressure, up and down, of the levels that may be tried."""
+"""Largest ratio to the scene's pressure, up and down, of the levels that may be tried."""
 _FIRST_REACH: Final = 1.8
-"""Times the scene's pressure, up and down, of the levels that are tried at first."""
+"""Largest ratio to the scene's pressure, up and down, of the levels that are tried first."""
 _OFFSET_STEP_S: Final = 1e-4
 """Step to which an offset is rounded."""
 _OWN: Final = {"target_vector": (_GAIN, _OFFSET, _INTEGRAL), "law_based": (_OFFSET,), "trial": ()}
 _INSTEAD: Final = {"target_vector": ("law_based",), "law_based": ("target_vector",), "trial": ()}
-"""Further kinds of controller by the scene's; valve-open times of a trial are its scene's."""
+"""Further kinds of controller to try, by the scene's kind."""
 
 
 def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials, ...]:
@@ -124,14 +124,14 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
 
 _NARROWER_BORES: Final = (0.7, 0.5, 0.35, 0.25)
 _WIDER_BORES: Final = (1.4, 2.0)
-"""Times the bore."""
+"""Factors on the bore."""
 _SLOW_FRACTION: Final = 0.25
-"""Share of a run's time that valves open for the initial vibration alone, from which a bore is small."""
+"""Fraction of a run's time that valves open for the initial vibration, above which wider bores are tried."""
 _FASTER: Final = (2.0, 4.0)
-"""Times the valve's conductance and over its lag."""
+"""Factors on the valve's conductance, and divisors of its lag."""
 _LIMITS: Final = (2.0, 4.0, 6.0)
 _CRESTS: Final = (1.0, 0.96, 0.92)
-"""Times the largest radius of a crest that holds the liquid."""
+"""Factors on the largest radius of a crest that holds the liquid."""
 _SOLD: Final = (
     ("Festo MHA2-MS1H-3/2", 0.39e-8, 0.3, 2.0e-3),
     ("SMC SY3000", 1.1e-8, 0.28, 12e-3),
@@ -152,7 +152,7 @@ _MEASURED: Mapping[str, str] = MappingProxyType(
 
 
 def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
-    """Every change by itself, those of one kind with the smallest first."""
+    """Single changes of a scene, those of one kind with the smallest first."""
     return (
         *_of_crest(scene, model),
         *_of_bore(scene, model),
@@ -163,7 +163,7 @@ def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
 
 
 def valves_of(scene: Scene) -> tuple[Remedy, ...]:
-    """Valves that can be bought for a scene that gives none; none where it does."""
+    """Valves that can be bought; empty for a scene that gives its valve."""
     gas = scene.gas
     if gas.conductance is not None:
         return ()
@@ -221,7 +221,7 @@ def _of_valve(scene: Scene) -> Iterator[Remedy]:
 
 
 def _of_limit(scene: Scene) -> Iterator[Remedy]:
-    """Higher limits, where the scene requires no residual: they would not reach that."""
+    """Higher limits; none where the scene requires a residual, which they would miss."""
     if scene.requirement.residual is None and scene.requirement.grade is None:
         for factor in _LIMITS:
             changes = {"controller.limit": factor * scene.controller.limit}

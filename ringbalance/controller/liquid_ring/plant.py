@@ -18,26 +18,26 @@ from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.loop_models import Rotor
 
 NEAR_RESIDUAL: Final = 1e-6
-"""Fill ratio above its residual fill up to which a chamber counts as at it, in runs and ensembles: the rest
-changes no vibration."""
+"""Fill ratio above the residual fill up to which a chamber counts as at it, in runs and ensembles; too small
+to change a vibration."""
 _MAX_DOUBLINGS: Final = 40
 _REFINEMENTS: Final = 6
-"""Each leaves a 256th of the range."""
+"""Number of refinements; each leaves a 256th of the range."""
 _PRESSURES: Final = 257
-"""Few calls of the law with many pressures cost least."""
+"""Number of pressures in a call of the law: few calls with many pressures cost least."""
 NEARLY_EMPTY: Final = 1e-6
-"""Fill ratio at which a chamber's last liquid is looked at."""
+"""Fill ratio above the lowest one of a chamber that counts as nearly empty."""
 LEAST_PRESSURE_PA: Final = 1.0
-"""Gauge, Pa, at which the search for a pressure that starts a flow begins without one."""
+"""Lowest gauge pressure at which the search for a pressure that starts a flow begins, Pa."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LiquidRing:
-    """The disc's flow law and moments, with what moves its liquid."""
+    """Flow law and moments of the disc, and dynamics of its liquid."""
 
     model: BalancerModel
     chambers: int
-    """n, even."""
+    """Number of chambers n, even."""
     dynamics: Dynamics
     total: float
     """Sum of the two fill ratios of a pair."""
@@ -67,16 +67,19 @@ class LiquidRing:
         return complex(largest_pair_moments(self.model, total=self.total, least_fill=least))
 
     def unreachable_vibration(self, *, rotor: Rotor, least_fill: float | None = None) -> float:
-        """Vibration that remains with the liquid at its best, m; zero within capacity.
+        """Vibration that remains with the best fills, m; zero within capacity.
 
-        Args: `least_fill`: as `largest_pair_moment`.
+        Args: `least_fill`: as in `largest_pair_moment`.
         """
         corners = corners_of(self.largest_pair_moment(least_fill=least_fill), self.chambers)
         left = unreachable_moment(corners, np.asarray(-rotor.initial_unbalance))
         return float(left) * rotor.influence_coefficient
 
     def moment_towards(self, direction: complex, *, least_fill: float | None = None) -> float:
-        """Largest moment that the disc forms in a direction, kg m. Args: `least_fill`: as above."""
+        """Largest moment that the disc forms in a direction, kg m.
+
+        Args: `least_fill`: as in `largest_pair_moment`.
+        """
         corners = corners_of(self.largest_pair_moment(least_fill=least_fill), self.chambers)
         return float(moment_towards(corners, np.asarray(direction / abs(direction) if direction else 1.0)))
 
@@ -114,7 +117,7 @@ def moment_towards(corners: ComplexArray, towards: ComplexArray) -> FloatArray:
     crossed = (edges.conj() * towards[..., None]).imag
     reached = (edges.conj() * corners).imag / np.where(crossed < 0, crossed, -np.inf)
     nearest = np.min(np.where(crossed < 0, reached, np.inf), axis=-1)
-    # Without any: nothing moves, or two chambers lie along the direction.
+    # No edge is crossed if nothing moves, or if two chambers lie along the direction.
     return np.asarray(np.where(np.any(crossed < 0, axis=-1), nearest, np.max(np.abs(corners), axis=-1)))
 
 
@@ -156,7 +159,7 @@ def starting_pressure(
 
 
 def _least_pressure(flows: Callable[[FloatArray], BoolArray], low: float, high: float) -> float | None:
-    """Smallest pressure from `low` on from which on liquid flows up to `high`; None where it does not."""
+    """Smallest pressure from `low` on above which liquid flows up to `high`; None: none flows at `high`."""
     for _ in range(_REFINEMENTS):
         p = np.linspace(low, high, _PRESSURES)
         dry = np.flatnonzero(~flows(p))

@@ -1,8 +1,8 @@
 """From a scene to evidence, and from evidence to two HTML files with figures, tables and off-screen pictures.
 
-`evidence` collects, `saved` keeps, `sections` lists what the pages show, `page` fills the templates,
-`report` writes.  `figure` is the frame of every figure, `run_figures` what is drawn of a run; `prose` has
-words and equations, `traced` numbers.
+`evidence` collects the evidence, `saved` stores results for later reports, `sections` lists the sections of
+the pages, `page` fills the templates, `report` writes the files.  `figure` is the frame of every figure,
+`run_figures` has the figures of a run; `prose` formats words and equations, `traced` numbers.
 """
 
 if not __name__.startswith("ringbalance."):

@@ -1,4 +1,4 @@
-"""The evidence document: all that a report says, as plain numbers and texts, gathered from every room.
+"""The evidence document: the whole content of a report as plain numbers and texts, from every package.
 
 For the same scene file, seed and versions everything but `times` and `provenance` is equal to the last bit.
 """
@@ -63,10 +63,10 @@ def collect_evidence(
     pool: Workers | None = None,
     progress: Progress = lambda _: None,
 ) -> Record:
-    """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
+    """Run all that a report is based on, pictures excepted, and collect it in one JSON-able document.
 
     Args: `scene_text`: the scene file's own text, for the appendix; empty where there is none. `saved`:
-    results of heavy cases, which take the place of those not run. `pool`: runs cases beside this process.
+    results of heavy cases, used for those not run. `pool`: processes that share the work with this one.
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     ids = [case.id for case in load_cases() if case.paper == scene.balancer]
@@ -75,7 +75,7 @@ def collect_evidence(
     cases = case_jobs(missing, scene=ring_of(scene) or paper_scene(), level=level, mutations=heavy)
     sections, work = sections_of(scene.balancer), Work(scene=scene, level=level)
     study = partial(_STUDIES.get(scene.balancer, _plain_study), scene)
-    # The longest first, and behind it what is short: a worker that is at work does not give those back.
+    # Longest jobs first, then short ones: a busy worker does not return the jobs that it has taken.
     jobs = [
         *(job for section in sections.values() for job in section.jobs(work)),
         Job(name="study", title="Pressure, law and runs", do=study),
@@ -84,12 +84,12 @@ def collect_evidence(
     # A worker does not know a balancer that was registered in this process.
     answers = dict(answers_of(jobs, pool if scene.balancer in _STUDIES else None, progress))
     ran = {
-        # Wall time does not reproduce, and no verdict hangs on it.
+        # Wall time does not reproduce, and no verdict depends on it.
         result.definition.id: {key: value for key, value in result.to_dict().items() if key != "time_s"}
         for job in cases
         for result in answers[job.name]
     }
-    # Cases that look at no scene serve other reports; one that broke down is run again.
+    # Cases that depend on no scene serve other reports; one that broke down is run again.
     date_today = date.today().isoformat()
     new = {
         name: {"date": date_today, "record": case}
@@ -99,7 +99,7 @@ def collect_evidence(
     if new:
         keep_cases({**stored, **new})
     collected = {name: answers[name] for name in sections if answers.get(name) is not None}
-    # What a section measured by the clock does not reproduce.
+    # Measured times do not reproduce.
     clocked = {name: record.pop("times") for name, record in collected.items() if "times" in record}
     verification = [ran[name] if name in ran else stored[name]["record"] for name in ids]
     dates = {name: stored[name]["date"] for name in ids if name not in ran}
@@ -135,7 +135,7 @@ def _scene_record(scene: AnyScene, text: str) -> Record:
 
 
 def _ring_study(scene: Scene) -> Record:
-    """Pressure, calibration, both flow laws and a run under each, which several sections show."""
+    """Pressure, calibration, both flow laws and a run under each, for several sections."""
     field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
     calibration = calibration_of(scene)
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
@@ -187,7 +187,7 @@ def _ring_study(scene: Scene) -> Record:
 
 
 def _plain_study(scene: SceneFile) -> Record:
-    """One run of any balancer as its scene says, as `simulate` shows it, and what the scene demands."""
+    """One run of any balancer by its scene, as a document of `simulate`, and the scene's requirements."""
     balancer = balancer_of(scene)
     run = balancer.run({}, AS_GIVEN, trace=True).traced[0].run
     return {
@@ -219,7 +219,7 @@ def _eccentric_study(scene: EccentricScene) -> Record:
 _STUDIES: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType(
     {"liquid_ring": _ring_study, "eccentric_mass": _eccentric_study}
 )
-"""Studies by balancer, of those that have more to show than one run."""
+"""Studies by balancer, for those whose report shows more than one run."""
 
 
 def parameters(scene: SceneFile) -> list[Record]:
@@ -237,7 +237,7 @@ def parameters(scene: SceneFile) -> list[Record]:
             elif entry.presence.kind != "standard":
                 text = _written(value, entry.takes, digits=3)
             else:
-                # A default in the words of its declaration.
+                # A default is shown as in its declaration.
                 defaults = default if isinstance(default, list) else [default]
                 text = ", ".join(str(word).replace("*", " ") for word in defaults)
             width = uncertain.get(path)

@@ -28,17 +28,17 @@ INK: Final = "#010101"
 MUTED: Final = "#020202"
 GRID: Final = "#030303"
 PAPER: Final = "#040404"
-"""The paper's formulas, in every figure."""
+"""Colour of the paper's formulas in every figure."""
 FOUND: Final = "#050505"
-"""Results of this program, in every figure."""
+"""Colour of this program's results in every figure."""
 THIRD: Final = "#060606"
 FOURTH: Final = "#070707"
 FIFTH: Final = "#080808"
 SURFACE: Final = "#090909"
-"""The page behind the figure."""
+"""Colour of the page behind the figure."""
 
 AS_PAPER: Final[dict[str, Any]] = {"color": PAPER, "linestyle": (0, (5, 2))}
-"""A line of the paper's formulas."""
+"""Properties of a line of the paper's formulas."""
 REGIME_COLOURS: Final = {
     "siphon": FOUND,
     "separated": THIRD,
@@ -54,7 +54,7 @@ MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 
 
 def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
-    """Shades from one colour over another to a third; lines in the text's colour stand out on each."""
+    """Shades from one colour through another to a third; lines in the text's colour stand out on each."""
     ramp = LinearSegmentedColormap.from_list("ramp", [low, middle, high])
     return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
 
@@ -163,7 +163,7 @@ class Drawing:
         return float(box[1]), float(box[2])
 
     def standalone(self) -> str:
-        """The figure as a file of its own, in the colours of a light page."""
+        """The figure as an SVG file, in the colours of a light page."""
         return _as_file(self.svg, *self.size)
 
 
@@ -240,7 +240,7 @@ def curve(
     band: ArrayLike | None = None,
     **look: Any,
 ) -> Paint:
-    """A line or markers, and the half-width about them shaded where there is one."""
+    """A line or markers, with their half-width as a shaded band if there is one."""
 
     def paint(axes: Axes) -> None:
         if band is not None:
@@ -305,9 +305,9 @@ def _to_page(text: str, name: str) -> str:
     body = re.sub(r"font-family: [^;\"]*", "font-family: var(--fig-font)", body)
     for sentinel, (variable, *_) in _PALETTE.items():
         body = body.replace(sentinel, f"var({variable})")
-    # The frame around it on the page is what is read aloud, by the figure's caption.
+    # Screen readers read the frame around it on the page, by the figure's caption.
     body = body.replace("<svg ", '<svg aria-hidden="true" ', 1)
-    # A tenth of a point is finer than the eye; what is small, as a marker, keeps another digit.
+    # A tenth of a point is below what the eye sees; small parts, such as markers, keep another digit.
     parts = re.split(r'( (?:d|x|y|transform)="[^"]*")', body)
     short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", "\0".join(parts[1::2])))
     parts[1::2] = re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short)).split("\0")
@@ -335,7 +335,7 @@ def draw(
     with matplotlib.rc_context(settings):
         width = WIDE_IN if wide else NARROW_IN
         figure = Figure(figsize=(width, height))
-        # Margins in inches, the same in every figure, so that neighbours line up.
+        # Margins in inches, equal in all figures, so that neighbours align.
         sizes = 1 - (_LEFT_IN + _RIGHT_IN) / width, 1 - (_BOTTOM_IN + _TOP_IN) / height
         axes = figure.add_axes((_LEFT_IN / width, _BOTTOM_IN / height, *sizes))
         for axis in (axes.xaxis, axes.yaxis):
@@ -360,7 +360,7 @@ def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], label: AxisLabel)
     if display.factor == 1:
         return
     if not math.log10(display.factor).is_integer() and axis.get_scale() == "linear":
-        # Round in this unit they are not in the other.
+        # Ticks that are round in SI are not round in the unit shown.
         low, high = sorted(end * display.factor for end in limits)
         ticks = AutoLocator().tick_values(low, high)
         axis.set_ticks([tick / display.factor for tick in ticks if low <= tick <= high])
@@ -369,7 +369,7 @@ def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], label: AxisLabel)
 
 
 def panels(axes: Axes, *boxes: tuple[float, float, float, float], **kind: Any) -> list[Axes]:
-    """Axes in place of a figure's, each by left, bottom, width and height over the figure's.
+    """Axes that replace those of a figure, each by left, bottom, width and height over the figure's.
 
     Args: `kind`: properties of the axes, such as their `projection`.
     """

@@ -1,4 +1,4 @@
-"""Evidence of the report from judgements over drawn devices, as plain JSON records in SI."""
+"""Evidence of the report from judgements on drawn devices, as plain JSON records in SI."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
 _COARSE_DEVICES: Final = 16
-"""Devices on which settings for things that can be bought are chosen."""
+"""Number of devices on which settings for purchase options are chosen."""
 _MAX_CURVE_POINTS: Final = 50
 
 
 def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
-    """Judge the scene's own settings, with remedies and measurements where they do not suffice."""
+    """Judge the scene's own settings, with remedies and measurements where these settings do not suffice."""
     (judgement,) = judged_all(balancer, [{}], first=first, most=most)
     suffices = judgement.verdict == MET or bool(judgement.meets.all())
     measures = () if suffices else tuple(ranked(balancer, judgement).findings())
@@ -43,7 +43,7 @@ def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Rec
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
-    """Judge the scene's own and the recommended settings, both watched for `LONG_WATCH_TIME_S` too."""
+    """Judge the scene's own and the recommended settings, both also watched for `LONG_WATCH_TIME_S`."""
 
     def watched(judgement: Judgement) -> Record:
         fraction = judgement.fraction.document()
@@ -57,7 +57,7 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
     if scene_judgement is None or best.settings:
         recommended = judgement_record(best) | {"longer": tuning.longer and watched(tuning.longer)}
     if (path := tuning.along_name) in best.settings:
-        # The recommended settings leave the scene's level of the scan axis.
+        # The recommended settings change the scene's value on the scan axis.
         before = value_at(tuning.given, path)
         at_scene_level = [each.judgement.fraction.document() for each in tuning.along if each.level == before]
         moved = {
@@ -85,10 +85,10 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
 
 
 def choice_records(balancer: Balancer, some: slice) -> list[Record]:
-    """Judge some of the things that can be bought for what a scene leaves open."""
+    """Judge some purchase options for what a scene leaves open."""
 
     def coarse_search(changed: Balancer) -> Settings:
-        """The best grid point of the first kind of controller: enough to tell the things apart."""
+        """Best grid point of the first kind of controller, enough to compare the options."""
         space = changed.trials()[0]
         grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
         offered = (space.settings(dict(point)) for point in grid)
@@ -101,7 +101,7 @@ def choice_records(balancer: Balancer, some: slice) -> list[Record]:
 
 
 def judgement_record(judgement: Judgement) -> Record:
-    """A judgement with the verdict on every demand and the curve of settled devices."""
+    """A judgement with the verdict on every requirement and the curve of settled devices."""
     required = judgement.demands_document()
     for document, demand in zip(required, judgement.demands, strict=True):
         document["verdict"] = judgement.fraction_of(demand).verdict(judgement.required_fraction)
@@ -135,7 +135,7 @@ def advice_view(record: Record) -> Record:
         changes = [
             f"{key_words(path)} {setting_text(path, value)}" for path, value in remedy["changes"].items()
         ]
-        # A filter may be told in a key of its own what a sensor does: the same words twice.
+        # A filter may have its own key for a property of the sensor: its words are those of the sensor's key.
         remedies.append(opening(", ".join(dict.fromkeys(changes))))
     return {"remedies": remedies, "measures": [each["text"] for each in record.get("measures", ())]}
 
@@ -145,7 +145,7 @@ def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
 
     def written(value: Any, path: str) -> Any:
         if isinstance(value, tuple):
-            # One value for all chambers is written as a value, not as a list of one.
+            # One value for all chambers is written without a list.
             return written(value[0], path) if len(value) == 1 else [written(each, path) for each in value]
         if isinstance(value, str | bool | int):
             return value

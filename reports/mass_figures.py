@@ -89,18 +89,17 @@ def run_up(run: Record, locked: Record, rotor: Record, devices: Record | None = 
     of the locked rotor behind its unbalance, with the critical speed.
 
     Args: `rotor`: its `critical_speed_rad_s`, `amplification_factor` (None: none is defined), and
-    `locked_phase_rad`, the phase of what the locked masses leave of the unbalance. `devices`: as
-    in `over_time`.
+    `locked_phase_rad`, the phase of the unbalance with the masses locked. `devices`: as in `over_time`.
     """
     lag = np.degrees((rotor["locked_phase_rad"] - np.asarray(locked["phase_rad"])) % math.tau)
-    # An angle a little before the unbalance is a small lead, not a lag of almost a turn.
+    # A small lead is not shown as a lag of almost a turn.
     lag = np.where(lag > _MAX_LAG_DEG, lag - 360, lag)
     critical, factor = rotor["critical_speed_rad_s"], rotor["amplification_factor"]
     ends = min(*run["speed_rad_s"], critical), max(*run["speed_rad_s"], critical)
     at_critical = upright(critical, color=INK, linewidth=0.9, linestyle=(0, (6, 2, 1, 2)))
     text = f"critical speed {shown(critical, 'rad/s', digits=3)}"
     text += f", amplification factor {number(factor, digits=2)}" if factor else ""
-    # Where the lag is not: it passes 90 degrees at the critical speed.
+    # Clear of the lag curve, which passes 90 degrees at the critical speed.
     right = critical > sum(ends) / 2
     aligned: dict[str, Any] = {"ha": "right", "va": "top"} if right else {"ha": "left", "va": "bottom"}
     shift, height = ((-4, -4), 1.0) if right else ((4, 4), 0.0)

@@ -71,7 +71,7 @@ DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
         },
     }
 )
-"""The documents by file name; the report last: where it exists, all other files do."""
+"""The documents by file name; the report is written last: where it exists, all other files do."""
 _LEADING: Final = re.compile(r"\d+(?:\.\d+)?")
 _WEBP_WIDTH_PIXELS: Final = 800
 _WEBP: Final[Record] = {"format": "WEBP", "quality": 70, "method": 6}
@@ -93,7 +93,7 @@ def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
 
 @dataclass(frozen=True, kw_only=True)
 class _PageContent:
-    """Context of the templates, and every figure on the pages, for files of their own."""
+    """Context of the templates, and all figures of the pages, to be written as files."""
 
     context: Record
     drawings: tuple[Drawing, ...]
@@ -117,7 +117,7 @@ def page_content(
         case["id"]: {
             **of_cases[case["id"]],
             "quantities": placed(case.get("quantities") or [], f"{CASES_VIEW}.{case['id']}.quantities"),
-            # Claims on eccentric masses are all judged on a rotor of their own.
+            # All claims on eccentric masses are judged on the paper's rotor.
             "elsewhere": case.get("paper") != "eccentric_mass" and summary.elsewhere(case, evidence),
         }
         for case in evidence[CASES_VIEW]
@@ -165,7 +165,7 @@ def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
             continue
         variants = {}
         for key in ("light", "dark"):
-            # A quarter of the bytes, and no difference to the eye.
+            # A quarter of the bytes without a visible difference.
             packed = io.BytesIO()
             with Image.open(io.BytesIO(contents[item[key]])) as picture:
                 picture.thumbnail((_WEBP_WIDTH_PIXELS, _WEBP_WIDTH_PIXELS))
@@ -188,7 +188,7 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
 def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fill the template once for each document."""
     colours = ["".join(f"{key}:{value};" for key, value in scheme.items()) for scheme in (LIGHT, DARK)]
-    # Every sign outside the plainest is escaped, so that a scene's name cannot leave its string.
+    # All but plain characters are escaped, so that a scene's name cannot end its string.
     head: str = content.context["running_head"]
     escaped = "".join(c if c.isalnum() or c in " .,-()" else f"\\{ord(c):x} " for c in head)
     style = _template("style.css").replace("{{ running_head }}", escaped)
@@ -219,7 +219,7 @@ def terminal_lines(evidence: Record) -> list[str]:
 
 @cache
 def _environment() -> jinja2.Environment:
-    """Keeps the templates, each compiled once."""
+    """Environment of the templates, each compiled once."""
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         autoescape=True,

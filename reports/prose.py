@@ -55,12 +55,12 @@ _UNITS: Final = {
     r"'": "’",
 }
 _PLAIN: Final = re.compile(r"[^A-Za-z^%'*]*")
-"""Text that stays as it is, unless it has a " - ": most cells of tables."""
+"""Text that needs no typesetting unless it has a " - ": most cells of tables."""
 _KNOWN_ORIGINS: Final = ("given", "measured")
 _OWNERS: Final = {"lqr": "regulator", "masses": "eccentric masses"}
 """Names of tables of the scene file, where they differ from the key."""
 _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
-"""Tables, and a key, whose keys need no owner."""
+"""Tables whose keys need no owner in their names, and one such key."""
 _MESH: Final = "disc.mesh"
 _KEYS: Final = {
     "pressure": "gas pressure",
@@ -72,7 +72,7 @@ _KEYS: Final = {
     "conductance": "sonic conductance",
     "draw_down_factor": "draw-down factor",
 }
-"""Words for keys that are none by themselves."""
+"""Words for keys that do not read as words."""
 _PATH: Final = re.compile(
     r"\b(?:controller|disc|gas|liquid|masses|requirement|rotor|run|sensor|tube)\.[a-z_]+"
 )
@@ -95,7 +95,7 @@ def typeset(text: str) -> str:
 
 
 def opening(text: str) -> str:
-    """A text as it begins a sentence; a symbol at its head, such as k, stays as it is."""
+    """A text with a capital at its beginning; a leading symbol, such as k, stays as it is."""
     first = text.partition(" ")[0]
     return text if len(first) == 1 and first != "a" else f"{text[0].upper()}{text[1:]}"
 
@@ -109,7 +109,7 @@ def key_words(path: str) -> str:
 
 
 def paths_named(text: str) -> str:
-    """A sentence of the program with the names of inputs in place of the scene file's paths."""
+    """A sentence with the names of inputs in place of their paths in the scene file."""
     return _PATH.sub(lambda match: input_name(match[0]), text)
 
 
@@ -119,7 +119,7 @@ def resting(evidence: Mapping[str, Any], *paths: str) -> str:
     values = {row.get("path"): row.get("value", "") for row in evidence["scene"].get("table") or ()}
     by_origin: dict[str, list[str]] = {}
     for input_path in paths:
-        # What follows from the mesh of an imported chamber rests on that.
+        # A value derived from the mesh of an imported chamber rests on the mesh.
         path = _MESH if origins.get(input_path) == "derived" else input_path
         if (origin := origins.get(path, "given")) not in _KNOWN_ORIGINS:
             text = f"{key_words(path)} {values.get(path, '')}".rstrip()

@@ -33,7 +33,7 @@ from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
-"""Files of a report, the page last: where it exists, all others do."""
+"""Files of a report, in the order of writing; where the last, the page, exists, all others do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +114,7 @@ def write_report(
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
         path, figures, tables = stage / "evidence.json", stage / "figures", stage / TABLES
         path.write_text(evidence_text(evidence), encoding="utf-8")
-        # The pages are made of the evidence as it reads back from its file.
+        # The pages are made from the evidence as read back from its file.
         evidence = _read_at(path)
         views = dict(_views(path, evidence["balancer"], pool))
         figures.mkdir(exist_ok=True)

@@ -36,7 +36,7 @@ class _ResultFigures:
     drawings: tuple[Drawing, ...]
 
     def svg(self) -> str:
-        """All of them on one sheet, an SVG file."""
+        """All figures on one sheet, as an SVG file."""
         return sheet(self.drawings)
 
     def save(self, path: str | PathLike[str]) -> Path:
@@ -47,7 +47,7 @@ class _ResultFigures:
         return self.svg()
 
     def __repr__(self) -> str:
-        """Short: the notebook shows the figures, a terminal cannot."""
+        """Short text for a terminal, which cannot show the figures."""
         return f"<{len(self.drawings)} figures; .save(path) writes them as one SVG file>"
 
 
@@ -90,7 +90,7 @@ def _comparison(result: Any) -> list[Drawing]:
 
 
 def _trade(result: Any) -> list[Drawing]:
-    """Error against designs a second of every model that was timed."""
+    """Error over designs per second for every timed model."""
     drawings = []
     for quantity in result.to_dict()["quantities"]:
         name = quantity["quantity"]

@@ -50,7 +50,7 @@ from ringbalance.scene.origins import SceneFile
 _UM_PER_M: Final = 1e6
 _NUMBERED_SAMPLES: Final = 12
 _SAMPLE_DISTANCE: Final = 0.09
-"""Least distance of numbered samples over the picture's half width."""
+"""Least distance between numbered samples, over the picture's half width."""
 
 
 def figures_of(scene: SceneFile, run: Any) -> list[Drawing]:
@@ -120,7 +120,7 @@ def run_amplitude(run: Record) -> Drawing:
 
 
 def early_time(run: Record) -> float:
-    """End, s, of the part of a run in which most of a ring's gas is spent."""
+    """End, s, of the part of a run in which a liquid ring uses most of its gas."""
     spent = np.cumsum([item["duration_s"] for item in run["injections"]])
     if spent.size == 0:
         return float(run["time_s"][-1]) or 1.0
@@ -129,7 +129,7 @@ def early_time(run: Record) -> float:
 
 
 def fill_ratios(run: Record, until: float) -> Drawing:
-    """Fill ratio of every chamber against time. Args: `until`: end of the time axis, s."""
+    """Fill ratio of every chamber over time. Args: `until`: end of the time axis, s."""
     return draw(
         "fill-ratios",
         *(
@@ -144,8 +144,8 @@ def fill_ratios(run: Record, until: float) -> Drawing:
 
 
 def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
-    """Residual vibration as a vector over a run, with the limit's circle and what the disc can cancel; the
-    first samples of the controller numbered.
+    """Residual vibration as a vector over a run, with the limit's circle and the vibration that the disc can
+    cancel; the first samples of the controller are numbered.
 
     Args: `run`: a simulation document. `reach`: amplitude `vibration_m` that one pair cancels, direction
     `direction_rad` of the first pair's vibration (minus the lag angle), number of `pairs`; None: not shown.
@@ -167,7 +167,7 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
                 look: Any = {"color": FOUND, "markerfacecolor": face, "markersize": 6}
                 panel.plot(phase[index], amplitude[index], "o", **look)
             panel.set_title(f"{title}, radius in µm", loc="left", fontsize="medium", color=INK, pad=16)
-            # The numbers of the rings where the run does not begin.
+            # Numbers of the rings away from the beginning of the run.
             panel.set(ylim=(0, span), rlabel_position=math.degrees(phase[0]) + 195)
             panel.set_yticks([tick for tick in nice_span(span) if tick > 0])
             panel.yaxis.set_major_formatter(FuncFormatter(plain_number))

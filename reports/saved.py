@@ -48,7 +48,7 @@ _LISTS: Final = ("quantities", "series", "convergence", "tables", "mutations", "
 _KINDS: Final[Mapping[str, type]] = MappingProxyType(
     dict.fromkeys(_TEXTS, str) | dict.fromkeys(_LISTS, list) | {"reference": dict, "numbers": dict}
 )
-"""Types by key of a case's record that a report may take over."""
+"""Types of the keys of a case's record that a report may reuse."""
 _NAMES: Final[Mapping[type, str]] = MappingProxyType({str: "a text", list: "a list", dict: "an object"})
 
 
@@ -86,7 +86,7 @@ def saved_cases(folder: Path | None = None) -> list[Record]:
 
 
 def _problem(document: Any) -> str:
-    """Reason why a report cannot work with an evidence document; empty: none."""
+    """Reason why a report cannot use an evidence document; empty: none."""
     # NaN and infinity, which no evidence holds, raise ValueError.
     json.dumps(document, allow_nan=False)
     if not isinstance(document, dict):
@@ -102,7 +102,7 @@ def _problem(document: Any) -> str:
 
 
 def _case_problem(case: Any, name: str) -> str:
-    """Reason why a report cannot work with a case's record; empty: none."""
+    """Reason why a report cannot use a case's record; empty: none."""
     if not isinstance(case, dict):
         return f"{name} is no object"
     for key, kind in _KINDS.items():
@@ -121,7 +121,7 @@ def looks_at_no_scene(case: Mapping[str, Any]) -> bool:
 
 
 def kept_cases() -> dict[str, Record]:
-    """Light cases that look at no scene, by id, each with its `record` and the `date` on which it was run."""
+    """Light cases that depend on no scene, by id, each with its `record` and the `date` of its run."""
     path = _kept_file()
     if not trusted(path.parent):
         return {}
@@ -171,7 +171,7 @@ def provenance() -> Record:
 
     Returns: Texts; empty where this copy of the program is no checkout. The machine's name is left out.
     """
-    # Folders of files say nothing to another machine.
+    # Folders are those of this machine alone.
     program, *words = sys.argv
     arguments = [Path(word).name if os.sep in word else word for word in words]
     return {

@@ -1,4 +1,4 @@
-"""A section of the report: its name, title and template, what it collects and what it shows."""
+"""A section of the report: name, title, template, collected evidence and view."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ _WITH_LIQUID: Final = MappingProxyType({"liquid_ring": liquid_ring_scene})
 
 
 def ring_of(scene: AnyScene) -> Scene | None:
-    """The scene, of a balancer whose report calibrates and has fields and pictures; else None."""
+    """The scene if its balancer has a calibration, fields and pictures (a liquid ring); else None."""
     narrowed = _WITH_LIQUID.get(scene.balancer)
     return None if narrowed is None else narrowed(scene)
 
 
 def _nothing(_work: Work) -> None:
-    """Collects no evidence of its own."""
+    """Collect no evidence."""
 
 
 def _everything(_own: Record, _evidence: Record) -> Record:
-    """Shows nothing but what every template sees."""
+    """Add nothing to the content that every template sees."""
     return {}
 
 
@@ -59,18 +59,18 @@ class Section:
     """One section of the page."""
 
     name: str
-    """Its id on the page, its key in the evidence, and the stem of its template."""
+    """Id on the page, key in the evidence, and stem of the template."""
     title: str
     document: Document = "annex"
     of_paper: bool = False
     """True if it stands in the annex of every scene but the paper's own."""
     collect: Callable[..., Record | None] = _nothing
-    """From the work and the answers of `parts`: plain numbers and texts for the evidence, under the section's
-    name; None: nothing to report."""
+    """Function of the work and the answers of `parts`: plain numbers and texts for the evidence, under the
+    section's name; None: nothing to report."""
     parts: tuple[Job, ...] = ()
-    """Jobs that take the work, and then what they need."""
+    """Jobs; each takes the work, then the answers that it needs."""
     show: Callable[[Record, Record], Record | None] = _everything
-    """From the section's evidence and the whole to the template's `view`: texts and drawings, or None."""
+    """Function of the section's and the whole evidence: texts and drawings for the template, or None."""
     always: bool = False
     """True if it is shown without evidence of its own, which is then empty."""
     template: str = ""

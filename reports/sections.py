@@ -59,11 +59,11 @@ SECTIONS: Final[tuple[Section, ...]] = (
 _BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(
     {"liquid_ring": SECTIONS, eccentric.BALANCER: eccentric.SECTIONS}
 )
-"""Sections by balancer, for those that have pages of their own."""
+"""Sections by balancer, for balancers with their own pages."""
 CASES_VIEW: Final = "verification"
 """Key of the view of all cases among those of the sections."""
 PREFIXES: Final[Mapping[Document, str]] = MappingProxyType({"report": "", "annex": "A"})
-"""Before the number of every section, figure, table and equation of a document."""
+"""Prefix of the number of every section, figure, table and equation, by document."""
 
 
 def sections_of(balancer: str) -> dict[str, Section]:

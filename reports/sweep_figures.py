@@ -19,14 +19,14 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.platform.files import write_whole
 
 _COLUMNS: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor")
-"""Columns that are drawn, where there are numbers."""
+"""Columns of a sweep that are drawn if they have numbers."""
 _MAX_NOTE_CHARACTERS: Final = 50
 _OUTSIDE: Final = {"marker": "x", "linewidths": 1.0}
 _POINT_SHADES: Final = MAP[3:]
-"""Shades that stand out from the page."""
+"""Shades of points, which stand out from the page."""
 _BEST: Final = {"marker": "*", "facecolors": "none", "edgecolors": INK}
 _Shades = list[tuple[str, BoolArray]]
-"""Colours, each with the points that have it."""
+"""Colours, each with a mask of its points."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
 def sweep_drawings(sweep: Sweep) -> list[Drawing]:
     """A figure of each quantity over the keys that vary; none where a key takes texts.
 
-    Over a grid of more than two axes the two with most values, and the others as in the best row.
+    A grid of more than two axes is drawn over the two with most values, with the others as in the best row.
     """
     fields = {name: (unit, values) for name, unit, values in sweep.fields()}
     view = _view(sweep)
@@ -122,7 +122,7 @@ def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
 
 
 def _noted(panel: Axes, *parts: str) -> None:
-    """Write a line above the frame, on the right of the legend."""
+    """Write a line of text above the frame, to the right of the legend."""
     panel.text(1, 1.02, "; ".join(filter(None, parts)), ha="right", transform=panel.transAxes)
 
 

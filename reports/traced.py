@@ -138,7 +138,7 @@ class Part(Mapping[str, Any]):
 
     def __getitem__(self, key: str) -> Any:
         if "." in key:
-            # A quantile's name, which no dotted path can hold.
+            # A quantile's name has a dot and so cannot be in a dotted path.
             return self._record[key]
         return placed(self._record[key], f"{self._path}.{key}" if self._path else key)
 
@@ -197,14 +197,14 @@ def printed(
 
 @dataclass(frozen=True, kw_only=True)
 class _NumberColumn:
-    """Numbers in one unit and to one decimal place, that of the last digit of the largest."""
+    """Numbers in one unit and with equal decimals, to the last digit of the largest."""
 
     symbol: str
     texts: list[str]
 
 
 def column(values: _Items, digits: int = 6) -> _NumberColumn:
-    """A column of the evidence in the unit that suits its largest value, which has so many digits."""
+    """A column of the evidence in the unit that suits its largest value, which has `digits` digits."""
     numbers_of = list(values)
     display = numbers.display_unit(unit_of(numbers_of[0].path), *numbers_of)
     largest = max(abs(value) for value in numbers_of) * display.factor
@@ -214,7 +214,7 @@ def column(values: _Items, digits: int = 6) -> _NumberColumn:
 
 
 def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3) -> str:
-    """Both ends of an interval in one unit; empty without one, or with none that so many digits show."""
+    """Both ends of an interval in one unit; empty without one, or if `digits` do not separate the ends."""
     if ends is None:
         return ""
     low, high = ends
@@ -228,7 +228,7 @@ def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3)
 
 
 def table_of(texts: Sequence[str], caption: str = "", style: str = "narrow") -> Table:
-    """A table of which each text is a row: a line `Head :: cell` for each column; both stay markup.
+    """A table with a row for each text, which has a line `Head :: cell` for each column; both stay markup.
 
     Columns that are empty in every row are left out.
     """

@@ -1,4 +1,4 @@
-"""Cases of verification on the page, numbers as texts, and two studies of a scene: limits of validity, and
+"""Verification cases on the page, with numbers as texts, and two studies of a scene: limits of validity, and
 speed against accuracy.
 """
 
@@ -61,7 +61,7 @@ _FINE_RATIO: Final = 0.01
 """Half-width over error below which two digits of the error suffice."""
 _MAX_NAMED_INPUTS: Final = 2
 _MAX_DIGITS: Final = 4
-"""Digits of a number in brief: the uncertainty of the inputs allows no more, however fine a comparison is."""
+"""Digits of a number in brief: the uncertainty of the inputs justifies no more, even in fine comparisons."""
 _MAX_LABEL_CHARACTERS: Final = 28
 _CURVES: Final[dict[str, Record]] = {
     "paper": AS_PAPER,
@@ -69,9 +69,9 @@ _CURVES: Final[dict[str, Record]] = {
     "reference": {"color": THIRD, "linestyle": (0, (1, 1.5))},
     "points": {"color": INK, "linestyle": "", "marker": "o", "markersize": 2.5},
 }
-"""Looks of a curve by its style."""
+"""Line properties of a curve, by its style."""
 _SPARE: Final = (*(line(index) for index in (2, 3, 5)), {"color": INK})
-"""Looks of further curves of a style that is taken."""
+"""Line properties of further curves with a style already in use."""
 
 
 TABLES: Final = "tables"
@@ -165,7 +165,7 @@ def _range(quantity: JudgedQuantity) -> str:
     if sides[1] <= _LOPSIDED_RATIO * sides[0] or sides[1] <= 0.1 * abs(value):
         return ""
     display = display_unit(quantity.get("unit") or "1", value or max(map(abs, (low, high))))
-    # What is left of a numerical uncertainty about zero is zero.
+    # An end this close to zero is zero but for numerical uncertainty.
     least = _ZERO_FRACTION * (high - low)
     ends = (end * display.factor if abs(end) > least else 0.0 for end in (low, high))
     return with_unit(" to ".join(number(end, digits=2) for end in ends), display.symbol)
@@ -207,7 +207,7 @@ def _series_plot(name: str, series: Record) -> Drawing:
 
 
 def case_view(case: Record) -> Record:
-    """Everything that the page shows of one case."""
+    """Whole content of the page on one case."""
     stem = case["id"].replace("_", "-")
     sequences = []
     for each in case.get("convergence") or []:
@@ -249,7 +249,7 @@ def case_view(case: Record) -> Record:
             for n, latex in enumerate(case.get("equations") or [])
         ],
         "order_plot": _order_plot(f"order-{stem}", falling) if falling else None,
-        # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
+        # Errors that change their sign from mesh to mesh, or are rounding, have no order.
         "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],
         "drawings": [
             _series_plot(f"case-{stem}-{n}", series) for n, series in enumerate(case.get("series") or [])
@@ -309,15 +309,15 @@ def _extremes(_own: Record, evidence: Record) -> Record:
 
 
 EXTREMES: Final = Section(name="extremes", title="At the extremes", show=_extremes)
-"""Shown also where it was not run, to say how it is."""
+"""Section that without a run gives the command for one."""
 
 
 _trade_study = lru_cache(maxsize=4)(trade_study)
-"""One measurement serves every report of a scene within a process."""
+"""Trade study, measured once per scene and process."""
 
 
 def _collect(work: Work) -> Record | None:
-    """The trade of the scene, light: without meshes in three dimensions."""
+    """Trade study of the scene at the light level: without meshes in three dimensions."""
     return _trade_study(work.ring, level="light").to_dict()
 
 

@@ -41,11 +41,11 @@ _FILL: Final[AxisLabel] = ("fill ratio", "1")
 _MODES: Final = 4
 _FILLS: Final = 17
 _IMPORTED_FILLS: Final = 9
-"""Number of fills of an imported chamber, whose mesh each fill cuts twice."""
+"""Number of fills of an imported chamber: each fill cuts its mesh twice."""
 _COARSE: Final = ((8, 24), (4, 12), (2, 6))
-"""Meshes for figures and sentences: three digits."""
+"""Cells of meshes, accurate to the three digits that figures and sentences need."""
 _NEAR_SPEED: Final = 0.15
-"""Distance of a frequency from the speed, over the speed, that counts as a fill to avoid."""
+"""Distance of a frequency from the speed, over the speed, within which the fill is to be avoided."""
 _RESONANT_RATIOS: Final = (1 / HIGHEST_TRUE, 1 / LOWEST_TRUE)
 """Range of frequencies over the speed, by theory, that may be resonant."""
 
@@ -111,10 +111,10 @@ def _collect(work: Work) -> Record | None:
     try:
         met = resonant_fills(disc=scene.disc, modes=_MODES)
         if imported:
-            # Denser where the ring is thin, for there the frequencies rise fastest.
+            # Denser for thin rings, whose frequencies rise fastest.
             fills = (0.02 + 0.98 * np.linspace(0, 1, _IMPORTED_FILLS) ** 2) * largest
         else:
-            # A peak is narrower than the distance of even points.
+            # A peak is narrower than the spacing of even points.
             peaks = [
                 x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest
             ]

@@ -48,10 +48,10 @@ def _collect(work: Work) -> Record:
     point = drag.point
     liquids = liquids_in_tube(calibration)
     first, budgets, speed = liquids[0], calibration.quantities, float(calibration.answers.velocity)
-    # Where an unprimed tube spills at the operating point, the primed one of this section is another point.
+    # Where an unprimed tube spills, the primed tube of this section has another operating point.
     same = math.isclose(first["velocity_m_s"], speed, rel_tol=_VELOCITY_ROUNDING)
     if first["starts_at_scene_pressure"] and same and scene.tube.drag_coefficient is None:
-        # The uncertainties that every other table gives the scene's own liquid.
+        # The uncertainties of the scene's own liquid are those of all other tables.
         names = {"velocity_uncertainty": "velocity", "k_uncertainty": "drag_coefficient"}
         liquids[0] = first | {
             key: parts.total
@@ -97,7 +97,7 @@ def _rounded(values: npt.ArrayLike) -> Any:
 
 
 def _verdict_on_fifty(record: Record) -> str:
-    """Verdict on k = 50 for a liquid, by the velocity that Eq. 19 gives with it."""
+    """Verdict on k = 50 for a liquid, by the velocity of Eq. 19 with k = 50."""
     if not record["runs"]:
         return "nothing flows"
     gap = record["velocity_paper_m_s"] - record["velocity_m_s"]
@@ -115,7 +115,7 @@ def _draw_map(axes: Axes, drag: Record, bore: FloatArray, nu: FloatArray) -> Non
         axes.contourf(bore, nu, separation, levels=[0.0, 100.0], colors=[MUTED], alpha=0.16)
         grey: Record = {"color": MUTED, "alpha": 0.16, "linewidth": 0}
         axes.fill_between([], [], [], label="column separated at the siphon crest", **grey)
-    # Far from the line a wide uncertainty is no nearness.
+    # Far from the line k = 50 a wide uncertainty does not put a point into the band.
     far = np.abs(np.log(np.maximum(k, 1e-9) / _FIFTY)) > 2
     near = np.where(far, 1.0, np.abs(k - _FIFTY) - width)
     axes.contourf(bore, nu, near, levels=[-1e9, 0], colors=[PAPER], alpha=0.2)
@@ -146,7 +146,7 @@ def _view(record: Record, _evidence: Record) -> Record:
     nu = np.asarray(drag["kinematic_viscosity_m2_s"]) * _MM2_PER_M2
 
     def liquids(axes: Axes) -> None:
-        # Circles with names, on both sides in turn where the map has room.
+        # Circles with names, on alternate sides where the map has room.
         running = [liquid for liquid in record["liquids"] if liquid["runs"]]
         running.sort(key=lambda liquid: float(liquid["kinematic_viscosity_m2_s"]))
         across = math.log(record["bore_m"] / bore[0]) / math.log(bore[-1] / bore[0])

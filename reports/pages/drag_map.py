@@ -4,7 +4,7 @@ At equal fills the operating point follows from the gas head p/rho and, where th
 the crest: a denser liquid under proportionally more gas has the same heads, so one map serves all densities
 but for the vapour pressure.  Under the same gas it has a smaller head, or does not start at all.
 
-Where the column is separated, someone who reads k off Eq. 18 finds a drag that falls as 1/u^2.
+Where the column is separated, the k calculated from Eq. 18 falls as 1/u^2.
 """
 
 from __future__ import annotations
@@ -77,12 +77,12 @@ class _DragPoint:
     k_uncertainty: FloatArray
     """Expanded uncertainty (95 %) of k at a velocity that varies with it; zero without errors."""
     apparent_k: FloatArray
-    """2 p/(rho u^2) - 1: the k that Eq. 18 reads off this velocity; above k where the column is separated."""
+    """2 p/(rho u^2) - 1, the k by Eq. 18 at this velocity; above k where the column is separated."""
     reynolds: FloatArray
     flow_state: npt.NDArray[np.str_]
     """Values of `FlowState`."""
     in_range: BoolArray
-    """False where a correlation is stretched, as in `TubeLoss`."""
+    """False where a correlation is used beyond its range, as in `TubeLoss`."""
 
     @classmethod
     def of(cls, designs: Designs, errors: Sequence[Uncertainty] = ()) -> _DragPoint:
@@ -107,7 +107,7 @@ class _DragPoint:
         state = corrected_state(varied, u)
         widths = np.zeros((2, designs.size))
         if errors:
-            # One design alone would count as plain numbers.
+            # A single design would be taken as plain numbers.
             rows = np.resize(np.arange(designs.size), max(designs.size, 2))
             moved = changes_of(designs.take(rows).scene, _velocity_and_k, errors, each=rows.size)[1]
             widths = np.sqrt(np.sum(np.nan_to_num(larger(moved)) ** 2, axis=0))[:, : designs.size]
@@ -204,7 +204,7 @@ class DragMap:
         Args: `bore`: d, m, rising, shape (n,); default 41 from 0.2 to 5 mm. `kinematic_viscosity`: nu, m^2/s,
         rising, shape (m,); default 49 from 0.2 to 500 mm^2/s.
         Raises: ValueError: arcs of bends longer than the tube.
-        Range: as `tube_loss`; `point.in_range` says where a correlation is stretched.
+        Range: as `tube_loss`; `point.in_range` is False where a correlation is used beyond its range.
         """
         scene = calibration.scene
         d = _axis(bore, BORES, _BORE_POINTS, scene.tube.bore)
@@ -309,7 +309,7 @@ def _in_tube(
     stated = independent_half_widths(scene)
     for name, spread in _LIQUID_UNCERTAINTIES.items():
         widths = np.array([getattr(q, spread) * getattr(q, name) for q in liquids])
-        # What the scene states is of its own liquid.
+        # Uncertainties that the scene states apply to its own liquid alone.
         widths[0] = stated.get(name, widths[0])
         change: dict[str, Any] = {name: widths / NORMAL_95}
         errors.append(replace(of_input(name, 0.0), change=change))
@@ -325,7 +325,7 @@ def read_by_eq_18(
     H_A - H_C = (p_A - p_C + P_A - P_C)/rho. Their difference C = (D_m + p_c - P_C - p_C)/rho does not
     depend on what drives the flow, so k = alpha + k_up - 1 + 2 C/u^2: at one fill of the opposite chamber
     the excess falls exactly as 1/u^2, whatever the gas pressure and the driven chamber's fill.
-    What is read is the larger of the two, since the tube runs at the smaller velocity.
+    The larger of the two k applies, since the tube runs at the smaller velocity.
     Args: `velocity`: u, m/s, any shape, positive.
     Raises: ValueError: a law without a crest, whose column does not separate.
     Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.

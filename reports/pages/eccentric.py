@@ -25,10 +25,10 @@ from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Record, Section
 
 _MAGNIFIED_HALF: Final = 0.75
-"""Half of the magnified picture over the poles' extent."""
+"""Half of the width of the magnified picture, over the extent of the poles."""
 _MIN_EXTENT: Final = 0.02
 _UNIT_CIRCLE_HALF: Final = 1.12
-"""Half of the picture of the unit circle, or over the pole outside it."""
+"""Half of the width of the picture, over the radius of the unit circle or of the farthest pole outside it."""
 
 
 def _run(_own: Record, evidence: Record) -> Record:

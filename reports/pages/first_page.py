@@ -1,4 +1,4 @@
-"""The first page of a liquid ring: for what fraction of devices, under which settings, and what to do."""
+"""First page of a liquid ring: fraction of devices that settle, recommended settings, and remedies."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ _VERDICT_OPACITY: Final = {MET: 0.28, OPEN: 0.1}
 
 
 def _tuning(work: Work) -> Record:
-    """Settings by runs; `scene`: the scene with those recommended."""
+    """Settings found by runs, with the scene under the recommended ones as `scene`."""
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
     tuning = tuned(balancer, scan=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
@@ -154,7 +154,7 @@ def _view(record: Record, evidence: Record) -> Record:
     origins = evidence["scene"]["origins"]
     rows = {row["path"]: row["origin"] for row in evidence["scene"]["table"]}
     verdicts = {case["id"]: case["verdict"] for case in summary.claims(evidence)}
-    # Only the paper's own disc answers the study's question.
+    # The study's question is about the paper's own disc alone.
     answered = summary.is_papers(evidence) and verdicts.keys() >= set(_QUESTION)
     return {
         "question": {name: verdicts[name] for name in _QUESTION} if answered else {},

@@ -1,4 +1,4 @@
-"""The loop and its tuning: runs under each law, how many devices settle by when, and what a wrong k costs."""
+"""Control loop and tuning: runs under each law, devices settled over time, and the effect of a wrong k."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _MAX_FRAMES: Final = 7
 
 
 def _reach(work: Work) -> Record:
-    """Largest vibration, m, that a pair cancels, and the first pair's direction by the sensor's phase."""
+    """Largest vibration, m, that a pair cancels, and direction of the first pair in the sensor's phase."""
     scene, moment = work.ring, float(work.calibration.answers.usable_moment)
     return {
         "pairs": scene.disc.chambers // 2,
@@ -93,7 +93,7 @@ def _injections_until(run: Record) -> float:
 def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
     """Vibration amplitude over whole runs, with every injection of the first one.
 
-    Where a long rest follows the injections it has an axis of its own.
+    A long rest after the injections has a separate axis.
     """
     end = max(float(run["time_s"][-1]) for run in runs.values())
     early = 1.15 * max(map(_injections_until, runs.values()))
@@ -113,7 +113,7 @@ def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
         first.set_ylabel("amplitude, zero to peak, in µm")
         groups, across = _together(next(iter(runs.values()))["injections"]), first.get_xaxis_transform()
         for start, last, letters in groups:
-            # For the time that a chamber keeps its valve open.
+            # Line over the time that the valve is open.
             first.plot((start, last), (1.0, 1.0), color=INK, linewidth=3, transform=across, clip_on=False)
             first.axvline(start, color=MUTED, linewidth=0.5, alpha=0.6)
             if len(groups) <= _MAX_LETTERED:
@@ -218,10 +218,10 @@ _LINEAR_FILL_CHANGE: Final = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class _LoopGain:
-    """The proportional loop about level chambers under one law.
+    """The proportional loop about equal fills under one law.
 
-    e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V: a residual turns round from h = 1
-    and grows from h = 2.
+    e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V: a residual changes its sign
+    from h = 1 on and grows from h = 2 on.
     Source: sections 4.2 and 5 of the liquid-ring paper; a discrete first-order loop.
     """
 
@@ -229,17 +229,17 @@ class _LoopGain:
     velocity_m_s: float
     """u at equal fills."""
     drag_coefficient: float
-    """k that Eq. 18 reads out of that velocity, 2p/(rho u^2) - 1."""
+    """k by Eq. 18 at that velocity, 2p/(rho u^2) - 1."""
     moment_per_transferred_mass_m: float
     """lambda at equal fills."""
     slope_m_per_s: float
-    """Vibration taken away per second of gas."""
+    """Decrease of the vibration per second of valve-open time, m/s."""
     gain_per_operation: float
-    """h: share of the residual that an operation takes away."""
+    """h: fraction of the residual that one operation removes."""
 
 
 def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
-    """Linearise the loop about level chambers; None when the gas does not drive a flow there."""
+    """Linearise the loop about equal fills; None when the gas drives no flow there."""
     x, pressure = scene.disc.initial_fill, scene.gas.pressure
     flow = model.flow.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
     u = float(flow.velocity)

@@ -34,7 +34,7 @@ def _show(_own: Record, evidence: Record) -> Record | None:
     for finding in measured["findings"]:
         text = finding["text"]
         for each in measured["quantities"]:
-            # Names in place of keys.
+            # Keys are shown as names.
             if "_" in each["quantity"]:
                 text = text.replace(each["quantity"], usual_name(each["quantity"]))
         sentences.append(f"{opening(text)}.".replace(" -", " \N{MINUS SIGN}"))
@@ -57,7 +57,7 @@ _NAMES: Final = {
 _SIGNS: Final = {"g*mm": "g mm", "ml/s": "ml/s", "um": "µm", "deg": "°"}
 _PARTS: Final = ("real part", "imaginary part")
 _MARGIN: Final = 0.08
-"""Room beside the outermost values, over their range."""
+"""Margin beyond the outermost values, over their range."""
 
 
 def fit_figures(comparisons: Sequence[AgainstFit]) -> list[Drawing]:

@@ -41,7 +41,7 @@ from ringbalance.verification.case import RestsOn
 _FILLS: Final = 101
 _PRESSURES: Final = 121
 _TOP_FACTOR: Final = 1.5
-"""Top of the map over the scene's gas pressure, or over the priming pressure where that is higher."""
+"""Highest pressure of the map over the higher of the scene's gas pressure and the priming pressure."""
 _ARC_STEP_RAD: Final = math.radians(3)
 _OUTLINE_DECIMALS_M: Final = 7
 _SPILLING: Final = "spilling"
@@ -171,7 +171,7 @@ def _operating_map(record: Record) -> Drawing:
                 axes.contour(fill, pressure, smooth, levels=[0.5], colors=[MUTED], linewidths=0.7)
         near = np.abs(pressure - gas)[:, None] < _WORKING_RANGE_CLEARANCE * (pressure[-1] - pressure[0])
         for index, name in enumerate(record["regimes"]):
-            # Each name at the point of its area that is farthest from the edges.
+            # Each name stands at the point of its area farthest from the edges.
             room = distance_transform_edt(np.pad((regime == index) & ~near, 1))[1:-1, 1:-1]
             row, column = np.unravel_index(np.argmax(room), room.shape)
             if room[row, column] >= _NAME_CLEARANCE_POINTS:

@@ -1,4 +1,4 @@
-"""The report of any balancer that has no pages of its own: devices drawn, findings, and the run."""
+"""Report of a balancer without its own pages: drawn devices, findings, and the run."""
 
 from __future__ import annotations
 

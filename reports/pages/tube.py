@@ -62,7 +62,7 @@ def _drag(tube: Record, point: list[tuple[float, float]], printed: float) -> Dra
     velocity, k, width = (np.asarray(tube[key]) for key in ("velocity_m_s", "k", "k_uncertainty"))
     bottom = 0.8 * min((k - width).clip(0.2 * k.min()).min(), printed)
     top = 1.3 * max((k + width).max(), printed)
-    # 1-2-5 ticks of a few decades, decades alone beyond three.
+    # Ticks at 1, 2 and 5 up to three decades, beyond that at decades alone.
     ticks = [step * 10.0**e for e in range(-3, 7) for step in ((1, 2, 5) if top < 1e3 * bottom else (1,))]
 
     def scaled(factor: float) -> Callable[[ArrayLike], ArrayLike]:
@@ -157,7 +157,7 @@ def _collect(work: Work) -> Record | None:
     states, absent = [], []
     for regime in _REGIMES:
         fills, primed = _FILL_FRACTIONS * law.max_fill_ratio, regime is Regime.REVERSE
-        # The middle of the fills at the first gas pressure with that regime.
+        # The middle one of the fills with that regime, at the first gas pressure that has it.
         for pressure in (0.0,) if primed else tuple(f * scene.gas.pressure for f in _PRESSURE_FACTORS):
             flow = law.evaluate(fill_ratio=fills, gas_pressure=pressure, primed=primed)
             rows = np.flatnonzero(flow.regime == regime)
@@ -193,7 +193,7 @@ def _record(scene: Scene, law: CalibratedLaw, fill: float, pressure: float, prim
 
 
 def _column_code(margin: float | None, width: float | None) -> str:
-    """State of a full column by its margin and half-width, Pa: none, undecided, holds or separates."""
+    """State of a full column, by its margin and half-width, Pa: none, undecided, holds or separates."""
     if margin is None:
         return "none"
     if width is not None and abs(margin) <= width:

@@ -29,7 +29,7 @@ from ringbalance.verification.navier_stokes.flow_fields import FlowField, end_fi
 from ringbalance.verification.navier_stokes.tube import End
 
 _MAX_REYNOLDS: Final = 500.0
-"""Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
+"""Re up to which a flow is drawn; beyond, the layers of laminar flow are too thin for a picture."""
 _DIGITS: Final = 4
 _STREAM_FRACTIONS: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
 _WALL_STREAM_FUNCTION: Final = 1 / 8
@@ -41,7 +41,7 @@ _WINDOWS: Final[dict[End, tuple[float, float]]] = {"entrance": (-1.5, 3.5), "exi
 _TITLE_IN: Final = 0.4
 """Height of the text above the colour bar."""
 _FRAME_IN: Final = 0.94 + _TITLE_IN
-"""Height of axis, colour bar and the text above it."""
+"""Height of axis, colour bar and the text above the bar."""
 _FIELD_WIDTH_IN: Final = 2.9
 
 
@@ -87,7 +87,7 @@ def _field(flow: FlowField, colour: FloatArray) -> Record:
 
 
 def _packed(values: npt.ArrayLike) -> str:
-    """Numbers as one line of text: nobody reads a field of a thousand nodes number by number."""
+    """Numbers as one line of text, which keeps a field of a thousand nodes short in the file."""
     return " ".join(f"{value:.{_DIGITS}g}" for value in np.asarray(values).ravel())
 
 

@@ -1,4 +1,4 @@
 """Off-screen 3-D pictures: shapes, cameras, lettering, and the process that draws them.
 
-A new picture is drawn in `draw`, from fields of `fields`, and is asked for in `process`.
+A new picture is drawn in `draw`, from fields of `fields`, and requested in `process`.
 """

@@ -1,10 +1,10 @@
-"""Draws the 3-D pictures off-screen; run in a process of its own, because a driver may take it down.
+"""Draw the 3-D pictures off-screen, in a separate process, because a driver may crash it.
 
     python -m ringbalance.reports.pictures.draw JOB.json
 
 The job names the VTU files of the fields, the disc's dimensions in metres and the folder for the PNG files.
 VTK must find VTK_DEFAULT_OPENGL_WINDOW in the environment.  Standard input is a pipe that
-stays open: when it closes, the process that wants the pictures has ended, and the drawing ends.
+stays open: when it closes, the process that waits for the pictures has ended, and the drawing ends.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _WATER: Final = ListedColormap(colormaps["Blues"](np.linspace(0.28, 1.0, 256)))
 
 @dataclass(frozen=True, kw_only=True)
 class _Theme:
-    """Colours of a picture, so that it sits on the page without a frame."""
+    """Colours of a picture, which match the page so that it needs no frame."""
 
     name: str
     colours: dict[str, str]
@@ -123,7 +123,7 @@ def main(arguments: list[str]) -> int:
     plotter: Any = pv.Plotter(
         off_screen=True, window_size=[_SCALE * side for side in PICTURE], lighting="light kit"
     )
-    # The reduction smooths already.
+    # Reducing the picture smooths it.
     plotter.render_window.SetMultiSamples(0)
     for name, paint in (("pressure", _draw_pressure), ("disc", _draw_disc)):
         liquid = _read(job["fields"][name])
@@ -138,7 +138,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _read(path: str) -> Any:
-    """Linear cells in millimetres, smaller ones for quadratic ones: VTK cuts only linear ones well."""
+    """Linear cells in millimetres, several for a quadratic one, since VTK cuts only linear cells well."""
     grid: Any = pv.read(path)
     cells = grid.cells_dict.get(pv.CellType.TRIQUADRATIC_HEXAHEDRON)
     if cells is not None:
@@ -171,7 +171,7 @@ def _polar(radius: float, angle: float, height: float) -> FloatArray:
 def _look(
     plotter: Any, bounds: tuple[float, ...], *, direction: Any, up: Any, zoom: float, lift: float
 ) -> None:
-    """Point the camera at a box; the box stands a little right, the colour bar has the left."""
+    """Point the camera at a box, a little to the right, since the colour bar is on the left."""
     middle = np.array(bounds).reshape(3, 2).mean(axis=1)
     plotter.camera_position = [tuple(middle + direction), tuple(middle), up]
     plotter.camera.view_angle = 18
@@ -249,7 +249,7 @@ def _metal(job: Record) -> list[Any]:
         _ring(hub, outer + wall, back - wall, back),
     ]
     if "chamber" in job["fields"]:
-        # A little larger than the liquid, whose sides would else lie in its own.
+        # A little larger than the liquid, whose sides would otherwise coincide with the walls.
         body = job["walls"].scale(_WALL_SCALE).clip(normal="z", origin=(0, 0, 0))
         return rings + [body.rotate_z(360.0 * index / count) for index in range(count)]
     radius = np.linspace((hub + inner) / 2, outer + wall / 2, 41)
@@ -292,7 +292,7 @@ def _add_tube(plotter: Any, disc: Record, theme: _Theme) -> list[_Label]:
 def _tube_path(*, port: float, crest: float | None, height: float, bend: float) -> FloatArray:
     """Schematic centre line from the first chamber's port over the crest to the opposite one's, mm, (n, 3).
 
-    Out of the chamber, inward to the crest's radius, along that radius half-way round, outward and in again;
+    Out of the chamber, inward to the crest's radius, half a turn along it, outward and into the other one;
     without a crest straight across.
     Args: `port`: radius of both ports. `crest`: smallest radius on the path; None: a straight tube.
     `bend`: length of each leg over which a corner is rounded.
@@ -359,7 +359,7 @@ def _save(plotter: Any, lettering: _Lettering, theme: _Theme, path: Path) -> Non
     bar.tick_params(color=theme.ink, labelcolor=theme.ink, labelsize=_FONT_PT - 2)
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
-    # Without the fourth channel a file is a tenth smaller.
+    # Without the alpha channel a file is a tenth smaller.
     Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]).save(path, optimize=True)
 
 

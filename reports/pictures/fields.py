@@ -37,15 +37,15 @@ class _ChamberField:
 
     fill_ratio: float
     surface_radius: float
-    """m."""
+    """Radius of the free surface, m."""
     mesh: Any
     """Mesh of scikit-fem, m."""
     pressure: FloatArray
-    """Pa, shape (nodes,)."""
+    """Gauge pressure, Pa, shape (nodes,)."""
     profile: tuple[FloatArray, FloatArray]
     """Radius, m, rising from the free surface to the wall, and pressure, Pa."""
     record: Record
-    """Sizes of the mesh, and how the solve ended."""
+    """Sizes of the mesh, and status of the solve."""
 
     def pressure_profile(self, *, scene: Scene) -> Record:
         """Pressure from the free surface to the wall, and the profile that Eq. 12 implies, SI.

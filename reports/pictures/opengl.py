@@ -1,8 +1,8 @@
 """Probe whether this machine can draw off-screen, before VTK is imported.
 
-Without an OpenGL library VTK ends in a segmentation fault, so the question is put with ctypes alone and in
-a process of its own: whatever a broken driver does there, the caller gets a sentence.  Only the standard
-library is imported here, and the file runs by its path as well as a module.
+Without an OpenGL library VTK ends in a segmentation fault, so the probe uses ctypes alone in a separate
+process: even if a driver crashes there, the caller gets a sentence.  This file imports only the standard
+library, and runs by its path as well as as a module.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _entry_point(egl: ctypes.CDLL, name: str) -> ctypes._FuncPointer:
 
 
 def probe(*, egl: str, osmesa: str) -> OpenGL:
-    """Try EGL, then OSMesa, in this very process; a broken driver may end it.
+    """Try EGL, then OSMesa, in this process, which a broken driver may end.
 
     Args: `egl`: file name of the EGL library. `osmesa`: file name of the OSMesa library.
     """

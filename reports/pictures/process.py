@@ -1,4 +1,4 @@
-"""The 3-D pictures, drawn in a process of their own, so that a report survives a driver that crashes."""
+"""The 3-D pictures, drawn in a separate process, so that a crash of the driver does not end a report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LOG: Final = "drawing.txt"
 
 @dataclass(frozen=True, kw_only=True)
 class _Drawing3D:
-    """Pictures that are being drawn, or the reason why they are not."""
+    """Drawing in progress, or the reason why nothing is drawn."""
 
     process: subprocess.Popen[bytes] | None
     text: str
@@ -69,7 +69,7 @@ class _Drawing3D:
         return {"drawn": True, "text": self.text, "files": files, "shown": self.shown}
 
     def stop(self) -> None:
-        """End a drawing that nobody waits for any more."""
+        """End a drawing that is no longer needed."""
         if self.process is not None:
             # This closes the pipe and waits for the process.
             self.process.kill()
@@ -114,7 +114,7 @@ def drawing_beside(
 def _start_drawing(
     *, scene: Scene, fields: Mapping[str, Path], folder: Path, opengl: OpenGL | None = None
 ) -> _Drawing3D:
-    """Begin to draw in a process of its own, or say why nothing can be drawn.
+    """Begin to draw in a separate process, or record why nothing can be drawn.
 
     Raises: OSError: the folder cannot be written.
     """
@@ -153,7 +153,7 @@ def _start_drawing(
         process = subprocess.Popen(
             [sys.executable, "-m", "ringbalance.reports.pictures.draw", str(job)],
             env={**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": machine.window, "OMP_NUM_THREADS": "1"},
-            # Never written to: it closes when this process ends, however it ends, and then the other ends.
+            # Never written to: it closes whenever this process ends, and then the drawing process ends.
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=log,

@@ -12,8 +12,8 @@ the liquid upstream of it, of length L_up, is accelerated by the upstream chambe
     rho L_up du/dt = p_A - p_c + P_A - D_m - (alpha + k_up) rho u^2/2.
 With a_f and a_s for the two accelerations, p_m - p_c = rho L_up (a_s - a_f): the column is full exactly where
 a_f is the smaller one, so du/dt = min(a_f, a_s).  It is continuous across the change, and where it vanishes
-u is the smaller of the quasi-steady velocities, as in the flow law.  Over a primed tube p_c is the cavity's;
-an unprimed one spills with gas there, as far as the law has it carried out.
+u is the smaller of the quasi-steady velocities, as in the flow law.  In a primed tube p_c is the cavity's; in
+an unprimed one it is the gas's, and falls to the cavity's as the flow carries the gas out.
 
 The conditions are those of `reduced_model.tube.regime`, interpreted there and compiled here.
 """

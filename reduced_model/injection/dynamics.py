@@ -36,7 +36,7 @@ from ringbalance.scene.models import Scene, Tube
 
 
 class Event(StrEnum):
-    """Event that ended a flow before its time."""
+    """Event that ended a flow early."""
 
     NONE = "none"
     BLOCKED = "blocked"
@@ -201,7 +201,7 @@ class Lift:
 
     @classmethod
     def at(cls, scene: Scene, velocity: FloatArray) -> Lift:
-        """Make the tube up to the crest. Args: `velocity`: of a full tube at equal fills, m/s, by design."""
+        """Make the tube up to the crest. Args: `velocity`: of each full tube at equal fills, m/s."""
         tube = scene.tube
         crest = 0.0 if tube.hump_radius is None else tube.hump_radius
         straight = 0.0 if tube.hump_shape == "arc" else 2 * crest / (tube.port_radius + crest)

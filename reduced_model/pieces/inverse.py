@@ -110,7 +110,7 @@ def set_roots(c: Law, p: Pieces, way: int, cells: Filled, roots: Sequence[Filled
     length, row = (fourth - begin) / ROOT_CELLS, first
     cells[0], cells[1], cells[2] = 1.0 / length, ROOT_HEAD - begin / length, slowest
     for k in range(ROOT_CELLS + 1):
-        # The last edge, and what rounding brings before the first, belong to the piece beside them.
+        # The last edge, and a first edge rounded outwards, belong to the piece next to them.
         while row < last and roots[row][END] < (begin + k * length) * (1.0 - _EDGE):
             row += 1
         cells[ROOT_HEAD + k] = float(row)

@@ -25,25 +25,25 @@ Levels = Sequence[Sequence[float]] | FloatArray
 Query = list[float] | FloatArray
 
 # fmt: off
-# Of the law.
+# Indices of the law's numbers.
 LARGEST_FILL, AMBIENT, GAS_FACTOR, PORT, CREST, COLUMN, TRAPPED, VAPOUR, RELEASED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 LOWEST, HIGHEST, LEVEL_SCALE, LEAST_PRESSURE, CHAMBER_SCALE, CHAMBER_CELLS = 9, 10, 11, 12, 13, 14
-# Row of the way back; rows from a piece of the whole tube to what is beside it; where a block that builds on
-# the law has its own numbers; how a velocity carries gas.
+# Row of the way back; rows from a piece of the whole tube to its shares; first number of a block that builds
+# on the law; factor and offset of a velocity that carries gas out; number of these.
 WAY_BACK, SHARES, BLOCK, CARRY, CARRY_FROM, PLACES = 15, 16, 17, 18, 19, 20
 
-# Rows of the pieces that say where velocities are found: of the whole tube, and up to the crest.
+# Rows that locate the pieces of velocities: of the whole tube, and of the way up to the crest.
 SIPHON, THERE = 0, 1
-# In them: pressure below which a flow creeps, velocity over it there, largest eighth root of one, cells;
-# pressures at which half of the gas over the crest is carried out, none and all.
+# In such a row: pressure below which a flow creeps, velocity over pressure there, largest eighth root of a
+# pressure, cells per unit of it, their offset; pressures at which half, none and all gas is carried out.
 SLOWEST, CREEP, LAST, SCALE, CELLS, HALF, NONE, ALL = 0, 1, 2, 3, 4, 5, 6, 7
 # In a piece: its end and the polynomial; of a chamber two polynomials and the half-width of the second.
 END, C0, C1, C2, C3, C4, C5 = 0, 1, 2, 3, 4, 5, 6
 SQUARE_0, SQUARE_1, SQUARE_2, MOMENT_0, MOMENT_1, MOMENT_2, MOMENT_WIDTH = 1, 2, 3, 4, 5, 6, 7
-# Beside a piece of the whole tube: part of its pressure that is lost up to the crest, there and back.
+# Shares of a piece of the whole tube: part of the pressure lost up to the crest, there and back.
 SHARE_0, SHARE_1, SHARE_2, BACK_0, BACK_1, BACK_2 = 0, 1, 2, 3, 4, 5
 
-# Of a query, and of its answer.
+# Indices of a query: conditions, answer.
 FILL, OPPOSITE_FILL, PRESSURE, PRIMED = 0, 1, 2, 3
 VELOCITY, REGIME, STATUS, PRIMED_AFTER = 4, 5, 6, 7
 # In one direction: pressures at the tube's ends, and what lies over the crest.
@@ -51,18 +51,18 @@ UP_GAS, DOWN_GAS, UP_LEVEL, DOWN_LEVEL = 8, 9, 10, 11
 BLOWN, FALL, DRIVING, ABOVE, RESTING, CAVITY, GAS_THERE = 12, 13, 14, 15, 16, 17, 18
 # Where a velocity was looked for: square root of the pressure, piece, distance from its end.
 ROOT, ROW, TO_END, FULL_ROOT, FULL_ROW, FULL_TO_END = 19, 20, 21, 22, 23, 24
-# Of the column up to the crest: pressure that holds it; whether a column is there afterwards; part of the
-# driving pressure that a full siphon loses, and that pressure; what holds it less that.
+# Column up to the crest: pressure that holds it; true if primed or swept of gas; part of the driving pressure
+# that a full siphon loses on this way, and that loss; the holding pressure less the loss.
 HOLDS, SWEPT, PART_LOST, LOST, MARGIN = 25, 26, 27, 28, 29
-# Of the driven chamber, where these are asked for too.
+# Radius and moment of the driven chamber, if needed; size of a query.
 RADIUS, MOMENT, PLACES_OF_QUERY = 30, 31, 32
 
 BLOCKED, SIPHONING, SEPARATED, REVERSE = 0.0, 1.0, 2.0, 3.0
 OK, EXTRAPOLATED, STANDS, INVALID = 0.0, 1.0, 2.0, 4.0
 
-# Pa: of a gas, and of what drives a flow; under less a velocity loses its digits, or is zero by underflow.
+# Largest gas pressure and smallest driving pressure, Pa; under less a velocity loses digits or underflows.
 GREATEST_PRESSURE, LEAST_DRIVING = 1e12, 1e-300
-# Of a fill; parts of what a full siphon loses beyond which a tabulated share decides which velocity counts.
+# Tolerance of a fill ratio; holding pressure over loss outside which the tabulated share alone decides.
 FILL_SLACK, SURELY, PERHAPS = 1e-9, 0.997, 1.003
 # fmt: on
 

@@ -1,12 +1,11 @@
 """Pressures at the tube's ends and at its siphon crest, and the flow regime that follows from them.
 
-The one place for the conditions under which the tube is blocked, runs as a full siphon or as a separated
-column.  Everything is written for one direction of flow: upstream is the chamber that gives liquid,
-downstream the one that receives it; `TubeEnds.reversed` changes the direction.  Pressures are gauge, Pa; a
-hydrostatic pressure is that of a chamber's liquid at the outer wall, rho omega^2 (R2^2 - a^2)/2, without its
-gas.  The functions take numbers and arrays of one shape, and compiled code calls the same ones with numbers:
-there the path is the record of a plant, which has the same names, and the ends are four numbers in the order
-of `TubeEnds`.
+All conditions under which the tube is blocked, runs as a full siphon or as a separated column stand here.
+They are written for one direction of flow: upstream is the chamber that gives liquid, downstream the one that
+receives it; `TubeEnds.reversed` changes the direction.  Pressures are gauge, Pa; a hydrostatic pressure is
+that of a chamber's liquid at the outer wall, rho omega^2 (R2^2 - a^2)/2, without its gas.  The functions take
+numbers and arrays of one shape, and compiled code calls the same ones with numbers: there the path is the
+record of a plant, with equal field names, and the ends are four numbers in the order of `TubeEnds`.
 """
 
 from __future__ import annotations

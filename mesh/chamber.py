@@ -51,7 +51,7 @@ class ChamberMesh:
     cells: tuple[int, ...]
     """Cells along the radius, the angle and, in three dimensions, the axis."""
     grid: IntArray
-    """Node numbers by structured place, shape 2 cells + 1 along each axis."""
+    """Node numbers by position in the grid, shape 2 cells + 1 along each axis."""
     surface_radius: FloatArray
     """Radius of the free surface at its nodes, m, the shape of grid[0]."""
 
@@ -62,11 +62,11 @@ class ChamberMesh:
 
     @property
     def places(self) -> FloatArray:
-        """Places of the nodes, m, shape (dimension, nodes)."""
+        """Coordinates of the nodes, m, shape (dimension, nodes)."""
         return np.asarray(self.length_scale * self.mesh.doflocs)
 
     def quality(self) -> tuple[float, float]:
-        """Smallest scaled Jacobian and largest aspect over the nodes of all cells.
+        """Smallest scaled Jacobian and largest aspect ratio over the nodes of all cells.
 
         det(J) / prod_b |J_b| with J_b = dx/dX_b: 1 is square, 0 or less is folded; max_b |J_b| / min_b |J_b|.
         Source: the scaled Jacobian of the Verdict library (Knupp et al., SAND2007-1751), at all nodes of a
@@ -131,7 +131,7 @@ def chamber_mesh(
 
 @lru_cache(maxsize=16)
 def _topology(cells: tuple[int, ...]) -> tuple[Any, tuple[IntArray, ...], IntArray]:
-    """A mesh of unit cells with named boundaries, the grid place of each of its nodes, and their numbers."""
+    """Mesh of unit cells with named boundaries, grid position of each node, and node numbers on the grid."""
     first, second = (MeshQuad1, MeshQuad2) if len(cells) == 2 else (MeshHex1, MeshHex2)
     order = list(_ORDER[len(cells)])
     flat = first.init_tensor(*(np.arange(cells[axis] + 1.0) for axis in order))

@@ -41,16 +41,17 @@ _FIRST_NODES: Final = 9
 _EMPTY: Final = 1 - 4 * float(np.finfo(np.float64).eps)
 """Share of the outermost L that counts as empty: the square of a root falls short of it by rounding."""
 _SLIVER: Final = 1e-3
-"""Share of the volume: a free surface nearer to empty or full is that of this fill."""
+"""Fraction of the volume: nearer to empty or full, the free surface is that at this fraction."""
 _SLIVER_FACTOR: Final = 100.0
-"""Factor on the tolerance of values there: chords of an arc cost most where nothing asks."""
+"""Factor on the tolerance within that fraction: chords of an arc cost most there, and no result needs
+them."""
 _HALVINGS: Final = 16
-"""Rounds of halving: where the area jumps or has a kink, at a step in the walls, to 2e-6 of the range."""
+"""Rounds of halving: a jump or kink of the area, at a step in the walls, is located to 2e-6 of the range."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChamberTable:
-    """One chamber; a concentric surface of radius a has L = a^2."""
+    """Table of one chamber over L = a^2, a the radius of a concentric surface."""
 
     geometry: ChamberGeometry
     nodes: FloatArray
@@ -77,7 +78,7 @@ class ChamberTable:
         return float(self.columns[0, 0])
 
     def at(self, levels: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Columns and their derivatives by L, each of shape (4, ...); held beyond the ends."""
+        """Columns and their derivatives by L, each of shape (4, ...); constant beyond the ends."""
         level = np.asarray(levels, dtype=np.float64)
         held = np.clip(level, self.nodes[0], self.nodes[-1])
         values, slopes = self._pieces(held), self._slopes(held)
@@ -96,9 +97,9 @@ class ChamberTable:
         return np.asarray(self.at(np.asarray(radius, dtype=np.float64) ** 2)[0][column])
 
     def surface(self, radius: npt.ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The free surface of a radius a: its area over a, m, and the means of x and y on it, m.
+        """Area over a, m, and means of x and y, m, of the free surface of radius a.
 
-        An empty or a full chamber has none; there, and next to it, that of a nearby fill counts.
+        An empty or a full chamber has none; there and nearby, the surface of a nearby fill counts.
         """
         _, slopes = self.at(np.clip(np.asarray(radius, dtype=np.float64) ** 2, *self._ends))
         area, moment_x, moment_y = slopes[:3]
@@ -106,7 +107,7 @@ class ChamberTable:
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
-        """Least and largest L for which a surface is looked at."""
+        """Least and largest L for which a surface is evaluated."""
         full, empty = self.level_of(self.volume * np.array([1 - _SLIVER, _SLIVER]))
         return float(full), float(empty)
 
@@ -132,17 +133,17 @@ class ChamberTable:
 
 _NEWTON_STEPS: Final = 60
 _SETTLED: Final = 1e-15
-"""Step over the largest level, a few times the round-off, below which it changes nothing."""
+"""Newton step over the largest level, a few times the round-off, at which the iteration ends."""
 
 
 def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:
-    """Args: `columns`: values and, behind them, slopes at the nodes."""
+    """Cubic Hermite interpolant. Args: `columns`: values at the nodes, followed by slopes."""
     return CubicHermiteSpline(nodes, *np.split(columns, 2), axis=1)
 
 
 @lru_cache(maxsize=32)
 def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
-    """Table of a chamber, made when it is first asked for; a stretched one has that of its mesh, moved."""
+    """Table of a chamber, computed on first use; that of a stretched one is transformed from its mesh's."""
     if geometry.stretch is not None:
         return _stretched(geometry, geometry.stretch)
     patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST_SIDE_RATIO)
@@ -168,7 +169,7 @@ def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
 
 
 def _bounds(level: FloatArray) -> tuple[float, float]:
-    """Least and largest r^2, at nine places along each side of a patch, which hold all nodes of the mesh.
+    """Least and largest r^2, at nine points along each side of a patch, all nodes of the mesh among them.
 
     Args: `level`: r^2 on the patches, as in `Walls`.
     """
@@ -180,8 +181,8 @@ def _bounds(level: FloatArray) -> tuple[float, float]:
 def _refined(
     nodes: FloatArray, columns: FloatArray, exact: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Nodes, columns there, and the differences found in the intervals."""
-    # Slopes count but for the wall's, which nothing asks for.
+    """Refined nodes, columns at the nodes, and differences in the intervals."""
+    # Slopes have a tolerance, except that of the wall's mean.
     size, volume = np.abs(columns).max(axis=1), columns[0, 0]
     moment, turning = size[1:3].max(), size[COLUMNS + 1 : COLUMNS + 3].max()
     values = TOLERANCE * np.array([size[0], moment, moment, size[3]])
@@ -207,7 +208,7 @@ def _refined(
 
 
 def _stretched(geometry: ChamberGeometry, stretch: Stretch) -> ChamberTable:
-    """The table of a mesh that is stretched: r' = R1' + (r - R1) s, angles times k, heights times m.
+    """Table of a stretched mesh: r' = R1' + (r - R1) s, angles times k, heights times m.
 
     The free surface at r goes to r' with k m times its area over r, which is integrated from node to node:
     dV/dL' = k m dV/dL, and the moment's with r'/r and the sine of the turned half-angle as in a sector.
@@ -245,7 +246,7 @@ def _stretched(geometry: ChamberGeometry, stretch: Stretch) -> ChamberTable:
 
 
 _VOLUME_ERROR: Final = 1e-8
-"""Error over the volume; the rest is put right to first order, but for the slopes by L."""
+"""Error of the volume, relative; the rest is corrected to first order, except in the slopes by L."""
 _TILTED_STEPS: Final = 12
 _DRY_SHARE: Final = 1e-7
 """Share of the outer wall that may look dry by rounding."""
@@ -253,7 +254,7 @@ _DRY_SHARE: Final = 1e-7
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _TiltedLiquid:
-    """At each fill and each angle of gravity, shape (n, turn)."""
+    """Integrals at each fill and each angle of gravity, shape (n, turn)."""
 
     wall_square: FloatArray
     """Mean over the outer wall of |r + g/omega^2|^2 - b^2 where it is wet, m^2."""
@@ -263,7 +264,7 @@ class _TiltedLiquid:
     moment: FloatArray
     """First moment along x, m^4."""
     centroid: FloatArray
-    """dU/dV', mean of x over the surface, each part by how much of the liquid enters there, m."""
+    """dU/dV', mean of x over the surface, weighted by the liquid that enters at each point, m."""
     closed: BoolArray
     """True where the whole outer wall is wet; if it is partly dry without gravity as well, where the liquid
     at its deepest is deeper than G."""
@@ -275,7 +276,8 @@ def tilted_liquid(
 ) -> _TiltedLiquid:
     """Integrals over the liquid of given fill ratios, above zero.
 
-    Args: `length`: G, m. `turn`: angles of gravity, equally spaced from along x; one on a vertical shaft.
+    Args: `length`: G, m. `turn`: number of angles of gravity, equally spaced from the x axis; one on a
+        vertical shaft.
     """
     fill = np.array(fills)
     if vertical or length == 0:

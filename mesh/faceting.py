@@ -1,10 +1,10 @@
-"""Error of drawing curved walls by facets, as far as the mesh alone shows it.
+"""Error of facets in place of curved walls, estimated from the mesh alone.
 
-Where two facets meet at a small angle delta, the wall is taken for a smooth one through their nodes.  An arc
-of angle delta over a facet of width h then stands off by h delta/12 on average where the facet is flat, and
-by h delta/60 where it is quadratic and delta is what is left of the bend.
+Where two facets meet at a small angle delta, the wall counts as a smooth one through their nodes. An arc of
+angle delta over a facet of width h then deviates from it by h delta/12 on average where the facet is flat,
+and by h delta/60 where it is quadratic and delta is the remaining bend.
 
-The outer wall, besides: the axis about which it is round, and parts that face inward.
+Checks of the outer wall: the axis about which it is round, and parts that face inward.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of,
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 SMOOTH: Final = np.pi / 6
-"""Angle between two facets above which their edge is taken for one of the chamber."""
+"""Angle between two facets above which their edge counts as an edge of the chamber."""
 COARSE: Final = np.radians(65)
-"""Angle of that kind in a mesh without any curved edge, which may draw a round pillar as a hexagon."""
+"""Angle in place of `SMOOTH` in a mesh without curved edges, where a hexagon may be a round pillar."""
 SAFETY: Final = 1.5
 """Factor on the estimate: an arc drawn by few facets has one edge less than facets."""
 _FLAT: Final = 1 / 12
 _QUADRATIC: Final = 1 / 60
 _STRAIGHT: Final = 1e-6
-"""Distance of a middle node from the middle of its edge, over the edge."""
+"""Distance of a middle node from the middle of its edge, over the edge, up to which the edge is straight."""
 _MIDDLES: Final = {3: ((0.5, 0), (1, 0.5), (0, 0.5)), 4: ((0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5))}
 """Middles of the edges, (u, v), by number of corners."""
 _ROUND: Final = 1e-4
@@ -43,12 +43,12 @@ _INWARD: Final = -0.05
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Faceting:
-    """Volumes that the drawing may miss along each smooth edge, all counted as of one sign."""
+    """Volume errors by facets along each smooth edge, all taken with one sign."""
 
     radius: FloatArray
     """Radius of the edge, m."""
     volume: FloatArray
-    """m^3."""
+    """Volume error, m^3."""
     x: FloatArray
     """x of the edge, m."""
     wall: float
@@ -75,7 +75,7 @@ class _DrawingError:
 
 @lru_cache(maxsize=8)
 def faceting(geometry: ChamberGeometry) -> _Faceting:
-    """Estimate for the walls of a mesh."""
+    """Estimate the volume errors by the facets of a mesh's walls."""
     facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
     patches, outer = wall_patches(geometry)
     # Each edge of two facets: its place among the edges of both, facet by facet, and its ends.
@@ -89,7 +89,7 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     normals = _normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
-    # Share of h delta by which a wall stands off a facet; quadratic ones of straight edges are flat.
+    # Deviation of a wall from a facet over h delta; quadratic facets of straight edges are flat.
     shares = np.full(len(facets), _FLAT)
     if facets.shape[1] > corners:
         at = geometry.points[facets[:, : 2 * corners]]
@@ -127,8 +127,8 @@ def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray
 def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _DrawingError:
     """Expanded uncertainties by facets in place of curved walls, and by the table between its nodes.
 
-    At a fixed fill ratio the surface moves by what the whole chamber and by what the wet walls hold more;
-    each edge counts with the sign that does most, to first order.
+    At a fixed fill ratio the surface moves by the volume errors of the whole chamber and of the wet walls;
+    each edge counts with the sign of the largest effect, to first order.
     """
     table, walls, x = chamber_table(geometry), faceting(geometry), fill_ratio[:, None]
     level = table.level_of(fill_ratio * table.volume)
@@ -152,12 +152,12 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _Draw
 
 
 def axis_beside_shaft(geometry: ChamberGeometry) -> FloatArray | None:
-    """Place of the axis about which the outer wall is round, m, shape (2,), where that is not the shaft.
+    """Axis (x, y) about which the outer wall is round, m, shape (2,), where that is not the shaft.
 
-    Walls that turn about (c_x, c_y) have x^2 + y^2 = 2 c_x x + 2 c_y y + k_0 + k_1 z + k_2 z^2: cylinders and
-    cones of any draft.
+    Walls of revolution about (c_x, c_y) have x^2 + y^2 = 2 c_x x + 2 c_y y + k_0 + k_1 z + k_2 z^2: cylinders
+    and cones of any draft.
     Returns: c, by least squares over the wall's nodes; None for a wall that is round about the shaft, or not
-        round, or about an axis that it leaves on one side of the shaft, such as that of a bore.
+        round, or round about an axis without enclosing the shaft, such as a bore.
     """
     points = geometry.points[np.unique(geometry.boundaries[OUTER_WALL])]
     square = points[:, 0] ** 2 + points[:, 1] ** 2
@@ -174,7 +174,7 @@ def axis_beside_shaft(geometry: ChamberGeometry) -> FloatArray | None:
 
 
 def _fitted(terms: FloatArray, square: FloatArray) -> tuple[FloatArray, float]:
-    """Coefficients, and the largest departure over the mean."""
+    """Least-squares coefficients, and the largest residual over the mean of `square`."""
     coefficients = np.linalg.lstsq(terms, square, rcond=None)[0]
     departure = float(np.abs(terms @ coefficients - square).max() / square.mean())
     return np.asarray(coefficients, dtype=np.float64), departure

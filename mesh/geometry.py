@@ -1,4 +1,4 @@
-"""The chamber's shape, by closed forms or, where a mesh file gives it, by integrals over its walls.
+"""Shape of a chamber, by closed forms or, where a mesh file gives it, by integrals over its walls.
 
 A chamber is the set R1 <= r <= R2, |phi| <= alpha(r) with alpha(r) = theta/2 - asin(t/r): a plate takes a
 strip of thickness t, with faces parallel to the bounding radii.  Of an imported one the cross-section is the
@@ -19,7 +19,7 @@ from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
 
 _LAST_STEP: Final = 1e-9
-"""Last step of the square of the surface's radius, relative to that of the outer wall."""
+"""Newton step of the squared surface radius at which the iteration ends, over R2^2."""
 
 
 def imported_table(disc: Disc) -> ChamberTable | None:
@@ -68,7 +68,7 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
         return np.asarray(table.at_radius(surface_radius, 1) / disc.axial_width)
     a, outer, t = np.asarray(surface_radius, dtype=np.float64), disc.outer_radius, disc.plate_thickness
     inner_face, outer_face = np.sqrt(a**2 - t**2), np.sqrt(outer**2 - t**2)
-    # Differences of powers by their factors, or a film of a micrometre would cancel.
+    # Differences of powers as products, because they would cancel in a film of a micrometre.
     squares = (outer - a) * (outer + a)
     cubes = squares * (inner_face**2 + inner_face * outer_face + outer_face**2) / (inner_face + outer_face)
     half = disc.central_angle / 2
@@ -76,7 +76,7 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
 
 
 def moment_across(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
-    """First moment along y, as `liquid_first_moment` along x: zero unless an imported chamber is asymmetric.
+    """First moment along y, m^3: zero unless an imported chamber is asymmetric.
 
     It turns the moment of every chamber by the same angle, atan(moment_across/liquid_first_moment).
     """
@@ -105,9 +105,9 @@ def wall_square(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
 
 
 def head_square(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
-    """R2^2 - a^2, m^2: times rho omega^2/2 the pressure of the liquid at the radius R2, whatever the walls.
+    """R2^2 - a^2, m^2: times rho omega^2/2 the pressure of the liquid at R2, for walls of any shape.
 
-    Of an imported chamber R2 is the radius of its outermost place.
+    Of an imported chamber R2 is the radius of its outermost point.
     """
     a = np.asarray(surface_radius, dtype=np.float64)
     return np.maximum((disc.outer_radius - a) * (disc.outer_radius + a), 0.0)
@@ -143,7 +143,7 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
 
     full = within(most)[0]
     target = x * (full - within(least)[0])
-    # Newton's steps square the error, so the last of this size leaves rounding alone.
+    # Newton's method squares the error, so a step of this size leaves only rounding.
     squared, enough = most - x * (most - least), _LAST_STEP * most
     for _ in range(60):
         area, alpha = within(squared)

@@ -54,7 +54,7 @@ def _outward(places: FloatArray) -> FloatArray:
 
 
 def liquid_body(body: Tetrahedra, radius: float) -> Tetrahedra:
-    """The part of a chamber outside a concentric surface, which is its new boundary `free_surface`.
+    """Cut a chamber along a concentric surface: the part outside, with the new boundary `free_surface`.
 
     Args: `radius`: a, m.
     Raises: ValueError: the surface leaves no liquid, or does not meet the body at all.
@@ -87,7 +87,7 @@ def _tangents(body: Tetrahedra) -> FloatArray:
 
 
 def _move(radius: float, places: FloatArray, tangents: FloatArray) -> FloatArray:
-    """Step direction walls to the surface; zero where none leads there."""
+    """Step along the walls to the surface, m; zero where no direction along them leads there."""
     direction = np.einsum("nij,nj->ni", tangents, _outward(places))
     square = np.einsum("ni,ni->n", direction, direction)
     full = np.einsum("ni,ni->n", _outward(places), _outward(places))
@@ -97,7 +97,7 @@ def _move(radius: float, places: FloatArray, tangents: FloatArray) -> FloatArray
 
 
 def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
-    """Corners near the surface moved onto it; which nodes are on it now."""
+    """Body with the corners near the surface moved onto it, and a mask of the nodes on it."""
     tangents, room = _tangents(body), np.full(len(body.nodes), np.inf)
     ends = body.nodes[body.cells[:, EDGES]]
     lengths = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
@@ -114,7 +114,7 @@ def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
     for _ in range(10):
         step = np.where(taken[:, None], shift, 0.0)
         nodes, middle = body.nodes + step, body.cells[:, 4:].ravel()
-        # Each mid-node by the mean of the moves at its edge's ends.
+        # Each mid-node moves by the mean of its edge's ends.
         nodes[middle] = body.nodes[middle] + step[body.cells[:, EDGES]].mean(axis=2).reshape(-1, 3)
         result = replace(body, nodes=nodes)
         folded = _folded(body, result)
@@ -126,7 +126,7 @@ def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
 
 
 def _folded(body: Tetrahedra, after: Tetrahedra) -> IntArray:
-    """Cells that moves of their nodes turn inside out, or nearly so."""
+    """Cells turned inside out, or nearly so, by moves of their nodes."""
     moved = (after.nodes != body.nodes).any(axis=1)
     near = np.flatnonzero(moved[body.cells].any(axis=1))
     was, least = (_jacobians(replace(b, cells=b.cells[near])).min(axis=1) for b in (body, after))
@@ -218,7 +218,7 @@ _EDGE_NUMBER: Final = {frozenset((int(a), int(b))): k for k, (a, b) in enumerate
 
 
 def _divided(body: Tetrahedra, radius: float, value: FloatArray) -> Tetrahedra:
-    """Parts of the cells outside the surface as one body, with mid-nodes by the map of their cells."""
+    """Body of the parts of cells outside the surface, with mid-nodes by the map of their cells."""
     cuts = _cuts(body, radius, value)
     signs = np.sign(value)[body.cells[:, :4]].astype(np.int64)
     # Corners 0 to 3 of a cell, then the new nodes on its edges 0 to 5 as 4 to 9.

@@ -62,7 +62,7 @@ def shapes(barycentric: FloatArray) -> FloatArray:
 
 
 def slopes(barycentric: FloatArray) -> FloatArray:
-    """Derivatives of the shape functions by coordinates from the second on, (points, functions, dimension).
+    """Derivatives of the shape functions by all coordinates but the first, (points, functions, dimension).
 
     Args: `barycentric`: shape (points, dimension + 1).
     """
@@ -78,7 +78,8 @@ def slopes(barycentric: FloatArray) -> FloatArray:
 def derivatives(places: FloatArray, barycentric: FloatArray) -> FloatArray:
     """dx/dX of cells or of facets at points, shape (n, points, 3, dimension).
 
-    Args: `places`: of their nodes, shape (n, functions, 3). `barycentric`: shape (points, dimension + 1).
+    Args: `places`: coordinates of their nodes, shape (n, functions, 3). `barycentric`: shape (points,
+        dimension + 1).
     """
     local = places - places[:, :1]
     return np.asarray(np.einsum("enx,pna->epxa", local, slopes(barycentric), optimize=True))
@@ -143,7 +144,7 @@ def lonely(cells: IntArray, size: int) -> BoolArray:
 
 
 def with_middles(points: FloatArray, cells: IntArray, middles: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Nodes and cells with one mid-node for each edge, at the first place that is given for it."""
+    """Nodes and cells with one mid-node for each edge, at the first position given for the edge."""
     ends = np.sort(cells[:, EDGES], axis=2).astype(np.int64)
     keys = ends[..., 0] * len(points) + ends[..., 1]
     _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
@@ -186,7 +187,7 @@ def scikit_fem_mesh(body: Tetrahedra) -> Any:
         *(np.ascontiguousarray(each.T) for each in (body.nodes[corners], cells.reshape(-1, 4)))
     )
     places = MeshTet2.from_mesh(straight).doflocs
-    # Its nodes are the corners, then the edges; both number a cell's edges alike, faces the other way round.
+    # Its nodes are corners, then edges; it numbers a cell's edges as here, its faces in reverse order.
     places[:, corners.size + straight.t2e] = body.nodes[body.cells[:, 4:]].T
     named = {
         name: np.concatenate([straight.t2f[3 - k][body.faces[:, k] == number] for k in range(4)])

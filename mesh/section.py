@@ -22,8 +22,8 @@ from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of,
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 _PLANE_SHIFT: Final = 1e-4
-"""Distance of the plane from the middle, over the chamber's width.  Through nodes, as of a mesh that is
-symmetric about it, it would lose edges of the surface."""
+"""Distance of the plane from the middle, over the chamber's width. A plane through nodes, as in a symmetric
+mesh, would lose edges of the surface."""
 _EIGHT: Final = np.array(
     [
         [0, 4, 6, 7],
@@ -39,7 +39,7 @@ _EIGHT: Final = np.array(
 """Straight parts of a quadratic tetrahedron; each of its faces is divided as in `_FOUR`."""
 _FOUR: Final = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 _OUTLINE_SHIFT: Final = 1e-7
-"""Shift of an outline's plane, which then meets no node, over the chamber's size."""
+"""Shift of an outline's plane over the chamber's size, so that the plane meets no node."""
 
 
 class NoPlaneWavesError(ValueError):
@@ -48,7 +48,7 @@ class NoPlaneWavesError(ValueError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LiquidSection:
-    """The liquid's cross-section."""
+    """Cross-section of the liquid."""
 
     mesh: Any
     """`skfem.MeshTri1`, lengths over `scale`, with its boundaries by name."""
@@ -61,7 +61,7 @@ def middle_section(
 ) -> LiquidSection:
     """Section of the liquid outside a concentric surface, half-way along the shaft.
 
-    Args: `surface_radius`: a, m. `coarse`: by the corners of the cells alone, on chords twice as long.
+    Args: `surface_radius`: a, m. `coarse`: true for the cells' corners alone, with chords twice as long.
     Raises: ValueError: as `liquid_body`.
     Raises: NoPlaneWavesError: the free surface is not one chain of edges from wall to wall, or a wall is
         closed in itself: stream functions would differ from wall to wall.
@@ -92,10 +92,10 @@ def middle_section(
 
 
 def _crossings(simplices: IntArray, above: BoolArray) -> tuple[IntArray, IntArray]:
-    """Edges of tetrahedra or triangles from one side of the plane to the other, by triangle or line.
+    """Edges of tetrahedra or triangles that cross the plane, grouped into triangles or lines.
 
-    Returns: Ends of the edges at the corners of each triangle or line, shape (n, corners, 2); the simplex
-        that each of them lies in.
+    Returns: Ends of the edges at the corners of each triangle or line, shape (n, corners, 2); the number of
+        the simplex that each lies in.
     """
     # Corners above first: the lone corner is the first or the last one.
     order = np.argsort(~above[simplices], axis=1, kind="stable")
@@ -154,7 +154,7 @@ def _pieces(lines: IntArray) -> int:
 def _wall_pieces(geometry: ChamberGeometry) -> tuple[IntArray, ...]:
     """Straight-edged pieces of the facets that bound the chamber, on all of their nodes.
 
-    Returns: Nodes one after the other around each piece, pieces of as many corners together.
+    Returns: Nodes in order around each piece, one array for each number of corners.
     """
     facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
     ends, middles, centre = np.split(facets, [corners, 2 * corners], axis=1)

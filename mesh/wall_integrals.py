@@ -47,7 +47,7 @@ _SHAPES: Final[dict[int, tuple[Powers, Powers]]] = {
 
 @cache
 def _coefficients(nodes: int) -> FloatArray:
-    """From the places of a facet's nodes to c_ij, shape (9, nodes)."""
+    """Matrix from the coordinates of a facet's nodes to c_ij, shape (9, nodes)."""
     monomials, places = _SHAPES[nodes]
     xi, eta = (np.array(p) / 2 for p in zip(*places, strict=True))
     local = np.linalg.inv(np.stack([xi**i * eta**j for i, j in monomials], axis=1))
@@ -62,9 +62,9 @@ def _coefficients(nodes: int) -> FloatArray:
 
 
 def wall_patches(geometry: ChamberGeometry) -> tuple[FloatArray, BoolArray]:
-    """All walls of a chamber, X_u x X_v outward.
+    """Patches of all walls of a chamber, X_u x X_v outward.
 
-    Returns: c, m, shape (patches, 3, 3, 3) by power of u, of v, and axis; whether it is of the outer wall.
+    Returns: c, m, shape (patches, 3, 3, 3) by power of u, of v, and axis; true for patches of the outer wall.
     """
     facets = boundary_facets(geometry)
     patches = _coefficients(facets.shape[1]) @ geometry.points[facets]
@@ -75,14 +75,14 @@ def wall_patches(geometry: ChamberGeometry) -> tuple[FloatArray, BoolArray]:
 
 @cache
 def _to_bernstein(degree: int) -> FloatArray:
-    """From powers to Bernstein coefficients, by which a polynomial is bounded on [0, 1]."""
+    """Matrix from powers to Bernstein coefficients, which bound a polynomial on [0, 1]."""
     size = degree + 1
     return np.array([[comb(j, i) / comb(degree, i) for i in range(size)] for j in range(size)])
 
 
 @cache
 def _half_maps(degree: int) -> tuple[FloatArray, ...]:
-    """On powers: of the two halves of [0, 1]."""
+    """Matrices from powers on [0, 1] to powers on either half, scaled to [0, 1]."""
     to = _to_bernstein(degree)
     low = np.array([[comb(j, i) / 2**j for i in range(degree + 1)] for j in range(degree + 1)])
     return tuple(np.asarray(np.linalg.solve(to, half @ to)) for half in (low, low[::-1, ::-1]))
@@ -90,15 +90,15 @@ def _half_maps(degree: int) -> tuple[FloatArray, ...]:
 
 @cache
 def _mirror(degree: int) -> FloatArray:
-    """On powers: from u to 1 - u."""
+    """Matrix from powers of u to powers of 1 - u."""
     to = _to_bernstein(degree)
     return np.asarray(np.linalg.solve(to, to[::-1]))
 
 
 def _halved(values: FloatArray, *, across: BoolArray) -> FloatArray:
-    """The polynomials sum c_ij u^i v^j on both halves of the unit square, shape (2 n, ...).
+    """Polynomials sum c_ij u^i v^j on both halves of the unit square, shape (2 n, ...).
 
-    Args: `across`: whether it is cut at v = 1/2 and not at u = 1/2, shape (n,).
+    Args: `across`: true for a cut at v = 1/2, false at u = 1/2, shape (n,).
     """
     turned = np.where(across.reshape(-1, *[1] * (values.ndim - 1)), values.swapaxes(1, 2), values)
     parts = [np.einsum("ai,ni...->na...", half, turned) for half in _half_maps(values.shape[1] - 1)]
@@ -108,7 +108,7 @@ def _halved(values: FloatArray, *, across: BoolArray) -> FloatArray:
 
 
 def split_patches(patches: FloatArray, flags: BoolArray, *, longest: float) -> tuple[FloatArray, BoolArray]:
-    """Patches halved until none is longer across the shaft than a share of its distance from it."""
+    """Patches halved until none is longer across the shaft than `longest` times its distance from it."""
     done: list[tuple[FloatArray, BoolArray]] = []
     for _ in range(_SPLITS):
         control = np.einsum("ai,bj,nijx->nabx", _to_bernstein(2), _to_bernstein(2), patches)[..., :2]
@@ -131,32 +131,32 @@ PLAIN_POINTS: Final = 6
 """Gauss points along each side of a patch that no surface crosses."""
 CUT_POINTS: Final = 6
 LONGEST_SIDE_RATIO: Final = 1 / 3
-"""Longest side of a patch over its distance from the shaft: 1/|r|^2 then costs 1e-10 with six points."""
+"""Longest side of a patch over its distance from the shaft: 1/|r|^2 then errs by 1e-10 with six points."""
 _STEEP: Final = 0.05
-"""Least over largest slope of h along the lines on which the surface is looked for."""
+"""Least over largest slope of h along the lines on which the surface is located."""
 _HALVINGS: Final = 30
 _NEGLIGIBLE: Final = 1e-12
-"""Largest share of the volume in a piece of wall whose crossing is not looked for."""
+"""Largest fraction of the volume in a piece of wall whose crossing is not located."""
 COLUMNS: Final = 4
 """Volume, moment along x and along y, and int h dA over the outer wall; then their derivatives by L."""
 
 
 @cache
 def gauss(points: int) -> tuple[FloatArray, FloatArray]:
-    """Places and weights on [0, 1]."""
+    """Gauss points and weights on [0, 1]."""
     places, weights = np.polynomial.legendre.leggauss(points)
     return np.asarray((1 + places) / 2), np.asarray(weights / 2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Walls:
-    """Patches about one centre, those that count, each with what its Gauss points hold."""
+    """Patches of the walls that contribute, about one centre, with their integrands at Gauss points."""
 
     patches: FloatArray
-    """Relative to the centre, m, shape (n, 3, 3, 3)."""
+    """Coefficients c relative to the centre, m, shape (n, 3, 3, 3)."""
     outer: BoolArray
     level: FloatArray
-    """q, powers, shape (n, 5, 5)."""
+    """Coefficients of q by powers of u and v, m^2, shape (n, 5, 5)."""
     lowest: FloatArray
     highest: FloatArray
     """Bounds of q on each patch, m^2."""
@@ -170,7 +170,7 @@ class Walls:
 def walls_about(
     patches: FloatArray, outer: BoolArray, *, centre: FloatArray | None = None, slope: float = 0.0
 ) -> Walls:
-    """Walls for surfaces |r - c|^2 - s z = L about a centre, m; patches without any share are left out."""
+    """Walls for surfaces |r - c|^2 - s z = L about a centre, m, without patches that contribute nothing."""
     origin = np.zeros(2) if centre is None else centre
     moved = patches.copy()
     moved[:, 0, 0, :2] -= origin
@@ -282,7 +282,7 @@ def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray
     excess = walls.level[patch]
     excess[:, 0, 0] -= levels[number]
     share = np.abs(walls.samples[4]).sum(axis=1)[patch]
-    # Over the approximate size of the chamber's volume.
+    # Relative to the approximate volume of the chamber.
     negligible = _NEGLIGIBLE * float((np.abs(walls.samples[4]).sum(axis=1) * walls.highest).sum())
     for step in range(_HALVINGS + 1):
         if number.size == 0:
@@ -304,7 +304,7 @@ def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray
         for column, value in zip(total, values, strict=True):
             column += np.bincount(number, value, levels.size)
         left = ~(graph | inside | dry)
-        # Along the curve that a surface leaves on a wall nothing is gained by halving.
+        # Halving along the curve where a surface meets a wall gains nothing.
         flat = np.abs(np.diff(bounds[left], axis=1)).max(axis=(1, 2)) < np.abs(
             np.diff(bounds[left], axis=2)
         ).max(axis=(1, 2))
@@ -321,7 +321,7 @@ def _turned(values: FloatArray) -> FloatArray:
 
 
 def _steepness(bounds: FloatArray) -> FloatArray:
-    """Least over largest slope slopes u; zero where the crossing is no graph over v or has unclear ends."""
+    """Least over largest slope along u; zero where the crossing is no graph over v or has unclear ends."""
     rise = np.diff(bounds, axis=1).reshape(len(bounds), -1)
     size = np.abs(rise)
     steep = size.min(axis=1) / np.maximum(size.max(axis=1), 1e-300)
@@ -377,6 +377,6 @@ def _root(powers: FloatArray) -> FloatArray:
 
 
 _ROOT_ERROR: Final = 1e-12
-"""Error of a root, over the side of a patch; h vanishes there, so that volumes miss its square."""
+"""Error of a root, over the side of a patch; h vanishes there, so the error of a volume is its square."""
 _NEWTON_STEPS: Final = 60
-"""Halvings at worst."""
+"""Newton steps, or halvings at worst."""

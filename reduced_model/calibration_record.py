@@ -131,8 +131,7 @@ class _ErrorEffects:
     alone: FloatArray
     """Changes at the 2.5 and 97.5 % quantiles of each error alone, shape (m, 2, quantities)."""
     linear: FloatArray
-    """Half-widths (95 %) by errors that change no number of the scene; linear in the error, (m,
-    quantities)."""
+    """Half-widths (95 %) by errors that change no number of the scene, linear in them, (m, quantities)."""
     waves: Waves
 
     @classmethod

@@ -57,8 +57,7 @@ def calibration_rows(calibration: Calibration) -> Rows:
 
 
 def _printable_uncertainty(calibration: Calibration, value: float, total: float | None) -> float | None:
-    """Uncertainty to print: None below rounding, that of the inputs included if the scene states no
-    uncertainty."""
+    """Uncertainty to print; None below rounding, that of inputs if the scene states no uncertainty."""
     return believed(value, total, stated=bool(calibration.scene.uncertainty))
 
 

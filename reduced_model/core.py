@@ -59,8 +59,7 @@ class Answers:
     crest_pressure: FloatArray
     """Gauge pressure at the end of the crest's arc at equal fills, Pa; NaN where the tube is blocked."""
     cavitation_margin: FloatArray
-    """Lowest pressure in a full siphon (if blocked, in a primed tube at rest) less the cavity pressure,
-    Pa."""
+    """Lowest pressure in a full siphon (at rest, if blocked) less the cavity pressure, Pa."""
     stall_pressure: FloatArray
     """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
     priming_pressure_vented: FloatArray
@@ -176,8 +175,7 @@ class Answers:
 
 
 def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tuple[FloatArray, FloatArray]:
-    """Gauge pressure at the end of the crest's arc (NaN if blocked), and cavitation margin of a full siphon,
-    Pa."""
+    """Gauge pressure at the end of the crest's arc, NaN if blocked, and margin of a full siphon, Pa."""
     path, rows = tube.path, np.arange(tube.designs.size)
     flows, driving = flow.velocity > 0, driving_pressure(path, ends)
     siphon = flow.siphon_velocity

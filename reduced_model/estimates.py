@@ -33,15 +33,13 @@ _LOSS_PARTS: Final = ("whole", "roughness", "rotation", "bends", "ends")
 
 
 def deciding_gas_time(scene: Scene, *, rate: float) -> float:
-    """Valve-open time of the shortest injection that matters, s: the one commanded for a vibration at its
-    limit.
+    """Valve-open time of the shortest injection that matters, s: that for a vibration at its limit.
 
     Target vector: Kc times the limit; trial: the short step, where the limit lies below `fine_below`;
     law-based: the limit over the rate.  Every time scale is compared with this one, because the last
     injections decide whether a run settles.
     The result lies within the controller's limits of the valve-open time. `rate` is the change of the
-    vibration per second of gas, m/s; zero where
-    nothing flows.
+    vibration per second of gas, m/s; zero where nothing flows.
     Source: section 4 of the liquid-ring paper.
     """
     control = scene.controller
@@ -119,7 +117,7 @@ def range_flow(scene: Scene) -> RangeFlow:
 
 
 def range_velocities(flow: RangeFlow) -> FloatArray:
-    """Velocities from a quarter of the slowest (full or separated) to twice the fastest, m/s; empty without
+    """Velocities from 1/4 of the slowest (full or separated) to twice the fastest, m/s; empty without
     flow."""
     velocities = np.concatenate([flow.siphon, flow.separated])
     ends = np.log(velocities[(velocities > 0) & np.isfinite(velocities)])
@@ -129,8 +127,7 @@ def range_velocities(flow: RangeFlow) -> FloatArray:
 
 
 def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
-    """Largest relative change by neglecting a part of the tube's loss, or by a constant in place of the
-    whole.
+    """Largest relative change by neglecting a part of the tube's loss, or by a constant instead.
 
     Returns: The larger change of k under the same pressure and of the head up to the siphon crest, by part of
         the loss.

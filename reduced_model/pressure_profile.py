@@ -52,8 +52,7 @@ class HumpProfile:
     radius: FloatArray
     """Radius r of the path, m."""
     pressure: FloatArray
-    """Gauge pressure, Pa: of the gas or the cavity where the tube is not full; first and last in the
-    chambers."""
+    """Gauge pressure, Pa; of gas or cavity where the tube is not full; first and last in the chambers."""
     full: BoolArray
     """True where liquid fills the bore."""
     regime: Regime
@@ -61,8 +60,7 @@ class HumpProfile:
     velocity: float
     """Velocity u, m/s; negative in reverse, zero when blocked."""
     hump_path: float | None
-    """Path coordinate of the lowest crest pressure, at the end of the crest's arc, m; None without a
-    crest."""
+    """Path coordinate of the lowest crest pressure, the end of its arc, m; None without a crest."""
     hump_pressure: float | None
     """Gauge pressure over the crest, Pa; None without a crest."""
     cavity_pressure: float | None
@@ -159,7 +157,7 @@ class _Line:
 
 
 def _pressure_over_crest(law: CalibratedLaw, ends: TubeEnds, reverse: bool, velocity: float) -> float | None:
-    """Gauge pressure of the cavity or gas that a flowing column spills into, Pa; None for a full tube or at
+    """Gauge pressure of the cavity or gas that flowing liquid spills into, Pa; None: full tube, or at
     rest."""
     way = law.heads.to_crest(reverse=reverse)
     if way is None or velocity == 0:
@@ -204,8 +202,7 @@ def _separated(
     head: float,
     points: int,
 ) -> _Line:
-    """Pressure along a separated column: full up to the crest, a cavity, the column held by the downstream
-    chamber."""
+    """Pressure along a separated column: full up to the crest, a cavity, the downstream chamber's column."""
     top = ends.downstream_gas + back_pressure(path, ends)
 
     def behind(at: Places) -> FloatArray:
@@ -272,8 +269,7 @@ def _blocked(scene: Scene, law: CalibratedLaw, ends: TubeEnds, primed: bool, poi
 
 
 def _rest(scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None) -> tuple[float, float, float]:
-    """Path fractions s/L at which the two columns of a tube at rest end, and the gauge pressure between them,
-    Pa.
+    """Path fractions s/L at which the columns of a tube at rest end, and the gauge pressure between, Pa.
 
     A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
     opposite chamber's pressure; trapped, it is compressed isothermally from the hydrostatic pressures alone

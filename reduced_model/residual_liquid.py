@@ -1,5 +1,4 @@
-"""Limits of emptying a chamber (gas enters its port, or the flow stalls) and of holding a full one, gas
-off."""
+"""Limits of emptying a chamber (gas in its port, or stalling) and of holding a full one with the gas off."""
 
 from __future__ import annotations
 
@@ -63,19 +62,17 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs:
 
 @dataclass(frozen=True, kw_only=True)
 class Holding:
-    """Stability of the fullest chamber's liquid with the gas off: it stays if the column over the crest
-    parts.
+    """Stability of the fullest chamber's liquid, gas off: it stays if the column over the crest parts.
 
     Only at the vapour pressure does a column certainly part; runs with nominal parts assume the cavity
     pressure by `TubePath.released`.
     """
 
     sure_speed: float | None
-    """Lowest speed at which the liquid stays at any cavity pressure, rad/s; None: not at the scene's
-    speed."""
+    """Lowest speed at which the liquid stays at any cavity pressure, rad/s; None: not even at the scene's."""
     likely_speed: float | None
-    """Lowest speed at which the liquid stays at the cavity pressure of runs, rad/s; None: not at the scene's
-    speed."""
+    """Lowest speed at which the liquid stays at the cavity pressure of runs, rad/s; None: not even at the
+    scene's."""
     hump_radius: float | None
     """Radius of the scene's crest, m; None without one."""
     largest_hump_radius: float | None

@@ -240,8 +240,7 @@ class ModelUsed:
     why: str
     """Formula of the estimate, its value, and further reasons."""
     estimated_contribution: float | None
-    """Relative contribution, estimated before solving; None where the scene gives no basis for an
-    estimate."""
+    """Relative contribution, estimated before solving; None without a basis for an estimate."""
 
     @property
     def modelled(self) -> bool:

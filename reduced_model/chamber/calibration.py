@@ -28,7 +28,7 @@ from ringbalance.scene.models import Disc, Scene
 FILL_STEP: Final = 0.05
 """Step of the fill ratios that a calibration reports."""
 ROUND_OFF: Final = 16 * float(np.finfo(np.float64).eps)
-"""Relative floor of a numerical half-width."""
+"""Lower bound of a numerical half-width, relative."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,28 +39,27 @@ class FillCurve:
     """
 
     value: FloatArray
-    """By closed forms, or by quadrature where gravity is modelled."""
+    """Values by closed forms, or by quadrature where gravity is modelled."""
     numerical: FloatArray
     """Expanded uncertainty (95 %) by rounding, quadrature, and contradictions of finite elements."""
     unmodelled: FloatArray
-    """95 % uncertainty for what no model holds: surface tension, friction at walls, high waves."""
+    """Expanded uncertainty (95 %) by unmodelled effects: surface tension, friction at walls, high waves."""
     inputs: FloatArray
     """Expanded uncertainty (95 %) by the scene's uncertain inputs."""
     table: Table
-    """Interpolates the values, with slopes and curvatures."""
+    """Interpolant of the values, with slopes and curvatures."""
     interpolation: FloatArray
-    """Expanded uncertainty (95 %) of the table about each of the fills that are nodes, between which a table
-    may have more knots."""
+    """Expanded uncertainty (95 %) of the table near each node; a table may have more knots than nodes."""
     status: Status
     """Status over the whole range of fills."""
 
     @property
     def uncertainty(self) -> FloatArray:
-        """Half-width of the value for the scene's inputs as they stand: numerical and unmodelled terms."""
+        """Half-width of the value at the scene's nominal inputs: numerical and unmodelled terms."""
         return np.hypot(self.numerical, self.unmodelled)
 
     def half_widths(self, *, inputs: FloatArray) -> FloatArray:
-        """At the table's knots: numerical, unmodelled terms, interpolation and some inputs.
+        """Half-width at the table's knots: numerical, unmodelled terms, interpolation and some inputs.
 
         Args: `inputs`: expanded uncertainty (95 %) by those inputs, along the fill ratio.
         """
@@ -102,19 +101,19 @@ class ChamberCalibration:
     volume: float
     """V, m^3."""
     fill_ratio: FloatArray
-    """Nodes, equally spaced from zero to max_fill_ratio, and behind them those reported that are no nodes."""
+    """Nodes, equally spaced from zero to max_fill_ratio, then the reported fill ratios that are no nodes."""
     ring: RingValues
     """Closed forms at `fill_ratio`."""
     elements: ElementCheck | None
-    """Finite elements at a few of them; None: left out."""
+    """Check by finite elements at a few fill ratios; None: left out."""
     reported_fill_ratio: FloatArray
     """0, 0.05, ... max_fill_ratio."""
     reported: tuple[int, ...]
     """Indices of `reported_fill_ratio` in `fill_ratio`."""
     wall_pressure: FillCurve
-    """Liquid part, mean over the outer wall, Pa: a load."""
+    """Mean liquid pressure on the outer wall, Pa: a load."""
     hydrostatic_pressure: FillCurve
-    """Liquid part at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa: what drives the tube."""
+    """Liquid pressure at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa: it drives the tube."""
     moment: FillCurve
     """U, kg m."""
     moment_per_mass: Estimate
@@ -154,10 +153,10 @@ def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
 def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True) -> ChamberCalibration:
     """Evaluate the closed forms over the fill range and check them by finite elements at a few fills.
 
-    The values hold gravity's mean over a turn; finite elements hold it where it exceeds the scene's tolerance
-    at some fill, for it takes them ten times as long. A ring must exist.
-    Args: `checked`: whether finite elements check them, which takes most of the time. `varied`: whether both
-        sides of the uncertain inputs are looked at.
+    The values include the mean effect of gravity over a turn; the finite elements include it only where it
+    exceeds the scene's tolerance at some fill, because they then take ten times as long. A ring must exist.
+    Args: `checked`: true if finite elements check the values, which takes most of the time. `varied`: true if
+        the uncertain inputs are varied to both sides.
     Raises: SceneError: as `scene_ring`.
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates; moments and lambda times the scene's
         measured factor.
@@ -170,7 +169,7 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
         held = gravity_shares(scene).mean > scene.tolerance
         compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
         check = ElementCheck.of(scene, values=compared, gravity=held)
-    # The finite elements check the geometry, so before the factor that was measured.
+    # Finite elements check the geometry, so the measured factor is applied after the check.
     factor, unmodelled = scene.disc.moment_factor, unmodelled_fractions(scene, fills)
     moment, slope = (
         replace(each, value=factor * each.value, uncertainty=factor * each.uncertainty)
@@ -262,7 +261,7 @@ def _lambda_at_equal_fills(
 ) -> tuple[float, float, float]:
     """lambda at equal fills, 2 (dU/dV')/rho, m, and its numerical and its unmodelled half-width, m.
 
-    Shares of the moment count by how they change with the fill.
+    Unmodelled fractions of the moment count by their change with the fill.
     """
     m, density = nodes.size // 2, scene.liquid.density
     value = 2 * float(slope.value[m]) / density
@@ -280,9 +279,9 @@ _WITHIN_PIECE: Final = np.arange(1, 8) / 8
 
 
 def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray]:
-    """A table through equally spaced fills, and its expanded uncertainty (95 %) between them, at each."""
+    """Table through equally spaced fills, and its expanded uncertainty (95 %) near each of them."""
     coarse = spline(nodes[::2], value[::2] - value[0])
-    # Twice the step at worst triples the error; half of what the coarse table misses is on the safe side.
+    # Twice the step at least triples the error: half the error of the coarse table is on the safe side.
     missed = float(np.max(np.abs(coarse(nodes) - (value - value[0]))))
     return smooth_table(nodes, value), np.full(nodes.shape, missed / 2)
 
@@ -315,7 +314,7 @@ def pressure_tables(
 
 @lru_cache(maxsize=16)
 def _samples(disc: Disc, count: int, largest: float) -> tuple[FloatArray, FloatArray]:
-    """R2^2 - a^2, m^2, at equally spaced fills, and what a table of it misses about every one of `count`."""
+    """R2^2 - a^2, m^2, at equally spaced fills, and the error of its table near each of `count` nodes."""
     every = -(-_PIECES // (count - 1))
     fills = np.linspace(0.0, largest, every * (count - 1) + 1)
     squares = _square(disc, fills)

@@ -46,18 +46,18 @@ Source: IAPWS R1-76(2014)."""
 _METAL_TENSION_N_M: Final = 0.72
 """Surface tension of gallium near its melting point: taken above `METAL_DENSITY_KG_M3`."""
 _MODES: Final = 24
-"""Modes of a chamber that count: the part of gravity's tilt in a mode falls with its number squared."""
+"""Number of modes of a chamber: the part of gravity's tilt in a mode falls with the mode's number squared."""
 _SWING_ERROR: Final = 0.2
 """Error of the estimated amplification, as a fraction of the moment's ripple."""
 _CORIOLIS_FACTOR: Final = 2.0
-"""Ripple of the pressure over the swing: 2 omega times the flux along the ring, which is about that under
-which a free particle follows gravity however thin the ring."""
+"""Ripple of the pressure over the swing: 2 omega times the flux along the ring, about that with which a free
+particle follows gravity, however thin the ring."""
 
 
 def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
-    """Share of the liquid's pressure at R2 that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
+    """Upper bound of capillary pressure over liquid pressure at R2, sigma (2/B + 1/(a alpha) + 1/a)/P.
 
-    The moment hardly feels it: the same share of a surface's shape, taken as a whole.
+    The moment changes by the fraction of the liquid in the menisci along the walls.
     Returns: Shares by "pressures" and "moments", along the fills, which are above zero.
     Source: contact line over area of the free surface, contact angle zero, plus the ring's own curvature.
     """
@@ -87,10 +87,10 @@ def wall_layers(scene: Scene, fills: FloatArray) -> tuple[FloatArray, float]:
 
 
 def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
-    """Contribution of what no model holds: surface tension, friction at the walls, waves of finite height.
+    """Contribution of unmodelled effects: surface tension, friction at the walls, waves of finite height.
 
-    An imported chamber has besides what its facets leave of smooth walls, and by how much its moment exceeds
-    that along its middle, for which moments and lambda are given.
+    An imported chamber adds the error of facets in place of smooth walls, and the excess of its moment over
+    the component along its middle, which moments and lambda describe.
     Returns: Relative, of "pressures" (the wall's), "heads" and "moments", shape (n,) each; zero without
         liquid.
     Source: sum of the estimates, errors of one sign at worst.
@@ -101,7 +101,7 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     transverse = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
     tension = capillary_share(scene, fills[wet])
     a = surface_radius(disc=scene.disc, fill_ratio=fills[wet])
-    # The same pressure of surface tension is more of a mean over a wall that is nearer to the surface.
+    # A capillary pressure is a larger fraction of the mean over a wall nearer to the surface.
     nearer = head_square(disc=scene.disc, surface_radius=a) / wall_square(disc=scene.disc, surface_radius=a)
     shares = {
         "pressures": nearer * tension["pressures"] + common + faceting.wall_pressure,
@@ -115,14 +115,14 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
 
 
 class _Swing(NamedTuple):
-    """Amplification of gravity's ripple, natural frequencies being known to `FREQUENCY_UNCERTAINTY`."""
+    """Lowest and largest amplification of gravity's ripple within `FREQUENCY_UNCERTAINTY`."""
 
     lowest: FloatArray
     largest: FloatArray
 
 
 def amplification(scene: Scene, fills: FloatArray | float) -> _Swing:
-    """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - (1 + i d)/s^2)|.
+    """Estimated amplification of gravity's ripple by the swinging liquid, |1/(1 - (1 + i d)/s^2)|.
 
     Returns: Factors along the fills; 1 on a vertical shaft.
     Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, driven at s = 1; d, `_swing`.
@@ -137,8 +137,8 @@ def amplification(scene: Scene, fills: FloatArray | float) -> _Swing:
 def _wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
     """Estimated height that gravity's waves may have, zero-to-peak, over the depth of the ring.
 
-    A surface across gravity alone, g/omega^2 sin(phi) and cos(phi), is taken apart into the modes of a
-    chamber with half-angle alpha, k = j pi/(2 alpha), each of which answers as in `amplification` with the
+    The tilt of a surface by gravity alone, g/omega^2 sin(phi) and cos(phi), is resolved into the modes of a
+    chamber with half-angle alpha, k = j pi/(2 alpha), each of which responds as in `amplification` with the
     largest swing that its frequency's uncertainty allows. For the 90 deg of the liquid-ring paper within a
     factor of three of finite elements, thin rings included; half circles from a quarter of them up.
     """
@@ -150,18 +150,18 @@ def _wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
     less, more = (alpha * np.sinc((k + sign) * alpha / np.pi) for sign in (-1, 1))
     shares = np.abs(less + np.where(mode % 2, -more, more)) / alpha
     answers = shares * _swing(scene, k, np.log(scene.disc.outer_radius / a), alpha).largest
-    # The two parts follow each other by a quarter of a turn.
+    # Odd and even modes are a quarter of a turn out of phase.
     height = np.hypot(answers[..., ::2].sum(axis=-1), answers[..., 1::2].sum(axis=-1))
     tilt = scene.environment.gravity / scene.rotor.speed**2
     return np.asarray(height * tilt / (scene.disc.outer_radius - a[..., 0]))
 
 
 def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatArray | float) -> _Swing:
-    """|1/(1 - (1 + i d)/s^2)| over what s may be, of modes cos(k phi) of rings ln(R2/a) deep.
+    """Range of |1/(1 - (1 + i d)/s^2)| by the uncertainty of s, of modes cos(k phi) of rings ln(R2/a) deep.
 
-    d = (E/2)^(1/2) [2 R2/B + q/depth + (1 - q)/alpha], q = 2 k depth/sinh(2 k depth), is what Stokes layers
-    on ends, outer wall and plates take at s = 1, E = nu/(omega R2^2); at a peak within a factor of two of
-    finite elements.
+    d = (E/2)^(1/2) [2 R2/B + q/depth + (1 - q)/alpha], q = 2 k depth/sinh(2 k depth), is the damping by
+    Stokes layers on ends, outer wall and plates at s = 1, E = nu/(omega R2^2); at a peak within a factor of
+    two of finite elements.
     Source: the layers of `sloshing_system` on phi = cosh(k ln(R2/r)) cos(k phi), plates at r = R2.
     """
     disc, twice = scene.disc, 2 * k * depth
@@ -175,10 +175,10 @@ def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatA
 
 
 def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
-    """Bound of what waves do to the means over a turn, relative: (eta/h)^2/4, at most 1.
+    """Upper bound of the relative effect of waves on means over a turn, (eta/h)^2/4, at most 1.
 
     In shallow waves the mean square of the velocity is g_c <eta^2>/h, of which Bernoulli's equation takes
-    half from the wall pressure and as much from the surface's mean place; <eta^2> is at most eta^2/2.
+    half from the wall pressure and as much from the surface's mean position; <eta^2> is at most eta^2/2.
     """
     return np.minimum(_wave_height(scene, fills) ** 2 / 4, 1.0)
 
@@ -189,7 +189,7 @@ _FILL_SHARES: Final = (0.2, 0.5, 1.0)
 
 @lru_cache(maxsize=64)
 def chamber_fills(scene: Scene) -> FloatArray:
-    """Fill ratios of the range at which gravity leaves a closed ring: those at which a chamber is judged.
+    """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
 
     Returns: x, shape (n,); empty where there is none.
     """
@@ -198,10 +198,10 @@ def chamber_fills(scene: Scene) -> FloatArray:
 
 
 def range_fills(scene: Scene) -> FloatArray:
-    """Fill ratios over the range, with the one at which sloshing is resonant where that lies within.
+    """Fill ratios over the range, with that of resonant sloshing where it lies within.
 
-    At the resonant one the lowest mode meets the speed, s = 1: tanh(k ln(R2/a)) = 1/k; where k <= 1 the mode
-    stays below the speed at any fill.
+    At resonance the natural frequency of the lowest mode equals the speed, s = 1: tanh(k ln(R2/a)) = 1/k;
+    where k <= 1 the mode stays below the speed at any fill.
     """
     disc, fills = scene.disc, scene.disc.max_fill_ratio * np.array(_FILL_SHARES)
     k = np.pi / disc.central_angle
@@ -216,12 +216,12 @@ def range_fills(scene: Scene) -> FloatArray:
 
 
 class _GravityShares(NamedTuple):
-    """Estimated contributions of gravity, relative, of wall pressure or moment, at the worst fill."""
+    """Estimated relative contributions of gravity to wall pressure or moment at the worst fill."""
 
     mean: float
-    """To the means over a turn, of second order in g/(omega^2 a)."""
+    """Contribution to means over a turn, of second order in g/(omega^2 a)."""
     swing: float
-    """Ripple at 1x, of first order, with what the liquid's swing makes of it."""
+    """Contribution of the ripple at 1x, of first order, amplified by the liquid's swing."""
 
 
 @lru_cache(maxsize=8)
@@ -253,7 +253,7 @@ def gravity_shares(scene: Scene) -> _GravityShares:
 
 
 def compression(scene: Scene, fills: FloatArray) -> FloatArray:
-    """By how much the liquid is denser on the outer wall, p/K, with the scene's gas pressure on it.
+    """Relative increase of the liquid's density on the outer wall, p/K, under the scene's gas pressure.
 
     Returns: Shares along the fills; those above `LARGEST_COMPRESSION` are beyond every model here, and so
         are velocities that such a pressure drives.
@@ -302,21 +302,21 @@ def chamber_status(scene: Scene) -> Status:
 
 
 _ROTOR_DAMPING_RATIO: Final = 0.01
-"""Damping ratio that a rotor has at least, about: a growth below it is not worth a warning."""
+"""Approximate lower bound of a rotor's damping ratio: growth below it gives no warning."""
 _WHIRL_FILL_SHARES: Final = np.linspace(0.1, 1.0, 19)
 """Fills at which whirl is estimated, as shares of max_fill_ratio."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AsynchronousInstability:
-    """Critical speed that would be hit worst, and the growth of whirl there; orders of magnitude."""
+    """Critical speed at which whirl grows fastest, and its growth; orders of magnitude."""
 
     fill_ratio: float
     """Fill ratio of all chambers at which whirl grows fastest."""
     critical_speed: float
-    """(1 - s) omega, rad/s."""
+    """Critical speed (1 - s) omega, rad/s."""
     growth: float
-    """Over that critical speed: the damping ratio that would stop it."""
+    """Growth rate over that critical speed: the damping ratio that would stop whirl."""
 
     @classmethod
     def of(cls, scene: Scene) -> AsynchronousInstability | None:
@@ -353,7 +353,7 @@ class AsynchronousInstability:
 
     @property
     def finding(self) -> Finding | None:
-        """Warning that the growth exceeds what rotors damp; None elsewhere."""
+        """Warning that the growth exceeds the damping of rotors; None below it."""
         if self.growth <= _ROTOR_DAMPING_RATIO:
             return None
         numbers = {"critical_speed": self.critical_speed, "fill_ratio": self.fill_ratio}

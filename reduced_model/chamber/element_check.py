@@ -1,4 +1,5 @@
-"""Finite elements beside a chamber's closed forms: at a few fills, on the mesh that the tolerance needs."""
+"""Check of a chamber's closed forms by finite elements at a few fills, on the mesh that the tolerance
+needs."""
 
 from __future__ import annotations
 
@@ -29,8 +30,8 @@ _CHECKED_ON_WALLS: Final = ("wall_pressure", "moment", "hydrostatic_pressure")
 _STAND_IN: Final = {"moment_per_volume": "moment", "hydrostatic_pressure": "wall_pressure"}
 """Quantity that is checked instead, by the one that is not."""
 _MESH_SHARE: Final = 0.1
-"""Error that the mesh may leave at the thinnest ring checked, an imported chamber's surface at any fill, over
-the tolerance."""
+"""Allowed error of the mesh over the tolerance, at the thinnest ring checked; in an imported chamber, of the
+surface at any fill."""
 _RADIAL_CELLS: Final = 4
 """Cells along the radius. The pressure is quadratic and so are the cells: only the arcs need more."""
 _SMALLEST_CELL_RAD: Final = math.pi / 48
@@ -40,16 +41,16 @@ _CUT_ERROR: Final = 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ElementCheck:
-    """Finite elements at a few fills, and how far the closed forms are from them."""
+    """Results of finite elements at a few fills, and the deviation of the closed forms from them."""
 
     elements: RingQuantities | ImportedElements
-    """At the checked fills, with the half-widths of its own grid convergence."""
+    """Totals at the checked fills, with half-widths by grid convergence."""
     gravity: bool
-    """True if the elements hold gravity."""
+    """True if the elements include gravity."""
     difference: Mapping[str, FloatArray]
     """Closed form less finite elements, by `CHECKED`, SI, shape (n,)."""
     allowed: Mapping[str, FloatArray]
-    """Error of both, 95 %, by `CHECKED`, SI, shape (n,)."""
+    """Allowed difference: sum of both half-widths (95 %), by `CHECKED`, SI, shape (n,)."""
     excesses: Mapping[str, float]
     """Largest difference beyond what is allowed, relative to the value, by `CHECKED`; zero where they
     agree."""
@@ -74,7 +75,7 @@ class ElementCheck:
 
         An imported chamber is solved without gravity and compared with the integrals over its walls.
 
-        Args: `values`: by the closed forms. `gravity`: whether these hold gravity.
+        Args: `values`: results of the closed forms. `gravity`: true if these include gravity.
         Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or
             where the finite elements found no tilted surface.
         Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
@@ -87,7 +88,7 @@ class ElementCheck:
             fills = fills[at]
             pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=np.append(fills, 1.0))
             head = chamber_pressure(scene=scene, fill_ratio=np.append(fills, 1.0))
-            # The table of the integrals is good to a share of the whole chamber.
+            # The error of the integrals' table is relative to the whole chamber.
             closed_forms = {
                 name: Estimate(value=value[:-1], uncertainty=np.full(fills.shape, TOLERANCE * value[-1]))
                 for name, value in zip(_CHECKED_ON_WALLS, (pressure, moment, head), strict=True)
@@ -115,7 +116,7 @@ class ElementCheck:
 
     @property
     def solves(self) -> int:
-        """Meshes times fills that were solved."""
+        """Number of solves: meshes times fills."""
         return len(self.elements.cells) * self.elements.fill_ratio.size
 
 
@@ -168,9 +169,9 @@ def scene_ring(
     gravity: bool,
     cells: Sequence[tuple[int, ...]] | None = None,
 ) -> RingQuantities:
-    """Totals of one chamber's liquid, without gravity every one of them computed.
+    """Totals of one chamber's liquid; without gravity every fill must be solved.
 
-    Args: `gravity`: whether gravity is modelled. `cells`: meshes, finest first; default as in
+    Args: `gravity`: true if gravity is modelled. `cells`: meshes, finest first; default as in
         `ring_quantities`.
     Raises: SceneError: a chamber so narrow or a ring so shallow that a solve failed; the numbers of a failed
         solve would enter the tables of all other fill ratios.
@@ -201,13 +202,13 @@ class ImportedElements:
 
     fill_ratio: FloatArray
     wall_pressure: Estimate
-    """Mean over the whole outer wall, dry parts included, Pa, shape (n,)."""
+    """Mean pressure on the whole outer wall, dry parts included, Pa, shape (n,)."""
     hydrostatic_pressure: Estimate
-    """By the volume of the liquid as it is drawn, Pa, shape (n,)."""
+    """Pressure at R2 by the volume of the meshed liquid, Pa, shape (n,)."""
     moment: Estimate
-    """kg m, shape (n,)."""
+    """Moment of the chamber, kg m, shape (n,)."""
     volume: FloatArray
-    """Volume of the liquid as it is drawn, m^3, shape (n,)."""
+    """Volume of the meshed liquid, m^3, shape (n,)."""
     cells: tuple[tuple[int, ...], ...]
     """Number of cells of the scene's mesh."""
     status: Status
@@ -233,8 +234,8 @@ class ImportedElements:
         volume = np.array([ring.volume for ring in rings])
         surplus = volume - fill_ratio * chamber_volume(disc=disc)
         volume_error = np.abs(volume / (fill_ratio * chamber_volume(disc=disc)) - 1)
-        # With the surface moved until the drawn liquid has lost its surplus: da^2 = 2 dV/A on a free surface
-        # of area a A, which is drawn by facets, to a share of the tolerance.
+        # The surface moves until the surplus of the meshed liquid is gone: da^2 = 2 dV/A on a free surface of
+        # area a A, whose facets err by a fraction of the tolerance.
         head = chamber_pressure(scene=scene, fill_ratio=fill_ratio)
         area = chamber_table(geometry).surface(surface_radius(disc=disc, fill_ratio=fill_ratio))[0]
         moved = density * scene.rotor.speed**2 * surplus / area
@@ -249,7 +250,7 @@ class ImportedElements:
             hydrostatic_pressure=Estimate(
                 value=head - moved, uncertainty=_MESH_SHARE * scene.tolerance * head
             ),
-            # A free surface drawn by quadratic facets takes liquid off or adds some, all at the surface.
+            # Quadratic facets of the free surface remove or add liquid at the surface alone.
             moment=Estimate(value=moment, uncertainty=(_CUT_ERROR + 2 * volume_error) * np.abs(moment)),
             volume=volume,
             cells=((len(geometry.cells),),),

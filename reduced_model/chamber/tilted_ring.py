@@ -63,19 +63,19 @@ class TiltedRing:
     moment_ripple: FloatArray
     """First harmonic over a turn, kg m zero-to-peak."""
     closed: BoolArray
-    """True where the liquid covers the whole outer wall; elsewhere values of a sector mean nothing."""
+    """True where the liquid covers the whole outer wall; elsewhere values of a sector are invalid."""
 
     @classmethod
     def of(cls, scene: Scene, fill_ratio: FloatArray) -> TiltedRing:
         """Wall pressure, moment and dU/dV' of a chamber under gravity, exactly for liquid at rest.
 
         p = rho omega^2 (|r + g/omega^2|^2 - b^2)/2; dU/dV' = rho int x w / int w on the surface,
-        w = 1/|grad p|.  On a horizontal shaft gravity turns across the chamber.  At a place that turns with
-        the disc the mean of that over a turn is rho omega^2 (r^2 - a^2)/2, with a^2 the mean of
-        b^2 - (g/omega^2)^2, which both chambers of a pair share.  The tube is driven by that mean; what the
-        swing about it, of a share e of the driving pressure, takes off the mean velocity is e^2/16.
+        w = 1/|grad p|.  On a horizontal shaft gravity turns across the chamber.  At a point fixed in the disc
+        its mean over a turn is rho omega^2 (r^2 - a^2)/2, with a^2 the mean of b^2 - (g/omega^2)^2, which
+        both chambers of a pair share.  The tube is driven by that mean; a swing about it of e times the
+        driving pressure reduces the mean velocity by the fraction e^2/16.
         Args: `fill_ratio`: x, shape (n,), above zero.
-        Range: a surface that stays outside the plates' inner edge; the inner radius is not looked at.
+        Range: a surface that stays outside the plates' inner edge; the inner radius is not checked.
         Source: Eqs. 9 to 11 of the liquid-ring paper with gravity and exact plates; hydrostatics.
         """
         disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
@@ -109,7 +109,7 @@ class TiltedRing:
 
 @dataclass(frozen=True, kw_only=True)
 class _Turned:
-    """One quantity at every angle of gravity, shape (n, turn)."""
+    """Quantities at every angle of gravity, shape (n, turn)."""
 
     wall_pressure: FloatArray
     surface_square: FloatArray
@@ -120,7 +120,7 @@ class _Turned:
 
 
 def turn_samples(scene: Scene) -> int:
-    """Angles of gravity for means good to twelve digits: harmonics fall like (g/(omega^2 R1))^n."""
+    """Number of angles of gravity for means to twelve digits: harmonics fall like (g/(omega^2 R1))^n."""
     tilt = scene.environment.gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
     if tilt < 1e-12:
         return _TURN_SAMPLES[0]
@@ -227,7 +227,7 @@ def check_ring(scene: Scene) -> None:
     """
     gravity = scene.environment.gravity if scene.environment.shaft == "horizontal" else 0.0
     if abs(scene.rotor.speed) > math.sqrt(gravity / scene.disc.inner_radius):
-        # As fast as a surface at the inner radius asks for, further in than which none lies.
+        # Fast enough for a surface at the inner radius, the innermost one possible.
         return
     radius = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio))
     lowest = math.sqrt(gravity / radius)

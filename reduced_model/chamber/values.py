@@ -1,4 +1,4 @@
-"""Wall pressure, moment and lambda of a chamber over its fill: closed forms, gravity, and a mesh."""
+"""Wall pressure, moment and lambda of a chamber over its fill: by closed forms, with gravity, from a mesh."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def chamber_closed_forms(
 def chamber_pressure(*, scene: Scene, fill_ratio: npt.ArrayLike) -> FloatArray:
     """Hydrostatic pressure at the outer radius R2 without gravity, rho omega^2 (R2^2 - a^2)/2.
 
-    The head of a chamber of any shape is this over rho, from R2; a mean over its walls is a load.
+    Over rho it is the head of a chamber of any shape, from R2; the mean over the walls is a load
+    instead.
     Returns: Pa, the shape of `fill_ratio`.
     Source: Eq. 11 of the liquid-ring paper from the free surface outward.
     """
@@ -62,7 +63,7 @@ def measured_closed_forms(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Wall pressure, and moment and lambda corrected by the measured factor.
 
-    U and lambda times `Disc.moment_factor`; P as the geometry has it.
+    U and lambda times `Disc.moment_factor`; P is that of the geometry.
     Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
     """
     pressure, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fill_ratio)
@@ -76,7 +77,7 @@ _QUADRATURE_ERROR: Final = 1e-10
 
 
 def paper_closed_forms(scene: Scene, fill_ratio: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Wall pressure, Pa, of the chamber's volume, and moment, kg m, with the paper's own volume.
+    """Paper's wall pressure from the exact volume, Pa, and moment from the paper's volume, kg m.
 
     Source: Eqs. 3, 4, 7 and 12.
     """
@@ -90,7 +91,7 @@ def paper_closed_forms(scene: Scene, fill_ratio: npt.ArrayLike) -> tuple[FloatAr
         liquid_volume=np.asarray(fill_ratio) * chamber_volume(disc=disc),
     )
     moment = paper.moment_paper(disc=disc, density=rho, surface_radius=radius)
-    # A root and its square differ by rounding, of which an empty chamber shall have nothing.
+    # Rounding of a root and its square would give an empty chamber a moment.
     return pressure, np.where(volume > 0, moment, 0.0)
 
 
@@ -102,9 +103,9 @@ class RingValues:
     surface_radius: FloatArray
     """Radius of the concentric free surface that holds the same volume, m."""
     wall_pressure: Estimate
-    """Mean over the outer wall, of the liquid alone, Pa: a load."""
+    """Mean liquid pressure on the outer wall, Pa: a load."""
     hydrostatic_pressure: Estimate
-    """At the outer radius R2, of the liquid alone, Pa: what drives the tube."""
+    """Liquid pressure at the outer radius R2, Pa: it drives the tube."""
     moment: Estimate
     """U, kg m."""
     moment_per_volume: Estimate
@@ -117,9 +118,9 @@ class RingValues:
     def of(cls, scene: Scene, *, fill_ratio: FloatArray, gravity: bool) -> RingValues:
         """Evaluate the closed forms of a chamber, or integrate over its tilted ring.
 
-        Args: `fill_ratio`: x, shape (n,). `gravity`: whether gravity is modelled.
-        Returns: RingValues; half-widths hold rounding, the quadrature's error and, where gravity leaves no
-            closed ring, all that it could do to the liquid there.
+        Args: `fill_ratio`: x, shape (n,). `gravity`: true if gravity is modelled.
+        Returns: RingValues; half-widths include rounding, the quadrature's error and, where gravity leaves no
+            closed ring, a bound of its effect.
         Source: `chamber_closed_forms`, `TiltedRing.of`.
         """
         disc, surface = scene.disc, surface_radius(disc=scene.disc, fill_ratio=fill_ratio)
@@ -204,11 +205,11 @@ class _DrawingShares:
     wall_pressure: FloatArray
     hydrostatic_pressure: FloatArray
     moment: FloatArray
-    """Larger one of the moment's and of lambda's."""
+    """Larger of the uncertainties of moment and lambda."""
 
 
 def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
-    """Uncertainties by faceting at fill ratios above zero; zeros for the sector of the keys."""
+    """Uncertainties by faceting at fill ratios above zero; zeros for the built-in sector."""
     if disc.geometry is None:
         none = np.zeros(fills.shape)
         return _DrawingShares(volume=0.0, wall_pressure=none, hydrostatic_pressure=none, moment=none)
@@ -223,9 +224,9 @@ def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
 
 
 def share_across(disc: Disc, fills: FloatArray) -> FloatArray:
-    """Moment across the chamber's middle over that along it, dW/dU, of liquid that moves at a fill ratio.
+    """Ratio dW/dU of the moments across and along the chamber's middle, of liquid that moves at a fill ratio.
 
-    That of a pair's moment lies between those of the fills which it moves through.
+    The ratio of a pair's moment lies between those of the fills that it passes.
     Returns: Tangent of the angle between both, the shape of `fills`.
     """
     if disc.geometry is None:

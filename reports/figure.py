@@ -83,7 +83,7 @@ _PALETTE: Final = {
 }
 """By sentinel: CSS variable, and colours on a light and a dark page.
 
-The lines tell apart for deuteranopes and protanopes, and as text.
+Deuteranopes and protanopes can tell the lines apart; in every line colour text is legible.
 """
 LIGHT: Final = {name: light for name, light, _ in _PALETTE.values()}
 DARK: Final = {name: dark for name, _, dark in _PALETTE.values()}
@@ -168,7 +168,7 @@ class Drawing:
 
 
 def _as_file(body: str, width: float, height: float) -> str:
-    """An SVG file of svg elements; word processors, LaTeX and printers know neither variables nor schemes.
+    """An SVG file of svg elements; word processors, LaTeX and printers support neither variables nor schemes.
 
     Args: `width`, `height`: pt.
     """

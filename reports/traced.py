@@ -1,6 +1,6 @@
 """The evidence as templates see it, and the one filter that formats, typesets and traces what they print.
 
-A number taken out of the evidence knows its path there, so that a template need not repeat it.
+A number taken out of the evidence carries its path there, so that a template need not repeat it.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ class Part(Mapping[str, Any]):
 
 
 def placed(value: Any, path: str = "") -> Any:
-    """A value of the evidence that knows its dotted path, with all that is in it; texts as they are."""
+    """A value of the evidence with its dotted path, which its parts carry as well; texts are unchanged."""
     if isinstance(value, Mapping):
         return Part(value, path)
     if isinstance(value, list | tuple):

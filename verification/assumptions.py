@@ -82,7 +82,7 @@ def widened(
 ) -> Evidence:
     """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
 
-    The reach is that of the error: an input that moves number and reference alike counts for nothing.
+    The reach is that of the error: an input that changes number and reference alike adds nothing.
     Args: `at`: evidence of another scene, or a part of it.
     """
     if not assumptions:

@@ -91,7 +91,7 @@ class _ReferenceText:
 
 @dataclass(frozen=True, kw_only=True)
 class RestsOn:
-    """An input that decides a claim, by its scene path; it widens the claim where nobody gave its value."""
+    """An input that decides a claim, by its scene path; varied over its range unless given or measured."""
 
     path: Annotated[str, Pattern(r"[a-z_]+\.[a-z_]+", "table.key")]
     low: float | None = None

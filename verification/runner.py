@@ -203,7 +203,7 @@ def case_jobs(
 
     The first job takes longest when nothing is compiled yet: the cases on eccentric masses share a compiled
     strategy, so one process runs them all and compiles it once.
-    Args: `apart`: True to make every case a job of its own.
+    Args: `apart`: True to make every case a separate job.
     """
     driven = () if apart else tuple(case for case in case_ids if load_case(case).paper == DRIVEN)
     groups = [driven] if driven else []

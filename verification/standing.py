@@ -1,7 +1,7 @@
 """Basis of each predicted quantity: measurements, verification, calibration, or assumption.
 
-A case says in `about` which subjects of `standing.toml` its result is evidence for; everything else of the
-table follows.
+A case names in `about` the subjects of `standing.toml` that its result is evidence for; the rest of the table
+follows from the cases.
 """
 
 from __future__ import annotations

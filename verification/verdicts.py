@@ -115,7 +115,7 @@ def combine(*, kind: Kind, verdicts: Sequence[Verdict], roles: Sequence[Role] = 
     Readings of one claim count as one, the most favourable. A number that holds after a
     correction leaves a claim confirmed with correction where its idea was judged and confirmed; otherwise it
     is refuted. Args: `roles`: of each verdict, default "number".
-    Raises: ValueError: a verdict that this kind of case does not know.
+    Raises: ValueError: a verdict that this kind of case does not have.
     """
     order = VOCABULARY[kind]
     unknown = [verdict for verdict in verdicts if verdict not in order]

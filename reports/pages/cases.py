@@ -44,7 +44,7 @@ from ringbalance.verification.extremes.study import axis_rows
 from ringbalance.verification.trade import error_text, models_table, trade_study
 
 JudgedQuantity = Mapping[str, Any]
-"""A judged quantity of a case, whose numbers know their path in the evidence."""
+"""A judged quantity of a case, whose numbers carry their paths in the evidence."""
 _ZERO_FRACTION: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
 _BOX_KEYS: Final = (

@@ -142,7 +142,7 @@ def _read(path: str) -> Any:
     grid: Any = pv.read(path)
     cells = grid.cells_dict.get(pv.CellType.TRIQUADRATIC_HEXAHEDRON)
     if cells is not None:
-        # The filter knows the nodes on corners and edges, which come first.
+        # The filter handles the nodes on corners and edges, which come first.
         fields = dict(grid.point_data)
         grid = pv.UnstructuredGrid({pv.CellType.QUADRATIC_HEXAHEDRON: cells[:, :20]}, np.asarray(grid.points))
         grid.point_data.update(fields)

@@ -1,4 +1,4 @@
-"""Verdicts on requirements; a fraction of drawn devices with its bounds, and paired fractions."""
+"""Verdicts on requirements, a fraction of drawn devices with its bounds, and paired fractions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Proportion:
 
     @property
     def value(self) -> float:
-        """Fraction; not a number without devices."""
+        """Fraction of the devices; NaN without devices."""
         return self.count / self.of if self.of else math.nan
 
     @property

@@ -210,7 +210,7 @@ def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:
 
 
 def _safe_at_rest(cells: _Cells, hole: ComplexArray, angles: FloatArray) -> float:
-    """Smallest fraction below the level through a point of the hole, over directions of gravity."""
+    """Smallest fraction below the level of the hole's lowest point, over directions of gravity."""
     down = np.exp(1j * angles)[:, None]
     depth = np.real(cells.middle * np.conj(down))
     # The lowest point is reached first.
@@ -219,7 +219,7 @@ def _safe_at_rest(cells: _Cells, hole: ComplexArray, angles: FloatArray) -> floa
 
 
 def _safe_turning(cells: _Cells, hole: ComplexArray, offsets: FloatArray, angles: FloatArray) -> float:
-    """Smallest fraction below a surface through the hole that is a circle about -g/omega^2."""
+    """Smallest fraction in the liquid, its surface a circle about -g/omega^2 through the hole."""
     shares = []
     for offset in offsets:
         centre = -offset * np.exp(1j * angles)[:, None]

@@ -1,23 +1,23 @@
 """k of the tube by the library `fluids` alone, as a designer without this program would calculate it.
 
 k = f L/d + K_entrance + sum of K_bend + extra + (K_exit - 1), each part by every method of `fluids` in its
-range, the tube at rest. The library knows no rotation, and no laminar loss of an entrance or a bend.
+range, the tube at rest. The library covers no rotation, and no laminar loss of an entrance or a bend.
 
 A method is used within the range that its source claims, by rules set before the results:
 
 * friction: the range that `fluids` states, and in it at most 5 % from Colebrook's equation, which all of
   them approximate;
 * bends: the angles, radii and Re of the source. Crane's are multiples of the friction of commercial steel
-  pipes, from 15 mm on. Miller's chart begins at Re = 1e4, Ito's measurements at 2e4; Swamee's formula knows
-  no Re. So nothing but the program's own formula follows Re below 1e4, and nothing is judged there;
-* an entrance that projects: the methods that need the thickness of the wall, which no scene gives, are asked
-  for a thin edge and for a twentieth of the bore.
+  pipes, from 15 mm on. Miller's chart begins at Re = 1e4, Ito's measurements at 2e4; Swamee's formula has
+  no Re. So only the program's own formula covers Re below 1e4, and nothing is judged there;
+* an entrance that projects: the methods that need the thickness of the wall, which no scene gives, are used
+  with a thin edge and with a twentieth of the bore.
 
 The program's own methods are shown among them, but it is judged by the others alone: by the middle between
 the smallest and the largest, all between being equally likely. A comparison with an uncertainty above its
-limit proves nothing. Limits: of friction 15 %, what a chart of it claims on a real wall and half as much
-again; of bends 75 %, half the spread of handbooks and the program's own quarter; of k 25 %, in which an exit
-counted twice could not hide where k is below 4.
+limit proves nothing. Limits: for friction 15 %, one and a half times the claim of its chart for real walls;
+for bends 75 %, half the spread of handbooks plus the program's own 25 %; for k 25 %, exceeded by an exit that
+is counted twice where k is below 4.
 """
 
 from __future__ import annotations

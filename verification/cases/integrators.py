@@ -1,13 +1,13 @@
-"""One operation under a flow law by the program's march and by Eq. 20's segments.
+"""One operation under a flow law, by the program's time integration and by Eq. 20's segments.
 
 Exact references are the closed form of the paper's law, and for other laws t = (V/S) int dx/u to a fill x.
-Near a stall u goes like the square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one
+Near a stall u varies as the square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one
 segment takes d to d - kappa sqrt(d). The exact flow stalls after tau = 2 sqrt(d)/((S/V) c). A segment stays
 on its side of the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the
 last ones are too long. One that steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most. A
 full tube would let it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) where
 sqrt(d) < kappa/4, and the steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that
-every start is drawn into it.
+it attracts every start.
 """
 
 from __future__ import annotations

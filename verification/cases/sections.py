@@ -3,11 +3,11 @@ and the friction formula's blend of laminar and turbulent flow.
 
 The manufactured flow on the curved half section, every term of the equation at work: in the plane
 u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the tube
-w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
+w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force f is that of
 
     inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
 
-asks for, with velocities given on the whole boundary.
+with velocities given on the whole boundary.
 
 Laminar flow in a rotating tube becomes developed at the rate at which disturbances decay along it.  A small
 steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial velocity over U and

@@ -1,6 +1,6 @@
 """Claims on k and on the assumptions of Eqs. 13 to 18 about the tube, by the program's own tube law.
 
-A velocity is the one that a full tube takes by itself under a head, and k is taken there.
+Velocities are those of a full tube under a given head, and k is that at such a velocity.
 """
 
 from __future__ import annotations

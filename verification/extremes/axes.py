@@ -36,7 +36,7 @@ _USUAL_FRACTION: Final = 0.75
 
 @dataclass(frozen=True)
 class InputAxis:
-    """One input, from one end of what anyone might ask for to a step beyond the other."""
+    """One input, over a range that exceeds the usual one of discs."""
 
     name: str
     title: str
@@ -179,7 +179,7 @@ _CHANGES: Final[Mapping[str, Callable[[Scene, float, Point], Changes]]] = Mappin
         "gravity": lambda _, value, __: {"environment.gravity": 9.80665 * value},
     }
 )
-"""Changed keys of the axes that hang on no other part of the scene; `scene_at` sets the rest."""
+"""Changed keys by axis, as functions of scene, value and point; `scene_at` sets the remaining axes."""
 
 
 def designed_set(*, count: int, seed: int) -> tuple[Point, ...]:

@@ -193,7 +193,7 @@ class Extremes(Result):
         }
 
     def rows(self) -> Rows:
-        """Endings of the points, and their stretches along each axis."""
+        """Endings of the points, and their intervals along each axis."""
         document = self.to_dict()
         worst = document["worst_error_over_half_width"]
         quantities = (

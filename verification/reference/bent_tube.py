@@ -1,9 +1,9 @@
 """Laminar flow through a bent tube in the rotating frame, in three dimensions.
 
 The path lies in the plane across the rotation axis, as a tube between two chambers of a disc does: its legs,
-its bends and the arc over the crest all stay at one place along the shaft. Coriolis and centrifugal forces
+its bends and the arc over the crest are all at one position along the shaft. Coriolis and centrifugal forces
 then lie in that plane too, the flow is its own mirror image in it, and half the tube is enough. Without that
-symmetry (an axis in the path's plane, say) the whole section would be needed. With lengths over the bore d,
+symmetry (with an axis in the path's plane) the whole section would be needed. With lengths over the bore d,
 velocities over the mean velocity U and reduced pressure over mu U/d:
 
     Re (u . grad) u + 2 R e_z x u = -grad p + lap u,    div u = 0
@@ -12,7 +12,7 @@ Inflow is developed; at the outlet the traction is that of developed flow. The s
 same finite elements on the same cells, so a straight tube keeps it to round-off.
 
 Across the path the stream is driven by 2 omega u, to its right when the disc turns to the left, and in a
-bend by u^2/r away from the bend's centre: its curvature adds to the rotation, or takes from it. In a bend to
+bend by u^2/r away from the bend's centre: its curvature adds to the rotation, or subtracts. In a bend to
 the left (with the rotation) both act to the same side, in one to the right they oppose each other: the bend
 then costs less than the straight tube.
 

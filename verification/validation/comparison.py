@@ -195,7 +195,7 @@ def with_left_out(
     """Statistics of the readings that a case leaves out, and of all readings together.
 
     Args: `left_out`: readings that are not judged, by name. `taught`: number of readings to which a
-        coefficient was fitted: no predictions, and counted in `taught_points` alone.
+        coefficient or an uncertainty was fitted: no predictions, counted in `taught_points` alone.
     Returns: `<name>_points`, `<name>_within` and `<name>_bias` of each, `all_points`, `all_within`.
     """
     numbers = {"taught_points": float(taught)} if taught else {}

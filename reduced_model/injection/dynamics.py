@@ -68,7 +68,7 @@ _PLANT_REAL: Final = (
     "density",  # kg/m^3
     "length",  # L, m
     "crest_end",  # fraction of the path to the end of the crest's arc, flow out of chamber 0
-    "return_crest_end",  # the same for flow out of chamber 1
+    "return_crest_end",  # its counterpart for flow out of chamber 1
     "port_pressure",  # D_p, Pa
     "column_pressure",  # D_m, Pa; of a one-way law the level above which liquid leaves a vented chamber
     "vapour_pressure",  # gauge, Pa
@@ -119,7 +119,7 @@ PLANT: Final = np.dtype(
         ("rows", np.float64, (ROWS, WIDTH_OF_ROW)),  # pieces of the law, or of its tables
     ]
 )
-"""Constants of a pair: liquid column, gas line, valve lag and moments."""
+"""Constants of a plant, common to its pairs: liquid column, gas line, valve lag and moment."""
 
 
 def empty_plants(count: int) -> Records:
@@ -145,7 +145,7 @@ _MOTION_REAL: Final = (
     "ran_back",  # change of x by flow out of the chamber not driven last, both valves closed
     "fill_before",  # of the driven chamber at the command
     "least_fill",  # of the driven chamber since
-    "residual",  # fill of a driven chamber that no command goes below
+    "residual",  # smallest fill to which a command may empty a driven chamber
     "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
     "ended",  # s since the interval began, at which the flow out of the driven chamber last ended
     "filled",  # s since the interval began, at which the tube was first primed; below zero for not yet
@@ -165,7 +165,7 @@ _MOTION_WHOLE: Final = (
     "regime_start",  # values of `Regime`
     "regime_end",
     "event",  # index into `EVENTS`
-    "lifting",  # whether the liquid that moves has not reached the end of the crest yet
+    "lifting",  # whether moving liquid is still short of the end of the crest
     "side",  # direction in which `front` counts; 0: the legs stand at their chambers' levels
 )
 MOTION: Final = np.dtype(
@@ -271,9 +271,9 @@ class Dynamics:
     max_fill_ratio: float
     """Largest x of a chamber."""
     residual: float = 0.0
-    """Fill of a driven chamber that no command goes below."""
+    """Smallest fill ratio to which a command may empty a driven chamber."""
     lift: Lift | None = None
-    """None: liquid passes the crest as soon as the gas can hold it there."""
+    """Filling of the tube up to the crest; None: liquid passes at once when the gas can hold it there."""
     gas_off: float = 0.0
     """Gauge, Pa, at or below which a chamber counts as without gas under a one-way law."""
     relative_error: float = RELATIVE_ERROR

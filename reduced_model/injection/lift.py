@@ -52,7 +52,7 @@ def crest_stop(plant: Record, direction: int) -> float:
 
 @inlined
 def front(plant: Record, motion: Record, x: float) -> float:
-    """Fraction of the path up to which liquid stands, with chamber 0 at a fill."""
+    """Fraction of the path up to which liquid stands, for a fill of chamber 0."""
     if not motion.lifting:
         return float(motion.front)
     return float(motion.front + motion.direction * (motion.started - x) / plant.hold_up)
@@ -194,7 +194,7 @@ def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
 
 @inlined
 def _risen(plant: Record, start: float, tall: float, rate: float) -> tuple[float, float]:
-    """Front and velocity of a leg that has followed a pressure rising at a rate, as that reaches the crest's.
+    """Front and velocity of a leg in a pressure rising at a rate, when it reaches that of the crest.
 
     A leg that touches the crest's circle has no stiffness there: with y the way to the crest's start,
     y'' = A y^2 + B t, whose solution that follows the balance y = -sqrt(-B t/A) passes t = 0 at

@@ -54,7 +54,7 @@ def pair_moment(plant: Record, fill: float) -> complex:
 def fill_for_moment(plant: Record, moment: float, lowest: float, highest: float) -> float:
     """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
 
-    Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
+    Beyond the ends it is extrapolated linearly and so may lie outside [lowest, highest].
     """
     if highest <= lowest:
         return lowest

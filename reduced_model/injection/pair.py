@@ -113,8 +113,8 @@ class Injections:
         )
 
     def _passed(self, opening: float, until: float) -> tuple[Record, float, float]:
-        """The pair some time after its valve has begun to open, s; fraction of the path up to which liquid
-        stands in the tube, and fill ratio that has left the driven chamber."""
+        """Record of the pair at `until`, s from the command to open; fraction of the path up to which liquid
+        stands in the tube; fill ratio that has left the driven chamber."""
         plant, before = self.dynamics.kept_plant(total=self.total), self.fill
         if self.chamber:
             before = self.total - self.fill
@@ -134,7 +134,7 @@ class Injections:
         if EVENTS[int(end["event"])] is Event.BLOCKED or moved == 0 or self.steady <= 0:
             return None
         if end["filled"] >= 0:
-            # Shut at the very instant, round-off would decide whether the tube is primed.
+            # If it closed at exactly this instant, round-off would decide whether the tube is primed.
             return float(end["filled"]) + _TIME_ERROR_S
         return max(self._filling_time, self._arrival)
 
@@ -183,7 +183,7 @@ class Injections:
     def dead_time(self, amount: float) -> float | None:
         """Dead time of the injection that moves a fill ratio, or of the shortest if that moves more, s.
 
-        Zero where the gas cannot move so much; None where what it has moved runs back with the valves shut.
+        Zero where the gas cannot move so much; None where the moved liquid runs back with the valves closed.
         """
         if self.shortest is None:
             return 0.0

@@ -32,7 +32,7 @@ from ringbalance.scene.platform.compiled import in_place, inlined
 _STAGES: Final = 4
 _GAMMA: Final = 0.57282
 _A: Final = np.array([[0.0, 0.0], [2.0, 0.0], [1.867943637803922, 0.2344449711399156]])
-"""Weights of earlier stages in the states of a stage; the last stage has the rates of the one before."""
+"""Weights of earlier stages in the states of a stage; the last stage takes the rates of the one before."""
 _C: Final = np.array(
     [
         [0.0, 0.0, 0.0],
@@ -204,8 +204,8 @@ def _solve(
 ) -> None:
     """Solve (d - J) k = r; the row of a stage holds r, then k.
 
-    Given the change of the velocity, the fill and both gases follow from their own rows, which leaves one
-    equation; `first` and `second` are what `_eliminate_gas` gives for the gases.
+    Fill and gases follow from the change of the velocity by their own rows, which leaves one equation.
+    Args: `first`, `second`: results of `_eliminate_gas` for both gases.
     """
     y, moves, per = motion.state, _moves(plant, motion), 1.0 / d
     x = w[stage, X] * per

@@ -98,7 +98,7 @@ class CalibratedLaw:
     heads: TubeHeads
     """Loss of the tube."""
     moment: CalibratedMoment
-    """The moment that goes with this law."""
+    """Moment of a pair that goes with this law."""
     gas_factor: float = 1.0
     """Gas pressure on the liquid over that at the point of measurement; all arguments are the latter."""
 

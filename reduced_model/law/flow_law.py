@@ -271,7 +271,7 @@ class CompleteLaw(FlowLaw, Protocol):
 
     @property
     def moment(self) -> MomentCurve:
-        """The moment that goes with the law."""
+        """Moment of a pair that goes with the law."""
         ...
 
     @property

@@ -82,7 +82,7 @@ class PaperLaw:
     ambient_pressure: float
     """Absolute, Pa."""
     moment: PaperMoment
-    """The moment that goes with this law."""
+    """Moment of a pair that goes with this law."""
     return_pressure: float | None = None
     """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa; None:
     no liquid returns, as in the paper."""
@@ -154,9 +154,8 @@ class PaperLaw:
 def paper_law(scene: AnyScene) -> PaperLaw:
     """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
 
-    The gas pressure counts as it is measured: Eq. 19 knows no gas column, and so not `gas.measured_at`.  What
-    the scene's tube lets run back with the gas off is the scene's, whatever the law: without a crest all of
-    it.
+    The gas pressure counts as measured: Eq. 19 has no gas column, so `gas.measured_at` has no effect.  With
+    the gas off the scene's tube decides what runs back, as under any law: without a crest all of it.
 
     Raises: SceneError: a balancer without liquid.
     Source: Eqs. 4 and 19; lambda = 72 mm.

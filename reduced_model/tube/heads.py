@@ -40,7 +40,7 @@ _ROUND_OFF: Final = 1e-15
 _LEVELLED: Final = 0.05
 """Largest fall of ln(head) that is levelled: a few percent, less than model errors change a head by."""
 _RISE: Final = 1e-9
-"""Slope d ln(head)/d ln u of a levelled head, below what tables resolve."""
+"""Slope d ln(head)/d ln u of a levelled head, too small for the tables to resolve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -182,7 +182,7 @@ def path_radius(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:
 
 
 def share_at_radius(*, tube: Tube, radius: float, far_leg: bool) -> float:
-    """Fraction s/L of the path where a leg passes a radius, or its end when it does not reach there.
+    """Fraction s/L of the path where a leg passes a radius, or of its end if it does not reach the radius.
 
     Raises: ValueError: a tube without a crest.
     """

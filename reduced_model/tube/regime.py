@@ -102,8 +102,8 @@ class TubePath:
     def return_pressure(self) -> float:
         """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa.
 
-        D_m + p_c, with the pressure p_c of a cavity: below, a full column over the crest parts.  Without a
-        crest nothing parts, and the chambers level out.
+        D_m + p_c, with the pressure p_c of a cavity: below it a full column separates at the crest.
+        Without a crest nothing separates, and the chambers level out.
         """
         if not self.crest:
             return 0.0
@@ -169,7 +169,7 @@ def cavity_bounds(path: Any, ends: Any) -> Any:
 
 @both_ways
 def cavity_pressure(path: Any, ends: Any) -> Any:
-    """Pressure of a cavity in a primed tube, Pa; over an open downstream port that of the gas there."""
+    """Pressure of a cavity in a primed tube, Pa; with an open downstream port that of the downstream gas."""
     low, high = cavity_bounds(path, ends)
     return low + path.released * (high - low)
 
@@ -188,7 +188,7 @@ def gas_over_crest(path: Any, ends: Any) -> Any:
 
 @both_ways
 def crest_margins(path: Any, ends: Any) -> Any:
-    """Crest pressure at rest less that of a primed tube's cavity, and less that of gas there, Pa.
+    """Crest pressure at rest less that of a primed tube's cavity, and less that of gas over the crest, Pa.
 
     The former drives a separated column in a primed tube, the latter in an unprimed one, if positive.
     """

@@ -129,7 +129,7 @@ class RunResult:
     unbalance: float
     """Unbalance of its rotor, kg m."""
     ended: str
-    """Code of the finding on what ended the run."""
+    """Code of the finding on the end of the run."""
     run: Any = None
     """The `Run`; None: it was not traced."""
     worst_amplitude: float = math.nan
@@ -220,7 +220,7 @@ class Demand:
     stated: bool
     """True if the scene states it; else it holds for every run."""
     amplitude: float | None = None
-    """Vibration at or below which a device counts as settled, m zero-to-peak, where [requirement] says so."""
+    """Vibration at or below which a device counts as settled, m zero-to-peak, if [requirement] has it."""
 
     def met(self, outcomes: Outcomes) -> BoolArray:
         """True for each device that meets the demand, shape (n,)."""

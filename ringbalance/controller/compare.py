@@ -157,7 +157,7 @@ class Comparison(Result):
 
     @property
     def succeeded(self) -> bool:
-        """True when both meet what is required of a fraction of devices."""
+        """True if both balancers meet the required fraction of devices."""
         return set(self.verdicts) == {MET}
 
     @property

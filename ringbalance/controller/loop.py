@@ -60,7 +60,7 @@ def simulate(
         sensor: default the scene's noise from the scene's seed.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
             default all that the scene gives numbers for.
-        residual_fill: of a driven chamber; the rest of an injection is lost there. Default the
+        residual_fill: fill of a driven chamber at which the rest of an injection is lost; default the
             fill at which gas enters the port.
         speed: factor on the law's velocity.
         noise: random numbers of the scene's sensor; default those of the scene's seed.

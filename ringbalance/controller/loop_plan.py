@@ -134,7 +134,7 @@ class LoopPlan:
 
         Args:
             plants: of the devices, type `PLANT`.
-            noise: noise of every device for at least a number of samples, as in `continue_runs`.
+            noise: function of a number of samples that gives `noise` of `continue_runs` for at least as many.
             traced: true if the trace is kept, of a single run.
             watch: called before each sample, as it may write into the run.
         Returns: that trace; else an empty one.

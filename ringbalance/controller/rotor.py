@@ -196,7 +196,7 @@ def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
 
 
 def _deviations(nominal: CommonRotor, rotor_of: _Drawn) -> Callable[[int], list[float]]:
-    """Deviations of a device's rotor by number: logarithms of ratios to what the scene says, and angles."""
+    """Deviations of a device's rotor by number: logarithms of ratios to the scene's values, and angles."""
 
     def of(number: int) -> list[float]:
         rotor = rotor_of(number)

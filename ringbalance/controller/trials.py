@@ -25,7 +25,7 @@ class SearchAxis:
     """Axis of a search."""
 
     name: str
-    """Name of what varies, such as the path of a key."""
+    """Name of the varied quantity, such as the path of a key."""
     levels: tuple[float, ...]
     """All levels that may be tried, increasing."""
     first: tuple[int, ...]

@@ -152,7 +152,7 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
     """Fills and gas of all chambers in time, and the vibration of the scene's rotor.
 
     Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack,
-        inputs that were fitted together, or a gas line that fills a chamber too fast to be followed.
+        inputs that were fitted together, or a gas line that fills a chamber too fast for a host's steps.
     """
     gas, half = scene.gas, scene.disc.chambers // 2
     terms = {FILLING: gas.conductance, LAG: gas.valve_lag}

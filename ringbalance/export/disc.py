@@ -104,7 +104,7 @@ def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:
 
 
 def keep_primed(w: Query, flag: int) -> None:
-    """Keep if the tube holds a continuous column; while a parted one flows, that stays as it was."""
+    """Record if the tube holds a continuous column; unchanged while a separated column flows."""
     if w[PRIMED_AFTER] != 0.0:
         w[flag] = 1.0
     elif w[REGIME] == BLOCKED:
@@ -129,7 +129,7 @@ def set_rates(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None
 
 
 def take(w: Query, at: int, weight: float, time: float) -> None:
-    """Count rates, and go to where they lead in a time from the beginning of a part."""
+    """Add weighted rates to their sum, and set the state that they give a time after a part's beginning."""
     i = 0
     while i < STATES:
         w[SUM + i] = w[SUM + i] + weight * w[RATES + i]

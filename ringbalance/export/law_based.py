@@ -120,7 +120,7 @@ def pair_moment(c: Law, k: Cells, p: Pieces, fill: float) -> float:
 
 
 def set_moment(c: Law, k: Cells, p: Pieces, w: Query) -> None:
-    """The disc's moment, kg m, with the liquid where it is followed to, and each pair's change."""
+    """Set the disc's moment, kg m, with the liquid as estimated, and the change expected of each pair."""
     d = int(c[BLOCK])
     r = memory(c)
     w[r + NOW_X] = 0.0

@@ -29,13 +29,13 @@ DEVIATIONS, NEARER = 9.0, 9.0
 
 @both_ways
 def change_of(r: int, pair: int) -> int:
-    """Place of what is asked of a pair."""
+    """Index of a pair's numbers."""
     return r + FIRST_CHANGE + PER_CHANGE * pair
 
 
 @both_ways
 def set_should(m: Query, r: int, pair: int, moment: float, opened: bool) -> None:
-    """Change that a pair's moment should have made, kg m: as the liquid is followed, or as asked of a try."""
+    """Set the expected change of a pair's moment, kg m: by the estimated liquid, or as requested of a try."""
     at = change_of(r, pair)
     m[at + SHOULD] = 0.0
     if opened:
@@ -46,7 +46,7 @@ def set_should(m: Query, r: int, pair: int, moment: float, opened: bool) -> None
 
 @both_ways
 def distance(m: Query, r: int, ux: float, uy: float) -> float:
-    """Square of how far the vibration's change is from that by a change of the moment, m^2."""
+    """Squared difference of the vibration's change from that expected of a change of the moment, m^2."""
     x = m[r + SEEN_X] - m[r + LAST_X] - (m[r + LEARNT_X] * ux - m[r + LEARNT_Y] * uy)
     y = m[r + SEEN_Y] - m[r + LAST_Y] - (m[r + LEARNT_X] * uy + m[r + LEARNT_Y] * ux)
     return x * x + y * y
@@ -103,7 +103,7 @@ def see_response(m: Query, r: int, half: int, amplitude_square: float, phase_squ
 
 @both_ways
 def set_bounds(m: Query, r: int, pair: int, now: float, least: float, most: float) -> None:
-    """Bounds of a pair's change by its moments, kg m; in the sense in which it gave nothing there is none."""
+    """Set the bounds of a pair's change by its moments, kg m; zero in the sense in which it gave nothing."""
     at = change_of(r, pair)
     m[at + LOWEST_CHANGE] = least - now
     m[at + HIGHEST_CHANGE] = most - now
@@ -169,7 +169,7 @@ def learn(
 
 @both_ways
 def shared(m: Query, before: int, sign: float, after: int, after_sign: float, x: float, y: float) -> bool:
-    """Split a vector over two pairs if it is between their directions, each with a sign; true if it is."""
+    """Split a vector over two pairs if it lies between their signed directions; true if it does."""
     ax = sign * m[before + AXIS_X]
     ay = sign * m[before + AXIS_Y]
     bx = after_sign * m[after + AXIS_X]

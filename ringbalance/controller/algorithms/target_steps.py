@@ -1,6 +1,6 @@
 """The target-vector controller in time, in + - * / sqrt and comparisons alone.
 
-`c` holds its settings, `w` its memory with its inputs and outputs; the names below are places in them.  It
+`c` holds its settings, `w` its memory with its inputs and outputs; the names below are indices into them.  It
 samples the vibration as soon as its wait is over, answers with the time that each valve is to stay open, and
 waits for the longest of these and one period more.  The program's loop compiles `sample`, an export
 translates all, see `reduced_model.pieces.point`; the phase enters by the components of the vibration.
@@ -38,7 +38,7 @@ OF_LONGEST, OF_NOISE, OF_EXPECTED = 0.5, 12.0, 0.1
 
 @both_ways
 def direction(c: Law, chamber: int) -> int:
-    """Place of a chamber's direction; chambers are counted on, a round below zero and a round above."""
+    """Index of a chamber's direction; chamber numbers wrap, at most one round below or above."""
     count = int(c[CHAMBERS])
     at = chamber
     if at < 0:
@@ -147,7 +147,7 @@ def see_response(c: Law, w: Query) -> None:
 
 @both_ways
 def nearest(c: Law, x: float, y: float) -> int:
-    """The chamber before a direction, next to which it lies."""
+    """First of the two neighbouring chambers between which a direction lies."""
     next_before = 0
     best = -2.0
     chamber = 0
@@ -189,7 +189,7 @@ def split(c: Law, w: Query, x: float, y: float, time: float) -> None:
 
 @both_ways
 def set_wanted(c: Law, w: Query, amplitude: float) -> None:
-    """Open time of the vector, s, by a PID on the amplitude; the integral stands still where it is cut."""
+    """Open time of the vector, s, by a PID on the amplitude; its integral is held while that is limited."""
     w[WANTED] = c[GAIN] * amplitude
     if w[HAS_BEFORE] == 0.0 or not w[SINCE] > 0.0:
         return

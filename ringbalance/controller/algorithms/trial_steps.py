@@ -1,6 +1,6 @@
 """The trial controller in time, in + - * / sqrt and comparisons alone; used as `target_steps` is.
 
-`c` holds its settings, `w` its memory with its inputs and outputs; the names below are places in them.  It
+`c` holds its settings, `w` its memory with its inputs and outputs; the names below are indices into them.  It
 reads the amplitude of the vibration alone.
 """
 

@@ -155,7 +155,7 @@ def judged(
 def best_of(
     balancer: Balancer, settings: Sequence[Settings], *, progress: Callable[[str], None] | None = None
 ) -> Settings:
-    """Choose the settings that serve most devices, apart from those of verdicts; the first of equals."""
+    """Choose the settings that serve most devices, on other devices than verdicts; the first of equals."""
     if len(settings) == 1:
         return settings[0]
     few = balancer.verdict_draws[0]

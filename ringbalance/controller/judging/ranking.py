@@ -54,7 +54,7 @@ class Deciding:
     measure: str
     """Code of the finding that says what to measure; empty: nothing can be measured."""
     middle: Proportion
-    """Fraction that meets every demand, of the devices with the input in the middle half of its range."""
+    """Fraction that meets every demand, of the devices with the input in its interquartile range."""
 
     @property
     def decides(self) -> bool:

@@ -105,7 +105,7 @@ def tried_remedies(
 
     The alternatives of one kind are tried in order of increasing change, until one meets the requirement, no
     device meets it, or significantly fewer do than before; where no device of the unchanged scene does, the
-    first kind that meets it is the last.  Where no remedy is enough by itself, the best two are tried
+    first kind that meets it is the last tried.  Where no remedy is enough by itself, the best two are tried
     together.  The best, and all that meet, are then judged on devices on which nothing was chosen.
 
     Args: `unchanged`: judgement of the best settings of the unchanged scene. `search`: finds settings.

@@ -4,9 +4,9 @@ Gas for a time T into a chamber of fill x moves (S/V) u T of fill to the opposit
 changes by b T with b = kappa |dM/dx| (S/V) u, M the moment of the pair along x + x_opposite = const: that is
 kappa lambda rho S u.  The controller commands T = Kc e along the residual, so a residual e becomes
 e (1 - h exp(j d)) with h = Kc b and d the error of the assumed lag angle.  It shrinks for h < 2 cos d and
-turns round from h = 1 / cos d on.  b differs from pair to pair, and with the chamber of a pair that is
-driven.  A residual that turns round is driven by both in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2,
-so the mean of both counts; of all pairs the largest.
+reverses from h = 1 / cos d on.  b differs between pairs, and between the two chambers of a pair.  A residual
+that reverses is corrected by both chambers in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2, so the mean
+of both counts; of all pairs the largest.
 
 `loop_information` gives all results on the loop that need no run.
 """

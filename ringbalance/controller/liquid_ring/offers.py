@@ -237,7 +237,7 @@ def _of_crest(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
     if held.largest_hump_radius is None or (held.holds and lifted):
         return
     for factor in _CRESTS:
-        # Rounded down to a tenth of a millimetre: a crest there holds.
+        # Rounded down to a tenth of a millimetre, where a crest holds the liquid.
         radius = math.floor(1e4 * factor * held.largest_hump_radius * (1 + 1e-12)) / 1e4
         path = shortest_path(
             port_radius=tube.port_radius,

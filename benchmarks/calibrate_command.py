@@ -1,6 +1,6 @@
 """User CPU time of `ringbalance calibrate` on the paper's disc, over that of `import scipy.optimize`.
 
-Both are whole processes that take turns, so that a busy machine slows them alike; the medians count.
+Both are whole processes, run alternately so that a busy machine slows both equally; medians are compared.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def user_time(arguments: tuple[str, ...]) -> float:
 
 
 def main() -> None:
-    """Measure in turns and print the medians and their ratio."""
+    """Measure alternately and print the medians and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repetitions", type=int, default=15)
     repetitions = parser.parse_args().repetitions

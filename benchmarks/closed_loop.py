@@ -1,17 +1,17 @@
-"""Noisy closed-loop runs with all terms of an injection, beside scipy's solve_ivp; more and more of them.
+"""Noisy closed-loop runs with all terms of an injection, compared with scipy's solve_ivp; growth with their
+number.
 
     python benchmarks/closed_loop.py [--json] [--repeats 3] [--members 1000] [--largest 8000]
 
 Both sides carry out the whole target-vector loop of the paper's disc under the calibrated law: noisy samples,
-two valves a command, and the motion of every pair that was driven.  The rival is what one would write
-oneself: a plain Python loop with the injections of `moving_injection`, solve_ivp with events, by the method
-and tolerance that is fastest over the injections of a run among those that keep each fill within 1e-6.  It
-takes for granted that a pair is at rest and vented at the next sample, keeps no record and looks after no
-residual fill.  Ours are drawn devices, each with a law, a rotor and noise of its own, which
-are made for it, and all of that.  Before the time is taken, a run without noise must agree; the error of
-their fills is shown.
-Times are of the processor, with one thread, the least of several rounds; the growth is measured after
-everything has been compiled, so that the peak memory of the process shows what more of them add.
+two valves a command, and the motion of every driven pair.  The rival is a plain user script: a Python loop
+with the injections of `moving_injection`, solve_ivp with events, by the method and tolerance that is fastest
+over the injections of a run among those that keep each fill within 1e-6.  The rival assumes that a pair is at
+rest and vented at the next sample, keeps no record and ignores residual fills.  The program runs drawn
+devices, each with its own law, rotor and noise, including the time to draw them, and does all that the rival
+leaves out.  Before timing, runs without noise must agree; the error of their fills is printed.
+Times are processor times of one thread, the least of several rounds; the growth is measured after everything
+has been compiled, so that the peak memory of the process shows the memory of further devices.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ from ringbalance.scene.models import Scene
 GAIN = 0.3
 """Fraction of the paper's gain, which suits the paper's own law; the calibrated law moves more liquid."""
 TIME_LIMIT = 20.0
-"""s, of a run: some 40 samples."""
+"""Time limit of a run, s: some 40 samples."""
 JUDGED = 20
 """Injections of a run by which the rival's method is chosen."""
 RIVAL_RUNS = 2
 END_ERROR = 1e-9
-"""m, of a run's last amplitude: some of its fills are within 1e-6."""
+"""Largest error of a run's last amplitude, m: its fills are within 1e-6."""
 
 
 FIRST_CALL = """
@@ -67,7 +67,7 @@ print(time.process_time() - start)
 
 @dataclass(kw_only=True)
 class Carried:
-    """Injections by solve_ivp for the plain loop, with a list of what was asked for."""
+    """Injections by solve_ivp for the plain loop, with a list of the requested ones."""
 
     rival: Rival
     total: float
@@ -82,9 +82,9 @@ class Carried:
 
 
 def plain_run(scene: Scene, model: BalancerModel, plain: Carried, seed: int) -> tuple[complex, int]:
-    """One target-vector run as one would write it oneself.
+    """One target-vector run by a plain loop.
 
-    Args: `plain`: carries an operation through. `seed`: of the noise.
+    Args: `plain`: computes an injection. `seed`: of the noise.
     Returns: Vibration at the end, m, and the number of samples.
     """
     settings, sensor, random = scene.controller, scene.sensor, np.random.default_rng(seed)
@@ -139,7 +139,7 @@ def _pid(
 def _gas(
     scene: Scene, plain: Carried, fills: list[float], wanted: float, phase: float, remaining: float
 ) -> float:
-    """Drive the two chambers and return how long the gas was on."""
+    """Drive the two chambers and return the longest valve-open time, s."""
     settings, half, longest = scene.controller, len(fills), 0.0
     length = min(max(wanted, 0.0), settings.maximum_gas_time)
     angle = phase + settings.assumed_lag_angle
@@ -177,7 +177,7 @@ def fastest(rival: Rival, dynamics: Dynamics, targets: list[tuple[float, float]]
 
 
 def check_same(scene: Scene, model: BalancerModel, carried: Carried) -> None:
-    """Make sure that both sides do the same work. Raises: RuntimeError: they do not end alike."""
+    """Check that both sides do the same work. Raises: RuntimeError: their final amplitudes differ."""
     still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
     end, _ = plain_run(still, model, carried, 0)
     (single,) = LiquidRingBalancer(still).run({}, AS_GIVEN).final_amplitude
@@ -187,13 +187,13 @@ def check_same(scene: Scene, model: BalancerModel, carried: Carried) -> None:
 
 
 def rival_run(scene: Scene, model: BalancerModel, carried: Carried) -> None:
-    """Some noisy runs."""
+    """Compute `RIVAL_RUNS` noisy runs of the rival."""
     for seed in range(RIVAL_RUNS):
         plain_run(scene, model, carried, seed)
 
 
 def growth(ensemble: Callable[[int], object], *, first: int, largest: int) -> list[dict[str, float]]:
-    """Ensembles that double up to the largest. Args: `ensemble`: runs so many members."""
+    """Time and memory of ensembles that double up to the largest. Args: `ensemble`: runs so many members."""
     results, size = [], first
     while size <= largest:
         used = time.process_time()
@@ -205,7 +205,7 @@ def growth(ensemble: Callable[[int], object], *, first: int, largest: int) -> li
 
 
 def compile_seconds() -> list[float]:
-    """Processor time, s, of a machine's first run, compiling, and of the first of a later process."""
+    """Processor time, s, of a machine's first run, which compiles, and of a later process's first run."""
     with tempfile.TemporaryDirectory() as folder:
         environment = os.environ | {"NUMBA_CACHE_DIR": folder}
         call = partial(subprocess.run, env=environment, capture_output=True, text=True, check=True)
@@ -213,7 +213,7 @@ def compile_seconds() -> list[float]:
 
 
 def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
-    """All that is measured. Returns: a document for json."""
+    """All measurements. Returns: A document for JSON."""
     scene = piped_scene()
     gain = GAIN * scene.controller.proportional
     scene = replace(

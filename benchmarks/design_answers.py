@@ -1,10 +1,10 @@
-"""Designs that `ringbalance design` finds, beside the best of a whole grid; and problems without any.
+"""Designs by `ringbalance design`, compared with the best of a whole grid; and problems without a solution.
 
 python benchmarks/design_answers.py [PROBLEM ...]
 
-A grid's step in size is at most 2 %.  Its points are tried the smallest first, each with all settings that
-are tried at first and those that `tune` finds, until one meets what is required; where the disc does not
-change, all of them, for the least gas.
+A grid's step in size is at most 2 %.  Its points are tried from the smallest, each with all initial
+settings and those that `tune` finds, until one meets the requirement; where the disc is fixed, all points are
+tried, for the least gas.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ringbalance.results.requirements import MET
 from ringbalance.scene.models import Scene
 
 NEAR: Final = 0.05
-"""Below the fraction asked for, up to which a point of the grid is judged on more devices."""
+"""Distance below the required fraction up to which a point of the grid is judged on more devices."""
 MEDIUM: Final = {"gas.conductance": "0.8 l/(s*bar)", "gas.critical_ratio": 0.28, "gas.valve_lag": "12 ms"}
 LARGE: Final = {"gas.conductance": "1.5 l/(s*bar)", "gas.critical_ratio": 0.36, "gas.valve_lag": "20 ms"}
 OPEN: Final = dict.fromkeys(("outer_radius", "axial_width", "pressure", "valves"))
@@ -36,12 +36,12 @@ OPEN: Final = dict.fromkeys(("outer_radius", "axial_width", "pressure", "valves"
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """The bundled spindle that looks for its balancer, with other things to choose from."""
+    """The bundled spindle design with other ranges to choose from."""
 
     vary: tuple[str, ...]
     changes: Mapping[str, Any] = field(default_factory=dict)
     stands: str = ""
-    """Beginning of the code of the finding that rules out every design; empty: there is one."""
+    """Prefix of the code of the finding that rules out every design; empty: a design exists."""
 
     @property
     def scene(self) -> Scene:
@@ -99,7 +99,7 @@ PROBLEMS: Final = {
 
 
 def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
-    """Points of a grid that meet what is required, with the median of their gas, J."""
+    """Points of a grid that meet the requirement, with the median gas energy, J."""
     required_fraction = balancer_of(space.scene).required_fraction()
     for point in points:
         first = race(
@@ -117,7 +117,7 @@ def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
 
 
 def best_of_grid(space: Space) -> tuple[float, Point] | None:
-    """Size, m^3, or gas, J, of the best point of the grid; None: none meets what is required."""
+    """Size, m^3, or gas, J, of the best point of the grid; None: none meets the requirement."""
     grid = [
         {path: rounded(value) if isinstance(value, float) else value for path, value in each.items()}
         for each in Plan(axes=space.axes).points()
@@ -131,11 +131,11 @@ def best_of_grid(space: Space) -> tuple[float, Point] | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """One problem."""
+    """Result of one problem: design of the search, and best design of the grid."""
 
     name: str
     value: float | None
-    """Size, m^3, or gas, J; None: no design meets what is required."""
+    """Size, m^3, or gas, J; None: no design meets the requirement."""
     grid: float | None
     """Value of the grid's best design."""
     codes: tuple[str, ...]
@@ -146,7 +146,7 @@ class Compared:
 
     @property
     def beyond(self) -> float:
-        """By how much the design is worse than the grid's best, relative; infinite for one that is wrong."""
+        """Relative excess of the design over the grid's best; infinite for a wrong answer."""
         if self.value is not None and self.grid is not None:
             return self.value / self.grid - 1
         named = any(code.startswith(PROBLEMS[self.name].stands) for code in self.codes)
@@ -154,7 +154,7 @@ class Compared:
 
     @property
     def text(self) -> str:
-        """A line."""
+        """Line of output."""
         answer = self.codes[0] if self.value is None else f"{self.value:.4g}"
         best = "none" if self.grid is None else f"{self.grid:.4g}"
         times = f"{self.seconds:.1f} s, grid {self.grid_seconds:.1f} s of processor time"

@@ -1,10 +1,10 @@
-"""Spread of the answers of `ringbalance design`: the bundled spindle, with six things open, from several
-starts of the search, and with other drawn devices.
+"""Spread of the results of `ringbalance design`: the bundled spindle with six free quantities, from several
+starts of the search and with different drawn devices.
 
 python benchmarks/design_spread.py [STARTS [SEEDS]]
 
-A start is the seed of the points that are tried, a seed that of the drawn devices (`run.seed`).  Each answer
-is checked on devices that no step of its search has seen.
+A start is the seed of the tried points; a seed is that of the drawn devices (`run.seed`).  Each design is
+checked on devices that no step of its search used.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ringbalance.design.designing import run_design
 from ringbalance.results.result import Presentation
 
 CHECKED: Final = 4096
-"""Further devices on which an answer is checked."""
+"""Further devices on which a design is checked."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +33,13 @@ class Answer:
     seed: int
     design: rb.Design
     fraction: float
-    """Fraction of the further devices."""
+    """Fraction of the further devices that meet the requirement."""
     seconds: float
     """Processor time of the search."""
 
     @property
     def text(self) -> str:
-        """A line."""
+        """Line of output."""
         point = self.design.point
         keys = (
             f"bore {1e3 * point['tube.bore']:.3g} mm, {point['gas.pressure'] / 1e6:.3g} MPa, "
@@ -65,7 +65,7 @@ def answer(start: int, seed: int) -> Answer:
 
 
 def main(starts: int = 4, seeds: int = 4) -> None:
-    """Print every answer, and how far they lie apart."""
+    """Print every result, and largest over smallest size."""
     for pairs in ([(start, 0) for start in range(starts)], [(0, seed) for seed in range(1, seeds)]):
         sizes = []
         for start, seed in pairs:

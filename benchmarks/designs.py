@@ -1,4 +1,4 @@
-"""Designs that the core answers: their rate as the batch grows, and beside one row at a time in the same run.
+"""Rate of designs in batches of growing size, compared with one design at a time in the same run.
 
 `python benchmarks/designs.py`; with `--json` for a program.
 """
@@ -25,14 +25,14 @@ from ringbalance.scene.models import Scene
 
 SIZES = (1, 10, 100, 1000, 10_000, 50_000)
 SINGLE = 30
-"""Designs that are answered one at a time."""
+"""Number of designs evaluated one at a time."""
 SIDED = 500
-"""Designs that are answered with both sides of their inputs."""
+"""Number of designs evaluated with both sides of their inputs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rate:
-    """Number of designs in one batch."""
+    """Size of one batch and its rate."""
 
     designs: int
     processor_seconds: float
@@ -81,7 +81,7 @@ def seconds(function: Callable[[], object]) -> float:
 
 
 def with_sides(designs: Designs, step: float = 0.01) -> Designs:
-    """Each design and both sides of each of its numbers that differ between them: 2 m + 1 rows a design."""
+    """Each design with both sides of each of the m numbers that differ between designs: 2 m + 1 rows each."""
     keys = [(table, key) for table, names in designs.varied.items() for key in names]
     values = {}
     for index, (table, key) in enumerate(keys):

@@ -3,8 +3,8 @@
 The whole run of 250 s in steps of 1 ms, with sensors, both filters, supervisor, regulator and the plant's
 stick and slip, is timed compiled (best of three, after the compiler has done its work).  The first few
 seconds are also run with numba switched off, in a child process: the same functions on the same NumPy arrays,
-step by step.  Compared is the time per step over that stretch, what a run of ten steps takes being taken off
-on both sides.  Times are processor times, of one thread.  Importing the package must not load the compiler.
+step by step.  The times per step over those seconds are compared, on both sides without the time of a run of
+ten steps.  Times are processor times, of one thread.  Importing the package must not load the compiler.
 
     python benchmarks/eccentric_mass.py [--stretch 4] [--json]
 """
@@ -28,9 +28,9 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, 
 from ringbalance.scene import bundled_scene, load_scene
 
 LONGEST = 1.0
-"""Time that the whole run may take, s."""
+"""Longest accepted time of the whole run, s."""
 LEAST_RATIO = 50.0
-"""Ratio of plain to compiled time per step."""
+"""Least accepted ratio of uncompiled to compiled time per step."""
 
 
 def paper_run_up(time_limit: float | None = None) -> EccentricScene:
@@ -50,7 +50,7 @@ def best(scene: EccentricScene, repeats: int) -> tuple[float, EccentricRun]:
 
 
 def plain(stretch: float) -> dict[str, float]:
-    """Time a stretch with numba switched off, in a process of its own.
+    """Time the first seconds with numba switched off, in a separate process.
 
     Args: `stretch`: simulated time, s.
     Returns: Its time and what the rotor does at the end.
@@ -69,7 +69,7 @@ def import_loads_the_compiler() -> bool:
 
 
 def stretch_times(stretch: float, repeats: int) -> dict[str, float]:
-    """Time a stretch, as this process runs functions, without what a run of ten steps takes.
+    """Time the first seconds, as this process runs functions, without the time of a run of ten steps.
 
     Args: `stretch`: simulated time, s. `repeats`: runs, of which the best counts.
     Returns: Its time per step and what the rotor does at the end.
@@ -84,8 +84,8 @@ def stretch_times(stretch: float, repeats: int) -> dict[str, float]:
 def measure(stretch: float) -> dict[str, float | bool | str]:
     """Time everything.
 
-    Args: `stretch`: simulated time that the plain functions are given, s.
-    Returns: Times, their ratio, and whether both sides did the same.
+    Args: `stretch`: simulated time of the uncompiled functions, s.
+    Returns: Times, their ratio, and whether both sides agree.
     """
     begin = time.process_time()
     simulate_eccentric(paper_run_up(0.01))

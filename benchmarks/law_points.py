@@ -1,7 +1,7 @@
-"""Time of the law at one point and a point in arrays, beside cubic pieces of scipy's that invert one head.
+"""Time of the law at one point, and per point of arrays, beside scipy's cubic pieces that invert one head.
 
-`python benchmarks/law_points.py`: microseconds of processor time a point. scipy's are what a law of one's own
-costs at the least: one velocity from one head, without chambers, regimes and half-widths.
+`python benchmarks/law_points.py`: microseconds of processor time a point. scipy's time is the least of a
+user's own law: one velocity from one head, without chambers, regimes and half-widths.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MANY = 100_000
 
 
 def seconds(call: Callable[[], object], *, times: int) -> float:
-    """Seconds of processor time of one call, the smallest of five rounds."""
+    """Processor time of one call, s, the smallest of five rounds."""
     call()
     durations = []
     for _ in range(5):

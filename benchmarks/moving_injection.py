@@ -1,12 +1,12 @@
-"""One injection with inertia, gas filling, venting and valve lag, beside scipy's solve_ivp.
+"""One injection with inertia, gas filling, venting and valve lag, compared with scipy's solve_ivp.
 
     python benchmarks/moving_injection.py [--json] [--repeats 5]
 
-Both sides model the same: the column's mass, its lift along the crest, the spill until the tube is primed,
-separation, and the gas of both chambers through an ISO 6358 line.  The rival is what one would write oneself
-with the calibrated law's own tables: phases that end at events, at the loosest tolerance that keeps the fill
-within 1e-6, by the fastest of the methods tried.  Ours is the compiled march of an ensemble's member at its
-own tolerance, and must keep the fill within the same 1e-6.
+Both sides have the same model: the column's mass, its rise to the crest, the spill until the tube is primed,
+separation, and the gas of both chambers through an ISO 6358 line.  The rival is a plain user script
+with the tables of the calibrated law: phases that end at events, at the loosest tolerance that keeps the fill
+within 1e-6, by the fastest of the methods tried.  The program uses the compiled integration of an ensemble's
+member at its own tolerance, and must keep the fill within the same 1e-6.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ from ringbalance.scene.platform.compiled import in_place
 FILL_ERROR = 1e-6
 WANTED = 1000.0
 DURATIONS = (0.03, 0.06, 0.2)
-"""s."""
+"""Valve-open times, s."""
 TAIL = 0.5
-"""s, until the next sample."""
+"""Time until the next sample, s."""
 BATCH = 2000
 METHODS = ("RK45", "DOP853", "LSODA", "Radau")
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
@@ -55,7 +55,7 @@ Y = FloatArray
 
 
 class Rival:
-    """A pair of equal fills by solve_ivp: rest, lift, spill and flow, each to the event that ends it."""
+    """A pair of chambers by solve_ivp: rest, lift, spill and flow, each to the event that ends it."""
 
     def __init__(self, scene: Scene, model: BalancerModel) -> None:
         assert isinstance(model.flow, CalibratedLaw)
@@ -105,7 +105,7 @@ class Rival:
         return min(float(full), (margin - upper) / (rho * self.upstream))
 
     def lift(self, y: Y, begun: float) -> float:
-        """Acceleration of liquid that the gas has to lift to the crest's end first."""
+        """Acceleration of liquid that the gas still lifts to the end of the crest, m/s^2."""
         front = self.place(y, begun)
         loss = self.law.density * float(roots_of(self.hump, max(y[1], 1e-12))) ** 8
         loss *= self.entrance + (1 - self.entrance) * front / self.span[1]
@@ -114,11 +114,11 @@ class Rival:
         return (self.margins(y)[1] + height - loss) / (self.law.density * front * self.scene.tube.length)
 
     def place(self, y: Y, begun: float) -> float:
-        """Fraction of the path that liquid has filled since the chamber's fill was `begun`."""
+        """Fraction of the path filled with liquid since the chamber's fill was `begun`."""
         return self.risen + float(begun - y[0]) / self.hold_up
 
     def set_out(self, y: Y) -> None:
-        """Front and velocity of a leg that has risen with the gas: y'' = A y^2 + B t, from the balance on."""
+        """Set front and velocity of a leg risen with the gas: y'' = A y^2 + B t, from the balance on."""
         volume = (1 - y[0]) * self.model.chamber_volume
         rate = self.gas_flow(y[2], self.ambient + self.scene.gas.pressure) / volume
         leg = self.span[0] * self.scene.tube.length
@@ -183,7 +183,7 @@ class Rival:
         end, ended = results.y[:, -1], results.t_events[0].size > 0
         further = len(results.t_events) > 1 and results.t_events[1].size > 0
         if stage == LIFTS and (ended or further):
-            # What lies before the middle of the crest falls back.
+            # Liquid short of the middle of the crest falls back.
             end[0] = begun - max(self.place(end, begun) - sum(self.span) / 2, 0.0) * self.hold_up
         if ended:
             end[1] = 0.0
@@ -207,7 +207,7 @@ def _inject(  # type: ignore[no-untyped-def]
 
 
 def ours(dynamics: Dynamics, duration: float, *, error: float, count: int, fill: float = 0.25) -> float:
-    """Fill after the same, `count` times over."""
+    """Fill after the program's injection and tail, repeated `count` times."""
     plant = dynamics.plant(total=0.5, relative_error=error)
     motions = np.repeat(at_rest(plant, fill=fill), 2)
     return float(_inject(plant[0], motions, duration, TAIL, count, np.zeros(WORKSPACE)))
@@ -224,7 +224,7 @@ def least(function: Callable[[], object], repeats: int) -> float:
 
 
 def rival_seconds(rival: Rival, duration: float, exact: float, repeats: int) -> tuple[float, str, float]:
-    """Time of the fastest method at its loosest tolerance that is exact enough, its name, its tolerance."""
+    """Time of the fastest method at its loosest sufficient tolerance, s, its name and its tolerance."""
     best = (math.inf, "", 0.0)
     for method in METHODS:
         for tolerance in TOLERANCES:
@@ -241,7 +241,7 @@ def rival_seconds(rival: Rival, duration: float, exact: float, repeats: int) -> 
 
 
 def piped_scene() -> Scene:
-    """The paper's disc with a gas line and valve of its own."""
+    """The paper's disc with a gas line and a valve."""
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
     return replace(scene, gas=replace(scene.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=5e-3))
 

@@ -1,8 +1,8 @@
-"""The program beside OpenFOAM: the turning tube, straight and bent, and waves on the ring.
+"""The program compared with OpenFOAM: the rotating tube, straight and bent, and waves on the ring.
 
     python benchmarks/openfoam.py [--out out/openfoam] [--only tube bend turbulent waves] [--keep]
 
-Needs Debian's package `openfoam` (1912), which nothing else does.  Every quantity is computed on three
+Needs Debian's package `openfoam` (1912), which is used only here.  Every quantity is computed on three
 meshes; its uncertainty is that of the grid convergence index, and the two agree when their difference is
 within both uncertainties.  `--keep` writes the results, dated, to benchmarks/openfoam.json and
 docs/beside-openfoam.md.
@@ -62,9 +62,9 @@ KEPT = HERE / "openfoam.json"
 PAGE = HERE.parent / "docs" / "beside-openfoam.md"
 FORMAL_ORDER = 2.0
 LAMINAR = ((1e4, 0.5), (1e5, 0.5))
-"""Kl = R Re and S = R/Re."""
+"""Pairs of Kl = R Re and S = R/Re."""
 TURBULENT = ((1e4, 0.0), (1e4, 2356.0), (2e4, 2356.0))
-"""Re and R; 2356 is water in the paper's tube."""
+"""Pairs of Re and R; R = 2356 is water in the paper's tube."""
 FILLS = (0.25, 0.45)
 STEPS, WRITES, RAMP, TURNS, PUSH = 150, 25, 9.0, 14.0, 0.4
 
@@ -84,20 +84,20 @@ class Row:
 
     quantity: str
     openfoam: float
-    """On the finest mesh."""
+    """OpenFOAM's value on the finest mesh."""
     on_meshes: tuple[float, ...]
-    """Coarse to fine."""
+    """OpenFOAM's values, coarse to fine."""
     openfoam_half_width: float
-    """95 %, of the cells alone."""
+    """Expanded uncertainty (95 %) of OpenFOAM's value, of discretisation alone."""
     ringbalance: float
     ringbalance_half_width: float
-    """95 %, of all that is uncertain in the program's answer."""
+    """Expanded uncertainty (95 %) of the program's value, all causes included."""
     seconds: float
     """Processor time of OpenFOAM's finest mesh."""
     ringbalance_seconds: float
     """Processor time of the program's answer."""
     cells: tuple[int, ...]
-    """Along one length, coarse to fine: around a quarter of the section, or around the chamber."""
+    """Cells along one length, coarse to fine: around a quarter of the section, or around the chamber."""
 
     @property
     def agrees(self) -> bool:
@@ -110,7 +110,7 @@ def row(
     *, quantity: str, values: Sequence[float], cells: Sequence[int], ours: Answer,
     seconds: float,
 ) -> Row:  # fmt: skip
-    """From the values of three meshes, coarse to fine, with numbers of cells along one length."""
+    """Row from the values of three meshes, coarse to fine, with numbers of cells along one length."""
     sizes = [1 / count for count in cells[::-1]]
     results = gci(values=list(values)[::-1], sizes=sizes, formal_order=FORMAL_ORDER, round_off=1e-6)
     return Row(
@@ -123,7 +123,7 @@ def row(
 
 
 def tube(_: Scene, out: Path) -> Iterator[Row]:
-    """Laminar friction of the straight turning tube over that at rest."""
+    """Laminar friction of the straight rotating tube over that at rest."""
     for kl, s in LAMINAR:
         reynolds = (kl / s) ** 0.5
         rotation = s * reynolds
@@ -152,7 +152,7 @@ def _solved_section(reynolds: float, rotation: float) -> Answer:
 
 
 def bend(scene: Scene, out: Path) -> Iterator[Row]:
-    """Loss over two bends of a turning tube, against the kept solution in three dimensions."""
+    """Loss over two bends of a rotating tube, compared with the stored three-dimensional solution."""
     start, end = 2.0, 20.0
     rotation = rotation_reynolds_number(
         angular_velocity=scene.rotor.speed, bore=scene.tube.bore, kinematic_viscosity=VISCOSITY_M2_S
@@ -177,7 +177,8 @@ def _refined(segments: Sequence[Segment], factor: float) -> list[Segment]:
 
 
 def _time_of_a_solve(scene: Scene, rotation: float) -> float:
-    """On the second of the three kept meshes, which errs by 0.4 %: about as OpenFOAM's finest does."""
+    """Processor time, s, of a solve on the second of three meshes, whose error of 0.4 % is about that of
+    OpenFOAM's finest."""
     begin = time.process_time()
     BentTubeFlow.of(
         segments=path_over_crest(scene, 1.5), cells=SectionMesh(around=2, across=3, wall_ratio=3.0),
@@ -187,7 +188,7 @@ def _time_of_a_solve(scene: Scene, rotation: float) -> float:
 
 
 def _kept_loss(start: float, end: float, *, seconds: float) -> Answer:
-    """Heavy case bent_tube_3d: loss between two places, and its share of the whole's uncertainty."""
+    """Loss between two arc lengths by heavy case bent_tube_3d, with its fraction of the total uncertainty."""
     stored = json.loads((HERE.parent / "reports/data" / PACKAGED).read_text(encoding="utf-8"))
     case = next(case for case in stored["verification"] if case["id"] == "bent_tube_3d")
     series = case["series"][0]
@@ -200,7 +201,7 @@ def _kept_loss(start: float, end: float, *, seconds: float) -> Answer:
 
 
 def turbulent(scene: Scene, out: Path) -> Iterator[Row]:
-    """Turbulent friction by the k-omega SST model, which was not made for a turning frame."""
+    """Turbulent friction by the k-omega SST model, which was not developed for a rotating frame."""
     smooth = replace(scene.tube, roughness=0.0, bends=())
     for reynolds, rotation in TURBULENT:
         around = (6, 8, 10)
@@ -227,7 +228,7 @@ def turbulent(scene: Scene, out: Path) -> Iterator[Row]:
 
 
 def waves(scene: Scene, out: Path) -> Iterator[Row]:
-    """Answer to gravity once a turn, and the lowest free frequencies, without plates."""
+    """Response to gravity at the rotation frequency, and the lowest free frequencies, without plates."""
     disc = replace(scene.disc, plate_thickness=0.0)
     cells = ((6, 36), (8, 48), (12, 72))
     for fill in FILLS:

@@ -1,7 +1,7 @@
-"""Writes OpenFOAM cases and runs its programs: dictionaries from mappings, meshes from hexahedra.
+"""Write OpenFOAM cases and run its programs: dictionaries from mappings, meshes from hexahedra.
 
 The programs are those of Debian's package `openfoam` (1912).  Meshes are written as a polyMesh, so that
-OpenFOAM may solve on the cells of this program or on any others made of hexahedra.
+OpenFOAM can solve on this program's cells or on any other hexahedra.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 
 PROGRAMS = ("SRFSimpleFoam", "pimpleFoam", "makeFaMesh")
 _DEBIAN = "/usr/share/openfoam"
-"""Folder in which Debian's package has what OpenFOAM's own shell setup would name."""
+"""Folder in Debian's package for the paths that OpenFOAM's own shell setup would set."""
 
 # Corners of a hexahedron's six faces, seen from outside counter-clockwise; corner order of VTK and OpenFOAM.
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -35,11 +35,11 @@ class HexMesh:
     points: FloatArray
     cells: IntArray
     patches: Mapping[str, tuple[IntArray, Mapping[str, Any]]]
-    """By name: the faces, each a row of four points in any order, and the entries of the boundary file."""
+    """Faces by name, each a row of four points in any order, and the entries of the boundary file."""
 
 
 def extruded(*, points: FloatArray, quads: IntArray) -> tuple[FloatArray, IntArray]:
-    """Points and cells of quadrilaterals repeated on levels.
+    """Points and hexahedra between copies of quadrilaterals on levels.
 
     Args: `points`: on every level, shape (levels, n, 3). `quads`: shape (m, 4), counter-clockwise seen from
         the next level.
@@ -56,9 +56,9 @@ def sides(*, edges: IntArray, count: int, slabs: int) -> IntArray:
 
 
 def write_mesh(*, folder: Path, mesh: HexMesh) -> None:
-    """The polyMesh: faces between cells by owner and neighbour, then those of each patch by owner.
+    """Write the polyMesh: faces between cells by owner and neighbour, then those of each patch by owner.
 
-    Raises: ValueError: a face of a patch that is none of the boundary's, or a boundary face in no patch.
+    Raises: ValueError: a face of a patch that is not on the boundary, or a boundary face in no patch.
     """
     corners = mesh.cells[:, np.array(_FACES)].reshape(-1, 4)
     cell = np.repeat(np.arange(len(mesh.cells)), 6)
@@ -125,12 +125,12 @@ def _word(value: Any) -> str:
 
 
 def vector(value: Sequence[float]) -> str:
-    """A vector as dictionaries have it."""
+    """A vector in the notation of dictionaries."""
     return _word(tuple(float(v) for v in value))
 
 
 def write_case(*, folder: Path, mesh: HexMesh, files: Mapping[str, Mapping[str, Any]]) -> None:
-    """A new case: the mesh, and dictionaries and uniform fields by their path; what was there is removed."""
+    """Write a new case: the mesh, and dictionaries and uniform fields by path; a previous case is removed."""
     shutil.rmtree(folder, ignore_errors=True)
     for path, entries in files.items():
         kind = entries.get("class", "dictionary")
@@ -171,7 +171,7 @@ class Run:
 
 
 def run(program: str, *, folder: Path) -> Run:
-    """One program of OpenFOAM on a case.
+    """Run one program of OpenFOAM on a case.
 
     Raises: RuntimeError: it failed; the text is the end of what it printed.
     """

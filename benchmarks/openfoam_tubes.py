@@ -1,6 +1,6 @@
 """The rotating tube in OpenFOAM: laminar and turbulent, straight; laminar with two bends.
 
-Lengths over the bore, velocities over the mean velocity; SRFSimpleFoam in the frame that turns.  A straight
+Lengths over the bore, velocities over the mean velocity; SRFSimpleFoam in the rotating frame.  A straight
 tube is one slab of cells between cyclic ends, driven to a mean velocity of one.
 """
 
@@ -145,7 +145,7 @@ def _driven() -> dict[str, Any]:
 def straight_tube(
     *, folder: Path, reynolds: float, rotation_reynolds: float, cells: tuple[int, int, float], turbulent: bool
 ) -> tuple[float, Run]:
-    """Friction factor (Darcy) of developed flow in the turning tube, and the run.
+    """Friction factor (Darcy) of developed flow in the rotating tube, and the run.
 
     Args: `rotation_reynolds`: R = omega d^2/nu. `cells`: as `swept_mesh` takes them. `turbulent`: by the
         k-omega SST model down to the wall.
@@ -156,7 +156,7 @@ def straight_tube(
     flat = {"type": "zeroGradient"}
     files = _common(
         omega=rotation_reynolds / reynolds, viscosity=1 / reynolds, residual=1e-8, turbulent=turbulent,
-        # Without rotation nothing moves across the tube, whose residual then is noise and ends no run.
+        # Without rotation there is no cross-flow; the residual of its equation is noise that ends no run.
         steps=4000 if turbulent else 20000,
     )  # fmt: skip
     files |= {
@@ -196,7 +196,7 @@ class BentRun:
     """Loss along a bent tube."""
 
     arc_length: FloatArray
-    """Over the bore, at the middle of every slab of cells."""
+    """Arc length over the bore, at the middle of every slab of cells."""
     head: FloatArray
     """Reduced pressure and carried kinetic energy over rho U^2/2, mean over the slab."""
     seconds: float
@@ -211,7 +211,7 @@ def bent_tube(
     *, folder: Path, segments: Sequence[Segment], cells: tuple[int, int, float], reynolds: float,
     rotation_reynolds: float,
 ) -> BentRun:  # fmt: skip
-    """Laminar flow through a turning tube along a plane path across the axis, developed where it enters."""
+    """Laminar flow through a rotating tube along a plane path across the axis, developed at the inlet."""
     omega = rotation_reynolds / reynolds
     _, entry = straight_tube(
         folder=folder / "inflow", reynolds=reynolds, rotation_reynolds=rotation_reynolds, cells=cells,

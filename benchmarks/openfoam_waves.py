@@ -1,6 +1,6 @@
 """Waves on the liquid ring in a chamber without plates, in OpenFOAM: the surface moves with the mesh.
 
-Lengths in R2, times in 1/omega, in the frame of the disc; gravity turns in it once a turn, backwards.  The
+Lengths in R2, times in 1/omega, in the frame of the disc, where gravity rotates backwards once a turn.  The
 chamber lies between the angles 0 and theta; `pimpleFoam` moves its mesh with the surface.  With plates the
 surface meets the wall at an angle and the tracking fails after a few turns, so plates are left out.
 """
@@ -18,20 +18,20 @@ from openfoam_case import HexMesh, extruded, field, run, sides, write_case
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 _VISCOSITY = 1e-5
-"""Over omega R2^2: thin layers, whose damping is outside the comparison."""
+"""Kinematic viscosity over omega R2^2: thin layers, whose damping is not compared."""
 GRAVITY = 0.005
-"""g over omega^2 R2: small waves."""
+"""Gravity, g over omega^2 R2: small waves."""
 _SLIP = {"type": "slip"}
 _EMPTY = {"type": "empty"}
 _NAMES = ("wall", "surface", "left", "right")
 _TURN = 2 * np.pi
 _THICKNESS = 0.05
 _PUSH = 0.3 * GRAVITY
-"""A frequency depends on the waves' height; these are a third as high."""
+"""Force that starts free waves, a third as high as gravity's: frequencies depend on their height."""
 _EVERY = 5
-"""Steps between the samples of which frequencies are made: thirty a turn."""
+"""Steps between the samples for frequencies: thirty samples a turn."""
 _NOISE = 1e-2
-"""Singular values below this share of the largest are noise."""
+"""Fraction of the largest singular value below which others are noise."""
 
 Force = Callable[[FloatArray], FloatArray]
 """Gravity's components in the disc's frame by time, shape (n, 2)."""
@@ -119,7 +119,7 @@ def _mean_pressure(patch: str) -> dict[str, Any]:
 
 
 def _control(*, turns: float, steps: int, writes: int) -> dict[str, Any]:
-    """`steps` and `writes` a turn."""
+    """Entries of controlDict for a run. Args: `steps`, `writes`: per turn."""
     return {
         "libs": "(interfaceTrackingFvMesh)", "application": "pimpleFoam", "startFrom": "startTime",
         "startTime": 0, "stopAt": "endTime", "endTime": turns * _TURN, "deltaT": _TURN / steps,
@@ -198,7 +198,7 @@ def _moving_mesh() -> dict[str, Any]:
 
 
 def _acceleration(force: Force, turns: float) -> str:
-    """The table: time, acceleration of the origin (minus gravity), angular velocity and its rate."""
+    """Table of time, acceleration of the origin (minus gravity), angular velocity and its rate."""
     time = np.linspace(0.0, turns * _TURN + 1.0, int(96 * turns) + 2)
     rows = [
         f"({t:.12g} (({-x:.12g} {-y:.12g} 0) (0 0 1) (0 0 0)))"
@@ -208,7 +208,7 @@ def _acceleration(force: Force, turns: float) -> str:
 
 
 def track(*, folder: Path, chamber: Chamber, force: Force, turns: float, steps: int, writes: int) -> Record:
-    """The liquid from rest in the disc's frame under a force that starts from zero."""
+    """Run of the liquid from rest in the disc's frame under a force that starts from zero."""
     mesh, quads = _mesh(chamber)
     files = {"system/controlDict": _control(turns=turns, steps=steps, writes=writes)}
     files |= _numerics() | _moving_mesh() | _fields()
@@ -229,7 +229,7 @@ def _history(path: Path) -> tuple[FloatArray, FloatArray]:
 
 
 def _moments(folder: Path, quads: IntArray) -> tuple[FloatArray, FloatArray]:
-    """From the meshes that were written: exact for straight-sided quadrilaterals."""
+    """Times and moments from the written meshes: exact for straight-sided quadrilaterals."""
     folders = [path for path in folder.iterdir() if (path / "polyMesh/points").exists()]
     modes = sorted(
         (float(path.name), _points(path / "polyMesh/points")) for path in folders if path.name != "constant"
@@ -252,7 +252,7 @@ def _moment(corner: FloatArray) -> FloatArray:
 
 
 def turning_gravity(*, ramp: float) -> Force:
-    """Gravity once a turn, backwards, raised smoothly over a number of turns."""
+    """Gravity that rotates backwards once a turn, raised smoothly over a number of turns."""
 
     def force(time: FloatArray) -> FloatArray:
         share = np.clip(time / (ramp * _TURN), 0.0, 1.0)
@@ -263,7 +263,7 @@ def turning_gravity(*, ramp: float) -> Force:
 
 
 def push(*, duration: float) -> Force:
-    """A smooth push, a part of a turn long, after which the liquid swings freely."""
+    """Smooth force pulse, a part of a turn long, after which the liquid oscillates freely."""
 
     def force(time: FloatArray) -> FloatArray:
         inside = time < duration * _TURN
@@ -274,7 +274,7 @@ def push(*, duration: float) -> Force:
 
 
 def swing(time: FloatArray, values: FloatArray, *, turns: float) -> complex:
-    """Amplitude once a turn over the last whole turns: mean, drift, cosine and sine by least squares."""
+    """Complex amplitude at the rotation frequency over the last turns: least squares with mean and drift."""
     last = time > time[-1] - turns * _TURN
     t = time[last]
     basis = np.stack([np.ones_like(t), t - t[-1], np.cos(t), np.sin(t)], axis=1)
@@ -283,7 +283,7 @@ def swing(time: FloatArray, values: FloatArray, *, turns: float) -> complex:
 
 
 def quasi_static(chamber: Chamber) -> tuple[float, float]:
-    """Swing of the moment and of the mean wall pressure under a surface that follows gravity at once.
+    """Amplitudes of moment and mean wall pressure for a surface that follows gravity at once.
 
     eta = (g - mean g)_r, over the surface, with g_r = g cos(angle + t): linear in g.
     """
@@ -297,9 +297,9 @@ def quasi_static(chamber: Chamber) -> tuple[float, float]:
 
 
 def frequencies(time: FloatArray, values: FloatArray, *, after: float, count: int) -> FloatArray:
-    """The lowest of the strong free frequencies over the speed in evenly sampled values, by a matrix pencil.
+    """Lowest strong free frequencies over the speed in evenly sampled values, by a matrix pencil.
 
-    Args: `after`: turns before the liquid is left alone. `count`: how many are wanted, lowest first.
+    Args: `after`: turns until the force has ended. `count`: number of frequencies, lowest first.
     """
     free = values[time > after * _TURN][::_EVERY]
     free = free - free.mean()
@@ -311,7 +311,7 @@ def frequencies(time: FloatArray, values: FloatArray, *, after: float, count: in
     strength = np.abs(np.linalg.lstsq(powers, free.astype(complex), rcond=None)[0])
     frequency = np.angle(poles) / (_EVERY * float(time[1] - time[0]))
     modes: list[float] = []
-    # A wave of finite height shows beside its line a weaker one nearby: the stronger one counts.
+    # A wave of finite height has a weaker spectral line near the main one: the stronger one counts.
     for i in np.argsort(-strength):
         apart = all(abs(frequency[i] / other - 1) > 0.15 for other in modes)
         if frequency[i] > 0.1 and strength[i] > 0.03 * strength.max() and apart:

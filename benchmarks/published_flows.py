@@ -37,7 +37,7 @@ class TaylorCouette:
     """Flow between rotating cylinders, computed and exact."""
 
     torque: float
-    """On the inner cylinder, per unit depth."""
+    """Torque on the inner cylinder, per unit depth."""
     exact_torque: float
     velocity_error: float
     """Largest nodal error over the largest wall velocity."""
@@ -45,7 +45,7 @@ class TaylorCouette:
 
 @dataclass(frozen=True, kw_only=True)
 class CylinderForces:
-    """The judged quantities of the cylinder benchmark 2D-1."""
+    """Compared quantities of the cylinder benchmark 2D-1."""
 
     drag: float
     lift: float
@@ -242,7 +242,7 @@ def cylinder_mesh(*, around: int, across: int, lengthwise: int, growth: float = 
     """Curved mesh of benchmark 2D-1: a ring of four patches about the cylinder, then the channel.
 
     Args: `around`: cells on a quarter of the cylinder, and across the channel. `across`: cells from the
-        cylinder to the channel wall. `along`: cells from the ring to the outlet. `growth`: last cell
+        cylinder to the channel wall. `lengthwise`: cells from the ring to the outlet. `growth`: last cell
         over first cell from the cylinder outwards.
     Returns: Quadratic mesh with boundaries inflow, outflow, wall, cylinder.
     Source: Schaefer and Turek, Benchmark computations of laminar flow around a cylinder (1996), Fig. 1.

@@ -1,6 +1,7 @@
-"""A sweep against a loop of calibrations and against runs, models against each other, and workers on paper.
+"""Time of a sweep compared with a loop of calibrations and with runs, of models with each other, and computed
+time of many workers.
 
-python benchmarks/sweep.py [DESIGNS]    prints what it measures; with --keep it is what the documents show
+python benchmarks/sweep.py [DESIGNS]    prints the measurements; with --keep they are stored for the documents
 """
 
 from __future__ import annotations
@@ -23,26 +24,26 @@ KEPT: Final = Path(__file__).parent / "sweep.json"
 SHOWN: Final = ("wall_pressure", "velocity")
 """Names of the quantities whose models are compared."""
 ON_PAPER: Final = (1000, 10_000, 100_000)
-"""Designs of a sweep by many workers."""
+"""Numbers of designs for the computed time of many workers."""
 CALIBRATED, CHECKED = 20, 12
 DRIVEN, RUNS = 20, 200
-"""Designs that are run, and devices of each at most."""
+"""Number of designs with runs, and most devices of each."""
 SIMULATED = 5
-"""Designs of which one run each is simulated by itself."""
+"""Number of designs with one separate simulation each."""
 VARY = {"tube.bore": "0.7mm:2.5mm", "rotor.speed": "5000rpm:7000rpm", "gas.pressure": "0.5MPa:1MPa"}
 
 
 def seconds(call: Callable[[], object]) -> float:
-    """Processor time."""
+    """Processor time of one call, s."""
     start = time.process_time()
     call()
     return time.process_time() - start
 
 
 def on_paper(workers: int, *, designs: int, each: float) -> float:
-    """Share of the workers' time that goes into designs, if one process sends and takes all bundles.
+    """Fraction of the workers' time spent on designs, if one process sends and receives all bundles.
 
-    Args: `each`: s, that a design takes.
+    Args: `each`: time of a design, s.
     """
     size = bundle_size(each, count=designs, workers=workers)
     free, caller = [0.0] * workers, 0.0
@@ -61,7 +62,7 @@ def with_runs(scene: AnyScene, points: Sequence[Mapping[str, Any]]) -> tuple[flo
 
 
 def measured(designs: int) -> dict[str, Any]:
-    """Processor time a design of each level, s; what rows leave out; errors and rates of the models."""
+    """Processor time of a design by level, s; error of the rows; errors and rates of models."""
     scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
     small = rb.sweep(scene, VARY, sample=f"latin:{CALIBRATED}")
     scenes = [small.point_scene(row) for row in range(CALIBRATED)]
@@ -110,7 +111,7 @@ def measured(designs: int) -> dict[str, Any]:
 
 
 def main(arguments: list[str]) -> None:
-    """Print, or keep, what is measured."""
+    """Print the measurements, or store them with --keep."""
     numbers = [int(word) for word in arguments if word != "--keep"]
     record = json.dumps(measured(*numbers or [1000]), indent=1) + "\n"
     if "--keep" in arguments:

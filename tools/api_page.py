@@ -15,7 +15,7 @@ _EXAMPLE: Final = re.compile(r"\n*^Example:\n", re.MULTILINE)
 
 
 def name_reference() -> str:
-    """Every public name: functions first, then what they take and give."""
+    """Reference of all public names: functions first, then types of arguments and results."""
     names = sorted(rb.__all__, key=lambda name: (name[0].isupper(), name))
     return "\n\n".join(_entry(name, getattr(rb, name)) for name in names)
 

@@ -14,13 +14,13 @@ KEPT: Final = ROOT / "benchmarks" / "sweep.json"
 
 
 def kept_rates() -> dict[str, Any]:
-    """Result of `python benchmarks/sweep.py --keep`."""
+    """Stored result of `python benchmarks/sweep.py --keep`."""
     record: dict[str, Any] = json.loads(KEPT.read_text(encoding="utf-8"))
     return record
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table."""
+    """Markdown table."""
     lines = [heads, ["---"] * len(heads), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
@@ -72,7 +72,7 @@ def levels_table(record: Mapping[str, Any]) -> str:
 
 
 def workers_table(record: Mapping[str, Any]) -> str:
-    """Share of the time of many workers that goes into designs, and what sending a bundle costs."""
+    """Fraction of the time of many workers spent on designs, and the time of sending a bundle."""
     each, call = record["seconds"]["runs"], record["seconds"]["call"]
     rows = [
         (str(row["workers"]), *(percent(used, digits=2) for used in row["used"])) for row in record["workers"]
@@ -87,5 +87,5 @@ def workers_table(record: Mapping[str, Any]) -> str:
 
 
 def _rounded(rate: float) -> str:
-    """One digit of a rate, since a busy machine halves it."""
+    """A rate with one digit, since a busy machine may halve it."""
     return f"{float(f'{rate:.1g}'):.0f}"

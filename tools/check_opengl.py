@@ -1,6 +1,6 @@
 """Can this machine draw off-screen?  Exit code 0: yes; 1: no, with the Debian packages that it would take.
 
-Any Python will do, an environment is not needed: the probe uses the standard library alone.
+Runs under any Python without an environment: the check uses only the standard library.
 """
 
 from __future__ import annotations

@@ -26,13 +26,13 @@ SAME: Final = (
     ("calibration.quantities.wall_pressure.value", "calibration.chamber.wall_pressure_Pa.-1"),
     ("calibration.quantities.moment.value", "calibration.chamber.moment_kg_m.-1"),
 )
-"""Places of the evidence that hold the same quantity; the liquids of `fifty` are those of a primed tube."""
+"""Groups of paths in the evidence with the same quantity; liquids under `fifty` are for a primed tube."""
 _APART: Final = 5e-3
-"""Two values of one quantity, relative; it is printed to three digits."""
+"""Largest relative difference of two values of one quantity, which is printed to three digits."""
 
 
 def traces(pages: Iterable[str]) -> list[tuple[str, str]]:
-    """Every traced number of some pages: its place in the evidence, and its text."""
+    """Path in the evidence and printed text of each traced number on some pages."""
     return [(path, unescape(text)) for page in pages for path, text in _TRACED.findall(page)]
 
 
@@ -48,7 +48,7 @@ def printed(text: str) -> tuple[float, float] | None:
 
 
 def _idle_zeros(text: str) -> int:
-    """Zeros at the end of a whole number that its uncertainty leaves without a meaning: 1 in 920 ± 100."""
+    """Number of insignificant final zeros of an integer, by its uncertainty: 1 in 920 ± 100."""
     parts = [part.split("\u202f×")[0] for part in text.split("±")]
     numbers = [match[0] for part in parts if (match := re.search(r"\d+(?:\u202f\d{3})*(?:\.\d+)?", part))]
     if any("." in part for part in numbers):
@@ -58,7 +58,7 @@ def _idle_zeros(text: str) -> int:
 
 
 def agrees(text: str, value: float | str) -> bool:
-    """True if a printed text is a value in one of the units that values are printed in."""
+    """True if a printed text agrees with a value in one of the units used for printing."""
     number = printed(text)
     if number is None or isinstance(value, str):
         return text == value
@@ -66,12 +66,12 @@ def agrees(text: str, value: float | str) -> bool:
 
 
 def untrue(pages: Iterable[str], evidence: Any) -> list[tuple[str, str]]:
-    """The traced numbers that the evidence does not hold."""
+    """Traced numbers that disagree with the evidence."""
     return [(path, text) for path, text in traces(pages) if not agrees(text, evidence_at(evidence, path))]
 
 
 def apart(evidence: Any) -> list[dict[str, float]]:
-    """Quantities that the evidence holds with two values, each by its places."""
+    """Quantities for which the evidence has two values, each with its paths."""
     groups = [{path: value for path in group if (value := _held(evidence, path))} for group in SAME]
     return [held for held in groups if held and max(held.values()) > (1 + _APART) * min(held.values())]
 
@@ -85,7 +85,7 @@ def _held(evidence: Any, path: str) -> float | None:
 
 
 def main(folder: Path) -> int:
-    """Check a report's folder; exit code 1 when a number is not the evidence's, or one quantity has two."""
+    """Check a report's folder; exit code 1 when numbers disagree with the evidence or with each other."""
     pages = [(folder / name).read_text(encoding="utf-8") for name in ("report.html", "annex.html")]
     evidence = json.loads((folder / "evidence.json").read_bytes())
     wrong = untrue(pages, evidence)

@@ -1,4 +1,4 @@
-"""Every generated part of the documents, and the equations as they are set.
+"""Generated parts of the documents, and the typeset equations.
 
 A part stands in its page between `<!-- table: NAME -->` and `<!-- end -->`.
 """
@@ -37,7 +37,7 @@ _PLACE: Final = re.compile(r"\{(\w+)[^}]*\}")
 
 
 def kind_table(*balancers: str) -> str:
-    """Kinds of measurement that scenes of some balancers predict, or of test benches, and their columns."""
+    """Kinds of measurement, and their columns, that scenes of some balancers predict, or of test benches."""
     return markdown(
         ("kind", "what it is", "measured", "further columns"),
         [
@@ -54,7 +54,7 @@ def kind_table(*balancers: str) -> str:
 
 
 def _explained(kind: Kind, *, measured: bool) -> list[str]:
-    """The columns that are measured, or the others, with what they hold."""
+    """Measured columns, or the others, with their meaning."""
     letters = ["`chamber`: letter of the driven chamber"] if kind.has_chamber and not measured else []
     return letters + [
         f"`{column.head}`: {column.meaning}"
@@ -66,13 +66,13 @@ def _explained(kind: Kind, *, measured: bool) -> list[str]:
 
 
 def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
-    """Evidence behind each quantity, by the documents of the cases; heavy ones are the stored ones."""
+    """Evidence for each quantity, from documents of the cases; heavy cases come from the stored results."""
     heavy = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
     return markdown(HEADS, standing_rows([{**case, **heavy.get(case["id"], {})} for case in cases]))
 
 
 def finding_table() -> str:
-    """Codes of findings, with what stands under them."""
+    """Codes of findings with severity, values and sentence."""
     return markdown(
         ("code", "severity", "values", "sentence"),
         [
@@ -88,7 +88,7 @@ def finding_table() -> str:
 
 
 def block_table() -> str:
-    """Variables of the blocks that are exported."""
+    """Variables of the exported blocks."""
     heads = ("block", "variable", "side", "unit", "from", "to", "meaning")
     return markdown(
         heads,
@@ -109,7 +109,7 @@ def block_table() -> str:
 
 
 def equations() -> bytes:
-    """SVG of each equation of the report and of the cases by its LaTeX, as the file keeps them."""
+    """Contents of the file of equations: SVG by LaTeX, for the report and the cases."""
     latex = {
         *(each.latex for each in report_equations().values()),
         *(e for c in load_cases() for e in c.equations),
@@ -138,7 +138,7 @@ PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
 
 
 def fresh(page: str, tables: Mapping[str, str]) -> str:
-    """A page with its parts written again. Raises: ValueError: it has others than these."""
+    """A page with its generated parts replaced. Raises: ValueError: its parts are not those of `tables`."""
     names = _BLOCK.findall(page)
     if sorted(names) != sorted(tables):
         raise ValueError(f"the page has {names}, written are {sorted(tables)}")
@@ -146,12 +146,12 @@ def fresh(page: str, tables: Mapping[str, str]) -> str:
 
 
 def text_of(name: str) -> str:
-    """A page as it stands."""
+    """Present text of a page."""
     return (ROOT / name).read_text(encoding="utf-8")
 
 
 def _documents() -> list[dict[str, Any]]:
-    """Cases that compare with measurements, run; of the others their text."""
+    """Results of the cases that compare with measurements, run now; definitions of the others."""
     scene = paper_scene()
     return [
         run_case(case.id, scene=scene).to_dict() if case.kind == "validation" else definition_document(case)
@@ -160,7 +160,7 @@ def _documents() -> list[dict[str, Any]]:
 
 
 def files(words: Sequence[str] = ()) -> Iterator[tuple[Path, bytes]]:
-    """Documents with their parts written again, all or those named, and the equations."""
+    """Documents with their generated parts replaced, all or those named, and the equations."""
     for name, tables in PARTS.items():
         if not words or name in words:
             yield ROOT / name, fresh(text_of(name), tables()).encode()

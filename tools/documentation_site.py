@@ -26,7 +26,7 @@ def toctrees(page: str) -> str:
 
 
 def add_order(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Let Sphinx read the order of the pages where a reader does: in docs/README.md."""
+    """Give Sphinx the order of the pages in docs/README.md."""
     if docname == app.config.root_doc:
         app.env.note_dependency(f"{LIST_OF_PAGES}.md")
         pages = Path(app.srcdir, f"{LIST_OF_PAGES}.md").read_text(encoding="utf-8")
@@ -35,25 +35,25 @@ def add_order(app: Sphinx, docname: str, source: list[str]) -> None:
 
 
 def inline_math(self: Any, node: nodes.math) -> None:
-    """An equation within a line."""
+    """Write an equation within a line."""
     self.body.append(f'<span class="math">{typeset_inline(node.astext())}</span>')
     raise nodes.SkipNode
 
 
 def display_math(self: Any, node: nodes.math_block) -> None:
-    """An equation on a line of its own."""
+    """Write an equation on a line of its own."""
     self.body.append(f'<div class="math">{typeset(node.astext())}</div>')
     raise nodes.SkipNode
 
 
 def add_index(app: Sphinx, error: Exception | None) -> None:
-    """README is the page that a browser opens."""
+    """Copy README.html to index.html, the page that a browser opens first."""
     if error is None:
         shutil.copyfile(Path(app.outdir, "README.html"), Path(app.outdir, "index.html"))
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Sphinx's hook."""
+    """Register the additions with Sphinx."""
     app.add_html_math_renderer("typeset", (inline_math, None), (display_math, None))
     app.connect("source-read", add_order)
     app.connect("build-finished", add_index)

@@ -1,4 +1,4 @@
-"""The tables of docs/is-k-50-right.md as Markdown, straight from the map, for `doc_tables`."""
+"""The tables of docs/is-k-50-right.md as Markdown, from the map of k, for `doc_tables`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def document_tables() -> dict[str, str]:
 
 
 def _liquids_table(liquids: list[Record]) -> str:
-    """One row a liquid."""
+    """Table with one row for each liquid."""
     heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
     more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
     return markdown((*heads, *more), [tuple(_liquid_cells(record)) for record in liquids])
@@ -51,7 +51,7 @@ _LIQUID_HEADS: Final = (
 
 
 def _liquid_cells(record: Record) -> Sequence[str]:
-    """One liquid under _LIQUID_HEADS, and the verdict on k = 50; a star: not under the scene's gas."""
+    """Cells of one liquid under _LIQUID_HEADS, and verdict on k = 50; a star: not with the scene's gas."""
     runs = record["runs"]
     star = "" if record["starts_at_scene_pressure"] else "*"
     return (
@@ -69,7 +69,7 @@ def _liquid_cells(record: Record) -> Sequence[str]:
 
 
 def _bores_table(calibration: Calibration) -> str:
-    """The bore at which k is the paper's, and the bores at which it may be, over the viscosity."""
+    """Bore at which k is the paper's, with its uncertainty range, over the viscosity."""
     drag = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
     k, width = drag.point.k, drag.point.k_uncertainty
     columns = [drag.bores_for(k + side * width) for side in (0.0, -1.0, 1.0)]

@@ -1,6 +1,6 @@
 """Table of the laminar end losses.
 
-Each end is one path in Re, followed on every mesh.  A finished path is one file, so a stopped run resumes.
+Each end is one path in Re, followed on every mesh.  A finished path is a file, so that a stopped run resumes.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def end_loss_times_reynolds(
 ) -> float:
     """K Re of an end, from the pressure deep in the tube beyond developed friction.
 
-    K_ent Re = -2 (p + 32 x), K_exit Re = 2 (p - 32 |x|), p on the axis at |x| = share of the tube's length.
-    Args: `end`: "entrance" or "exit". `share`: where to take the pressure.
+    K_ent Re = -2 (p + 32 x), K_exit Re = 2 (p - 32 |x|), p on the axis at |x| = `share` of the tube's length.
+    Args: `end`: "entrance" or "exit". `share`: fraction of the length at which p is taken.
     """
     distance = share * cells.tube
     at = distance if end == "entrance" else -distance
@@ -55,12 +55,12 @@ def end_loss_times_reynolds(
 
 @dataclass(frozen=True, kw_only=True)
 class EndSettings:
-    """All that the table of end losses depends on."""
+    """Settings that determine the table of end losses."""
 
     nodes: int = 30
     """Reynolds numbers from 0 to the limit, evenly spaced in ln(1 + Re/5)."""
     checks: tuple[int, ...] = (0, 4, 8, 12, 16, 20, 24, 28)
-    """Intervals between nodes with a further point half-way."""
+    """Numbers of the intervals between nodes that have a check point half-way."""
     cells_per_fold: tuple[float, ...] = (1.8, 2.4, 3.2)
     edge_cell: float = 1e-4
     reservoir: float = 40.0
@@ -172,7 +172,7 @@ def generate(*, folder: Path, settings: EndSettings, executor: Executor) -> None
 
 
 def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
-    """The table; paths are kept in out/end_losses/."""
+    """Path and bytes of the table; finished paths are kept in out/end_losses/."""
     settings = EndSettings()
     digest = hashlib.sha256(json.dumps(asdict(settings), sort_keys=True).encode()).hexdigest()
     folder = ROOT / "out" / "end_losses" / digest[:12]

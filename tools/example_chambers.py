@@ -1,4 +1,4 @@
-"""The meshes of chambers that come with the program, by OpenCASCADE through gmsh (extra `cad`).
+"""Bundled meshes of chambers, made by OpenCASCADE through gmsh (extra `cad`).
 
 The chamber of the liquid-ring paper with the gas tube of its section 3.1, of assumed size and place:
 once with fillets for the example scene, once without for the case that compares it with closed forms.
@@ -15,15 +15,15 @@ import gmsh
 
 ROOT = Path(__file__).parent.parent
 INNER, OUTER, WIDTH, ANGLE, STRIP = 20.5, 44.5, 62.0, math.pi / 2, 2.777
-"""mm; those of scenes/liquid_ring_paper.toml."""
+"""Dimensions of scenes/liquid_ring_paper.toml: mm, `ANGLE` in rad."""
 TUBE_RADIUS, TUBE_TIP = 2.0, 31.0
-"""Outside radius of the gas tube, which comes from the hub, and radius of its mouth, mm."""
+"""Outside radius of the gas tube, which comes from the hub, and radius at which it ends, mm."""
 FILLET = 5.0
-"""mm, along the shaft in all four corners."""
+"""Fillet radius along the shaft in all four corners, mm."""
 
 
 def sector() -> list[tuple[int, int]]:
-    """The space between two plates, as a volume."""
+    """Volume between two plates."""
     occ = gmsh.model.occ
 
     def corner(radius: float, side: int) -> int:
@@ -58,7 +58,7 @@ def filleted(volume: list[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def with_gas_tube(volume: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """The volume less the tube, which begins within the hub."""
+    """The volume without the gas tube, which begins within the hub."""
     tube = gmsh.model.occ.addCylinder(INNER - 5, 0, 0, TUBE_TIP - INNER + 5, 0, 0, TUBE_RADIUS)
     return [part for part in gmsh.model.occ.cut(volume, [(3, tube)])[0] if part[0] == 3]
 
@@ -80,7 +80,7 @@ def name_of(face: int) -> str:
 def mesh(*, fillets: bool, size: float, round_turn: int) -> bytes:
     """A file with a mesh of quadratic tetrahedra, as small a file as Gmsh writes.
 
-    Args: `size`: largest edge, mm. `round_turn`: edges along a full circle, which small radii need.
+    Args: `size`: largest edge, mm. `round_turn`: edges along a full circle, for small radii.
     """
     gmsh.initialize()
     for option, value in (
@@ -110,7 +110,7 @@ def mesh(*, fillets: bool, size: float, round_turn: int) -> bytes:
 
 
 def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
-    """Both meshes."""
+    """Paths and bytes of both meshes."""
     yield ROOT / "scenes" / "imported_chamber.msh", mesh(fillets=True, size=14.0, round_turn=4)
     data = ROOT / "verification" / "cases" / "gas_tube" / "data"
     yield data / "chamber.msh", mesh(fillets=False, size=9.0, round_turn=5)

@@ -1,4 +1,5 @@
-"""The example files of measurements in scenes/measurements/: a documented truth, noise, fixed seeds."""
+"""Example files of measurements in scenes/measurements/: simulated with documented true values, noise and
+fixed seeds."""
 
 from __future__ import annotations
 
@@ -41,10 +42,10 @@ TRUTH: Final[Mapping[str, Mapping[str, float]]] = {
         "motor.torque_constant": 0.0097,
     },
 }
-"""By balancer, SI; everything else is the scene's value."""
+"""True values by balancer and path, SI; all others are those of the scene."""
 SCENES: Final = {"liquid_ring": "liquid_ring_paper", "eccentric_mass": "eccentric_mass_paper"}
 _VIBRATION_NOISE: Final = {"liquid_ring": 0.02e-6, "eccentric_mass": 20e-6}
-"""Standard deviation of each component, m."""
+"""Standard deviation of each component of the vibration by balancer, m."""
 _ANGLE_NOISE: Final = math.radians(0.1)
 """Standard deviation of the angle of a mass, rad."""
 _RELATIVE_NOISE: Final = {"transfer": 0.01, "flow": 0.01, "pressure": 0.005}
@@ -53,7 +54,7 @@ _DIGITS: Final = {"um": 3, "deg": 2}
 
 
 def truth(kind: str) -> AnyScene:
-    """The machine that the example of a kind was measured on."""
+    """Scene with the true values for an example of a kind."""
     balancer = KINDS[kind].balancer
     scene = load_scene(bundled_scene(SCENES[balancer]))
     for name, value in TRUTH[balancer].items():
@@ -67,7 +68,7 @@ def truth(kind: str) -> AnyScene:
 def example(kind: str) -> str:
     """Text of one example."""
     plan, stated = _PLANS[kind]()
-    # Noise of one seed in twenty has a pattern that the criticism of a fit rejects: that of these has none.
+    # One seed in twenty gives noise with a pattern that the tests of a fit reject; none of these does.
     seed = 1000 + list(_PLANS).index(kind)
     return _text(kind, _measured(kind, plan, np.random.default_rng(seed)), stated)
 
@@ -86,7 +87,7 @@ def _observations(kind: str, columns: Mapping[str, npt.ArrayLike], chamber: Sequ
 
 
 def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Observations:
-    """The plan with what the truth predicts, and noise."""
+    """The plan with predictions for the true values, plus noise."""
     scene = truth(kind)
     exact = KINDS[kind].predict(scene, plan, inputs_of(scene).models)
     columns = dict(plan.columns)
@@ -104,7 +105,7 @@ def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Obs
 def _vibrations(
     kind: str, predicted: ComplexArray, scene: AnyScene, random: np.random.Generator
 ) -> dict[str, FloatArray]:
-    """Readings; that after an injection is that before the next one."""
+    """Vibration readings; the one after an injection is also the one before the next."""
     noise = _VIBRATION_NOISE[scene.balancer]
     if not isinstance(scene, Scene):
         return _polar("", _read(predicted, noise, random))
@@ -217,7 +218,7 @@ def _cell(value: float, dimension: str | None, unit: str) -> str:
 
 
 def _told(balancer: str) -> str:
-    """The truth in words."""
+    """True values as text."""
     paths = {name: f"{UNCERTAIN_QUANTITIES.get(name, '')}.{name}".lstrip(".") for name in TRUTH[balancer]}
     return ", ".join(
         f"{usual_name(path)} {in_usual_unit(path, TRUTH[balancer][name]):.4g} {usual_unit(path)}".rstrip()

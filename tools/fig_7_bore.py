@@ -1,6 +1,6 @@
 """Bores that give the rate of the liquid-ring paper's Fig. 7, under k = 50 and under the calibrated law.
 
-python tools/fig_7_bore.py    prints both; scenes/liquid_ring_paper*.toml state them, rounded
+python tools/fig_7_bore.py    prints both bores; scenes/liquid_ring_paper*.toml state them, rounded
 
 The paper gives no bore. Its Fig. 7 fixes the fall of the vibration per second of gas, K lambda rho S u at
 equal fills, so a bore follows from a flow law and the other values of the scene.
@@ -17,20 +17,20 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene import Scene, bundled_scene, liquid_ring_scene, load_scene
 
 RATE = 7.2e-6
-"""m/s of vibration per second of gas, read off Fig. 7."""
+"""Fall of the vibration per second of gas, m/s, read off Fig. 7."""
 SHORTEST, LONGEST = 0.5e-3, 2.5e-3
-"""m, of the bores among which one is looked for."""
+"""Limits of the search for a bore, m."""
 _MOVED = 1e-4
 """Fill ratio moved from one chamber to the other; the pair's moment is odd in it."""
 
 
 def paper_model(scene: Scene) -> BalancerModel:
-    """k = 50 and lambda = 72 mm."""
+    """Model with k = 50 and lambda = 72 mm."""
     return BalancerModel.of(rb.paper_law(scene))
 
 
 def calibrated_model(scene: Scene) -> BalancerModel:
-    """The calibrated law and moment."""
+    """Model with the calibrated law and moment."""
     return rb.calibrate(scene).model
 
 

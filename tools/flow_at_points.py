@@ -12,7 +12,7 @@ from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution
 
 _MARGIN = 0.05
-"""Share of an element by which a point may lie outside it: a chord's sagitta on a coarser curved mesh."""
+"""Accepted distance outside an element, over its size: a chord's sagitta on a coarser mesh."""
 
 
 def _candidates(system: FlowSystem, points: FloatArray) -> tuple[IntArray, IntArray]:

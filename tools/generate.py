@@ -32,7 +32,7 @@ TARGETS: Final = MappingProxyType(
 
 
 def asked(words: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
-    """Targets with the words that narrow them down. Raises: SystemExit: none, or a word before the first."""
+    """Targets, each with the words that select among its files. Raises: SystemExit: no target comes first."""
     places = [start for start, word in enumerate(words) if word in TARGETS]
     if not places or places[0]:
         lines = (f"    {name:<20}{text}" for name, (_, text) in TARGETS.items())
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str]) -> int:
     """Write what differs, or name it."""
     write, stale = "--write" in arguments, False
     for target, words in asked([word for word in arguments if word != "--write"]):
-        # Looked up late: a process that a target starts imports this module, and each needs other packages.
+        # Imported late: processes of a target import this module, and each target needs other packages.
         for path, content in import_module(TARGETS[target][0]).files(words):
             if path.exists() and path.read_bytes() == content:
                 continue

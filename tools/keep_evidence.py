@@ -1,10 +1,10 @@
-"""Keeps the heavy results of a report with the program, so that later light reports can show them.
+"""Store the heavy results of a report in the package, so that later light reports can show them.
 
     python tools/keep_evidence.py out/evidence.json [heavy.json ...]
 
 Takes the evidence of heavy reports, and what `ringbalance verify CASE --level heavy --json` prints.  Only
-heavy cases are kept, each with its date and the hash of its scene, over what was kept of them before; a
-light report takes those whose scene is its own.
+heavy cases are stored, each with its date and the hash of its scene, and replace earlier results; a light
+report takes those with its own scene.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def kept_document(document: Mapping[str, Any]) -> Record:
 
 
 def document_of(path: Path) -> dict[str, Any]:
-    """The evidence in a file; bare cases get the date of their file, and the versions at hand."""
+    """The evidence in a file; cases alone get the date of their file and the present versions."""
     document = json.loads(path.read_text(encoding="utf-8"))
     if isinstance(document, dict):
         return document

@@ -1,8 +1,8 @@
-"""Lists functions whose body is longer than a reader likes, and refuses those that are far too long.
+"""List long functions, and refuse those that are far too long.
 
     python tools/long_functions.py PATH...
 
-A body is counted without its docstring.  Over 60 lines is a question, printed; over 80 lines is refused with
+A body is counted without its docstring.  Over 60 lines a function is listed; over 80 lines it is refused with
 exit code 1.  A file may have any length.
 """
 

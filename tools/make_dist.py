@@ -43,7 +43,7 @@ def main() -> int:
 
 
 def build(checkout: Path, *, target: Path, epoch: int) -> list[Path]:
-    """Build a checkout, which it writes to.
+    """Build the distributions from a checkout, in which files are written.
 
     Args: `epoch`: s since 1970 (UTC), the time of every file.
     Returns: Source distribution and wheel.
@@ -57,7 +57,7 @@ def build(checkout: Path, *, target: Path, epoch: int) -> list[Path]:
 
 
 def without_clock(archive: bytes, *, epoch: int) -> bytes:
-    """A compressed tar archive with its members in order, all of one time and nobody's."""
+    """A compressed tar archive with sorted members, of one time and without owner."""
     written = io.BytesIO()
     with (
         tarfile.open(fileobj=io.BytesIO(archive), mode="r:gz") as read,

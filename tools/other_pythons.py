@@ -1,4 +1,4 @@
-"""Runs tests under every further supported Python of this machine.
+"""Run tests under every further supported Python of this machine.
 
     .venv/bin/python tools/other_pythons.py
 

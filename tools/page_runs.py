@@ -1,13 +1,12 @@
-"""Pages are programs: their code and commands run in order, and what they print stands below them.
+"""Run the code and the commands of pages in order, and write their output below them.
 
 A block of `python` or `sh` is run in an empty folder with the bundled `scenes`. A block after a line that
-ends in a file's name in code type and a colon becomes that file. A block of `text` straight after a block
-that was run is what that one printed; in it a line `...` stands for lines left out. A block after
-`<!-- not run: REASON -->` is not run. A picture (SVG) that a page shows is the one that its blocks write
-under that name.
+ends in a file's name in code type and a colon becomes that file. A block of `text` directly after a block
+that was run is its output; a line `...` in it stands for lines left out. A block after
+`<!-- not run: REASON -->` is not run. A picture (SVG) of a page is written by its blocks under that name.
 
 Each page, and each line that is one command of the program, is run in a copy of one process that has loaded
-the program already; a line with more of the shell in it is the shell's.
+the program already; any other line is run by the shell.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ _NOT_RUN: Final = re.compile(r"<!-- not run: .+ -->$")
 _PICTURE: Final = re.compile(r"!\[[^\]]*\]\(([\w./-]+\.svg)\)")
 _NUMBER: Final = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d{1,2}(?!\d))?")
 _NAME: Final = re.compile(r"""id="[^"]*"|href="#[^"]*"|url\(#[^)]*\)""")
-"""Within a picture: made from the shapes that it names."""
+"""Identifiers and references in a picture, which are derived from its shapes."""
 _COMMAND: Final = re.compile(r"ringbalance ([^|&;<>$`()]*?)( 2>&1)?(?: > ([\w./-]+))?")
 
 
@@ -54,7 +53,7 @@ class PageError(ValueError):
 
 @dataclass
 class Session:
-    """A folder, and the names of Python, in which a page's blocks run one after the other."""
+    """Folder and Python names in which a page's blocks run one after the other."""
 
     folder: Path
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "page"})
@@ -79,7 +78,10 @@ class Session:
         return printed
 
     def _program(self, words: str, joined: str | None, target: str | None) -> tuple[int, str, str]:
-        """A command of the program; its messages too where they are joined, nothing where it has a target."""
+        """Exit code, output and messages of a command of the program.
+
+        Args: `joined`: set if messages go into the output. `target`: file that takes the output.
+        """
         with contextlib.chdir(self.folder):
             ended, printed, said = forked(partial(cli.main, shlex.split(words)), joined=bool(joined))
             if target and not ended:
@@ -100,7 +102,7 @@ class Session:
 
 
 def forked(act: Callable[[], int], *, joined: bool = False) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of an act in a copy of this process."""
+    """Exit code, standard output and standard error of a function called in a copy of this process."""
     with tempfile.TemporaryFile("w+") as printed, tempfile.TemporaryFile("w+") as said:
         sys.stdout.flush()
         sys.stderr.flush()
@@ -116,7 +118,7 @@ def forked(act: Callable[[], int], *, joined: bool = False) -> tuple[int, str, s
 
 
 def _ended_with(act: Callable[[], int]) -> None:
-    """End this process with the exit code of an act; 1 after an exception, which is printed."""
+    """End this process with the exit code of a function; 1 after an exception, which is printed."""
     code = 1
     try:
         code = act()
@@ -129,7 +131,7 @@ def _ended_with(act: Callable[[], int]) -> None:
 
 
 def numbers_agree(first: str, second: str) -> bool:
-    """True if two lines differ in the last digits of numbers alone: other processors sum in other orders."""
+    """True if two lines differ only in the last digits of numbers: processors sum in different orders."""
     pairs = zip(_NUMBER.findall(first), _NUMBER.findall(second), strict=True)
     return all(abs(float(a) - float(b)) <= max(_last_digit(a), 1e-3 * abs(float(a))) for a, b in pairs)
 
@@ -173,7 +175,7 @@ def shown_lines(shown: Sequence[str], printed: Sequence[str]) -> list[str]:
 
 
 def fresh_page(page: str, folder: Path) -> str:
-    """A page with what its blocks print now, run in a folder.
+    """A page with the present output of its blocks, run in a folder.
 
     Raises: PageError: as of `Session.run` and `shown_lines`; output below a block that is not run.
     """
@@ -223,14 +225,14 @@ def fresh(path: Path) -> dict[Path, str]:
 
 
 def fresh_picture(path: Path, svg: str) -> str:
-    """A picture as it was drawn, or as it is kept where no more than last digits differ."""
+    """A picture as drawn now, or the kept one if only last digits differ."""
     current = path.read_text(encoding="utf-8") if path.exists() else ""
     first, second = (_NAME.sub("", each) for each in (current, svg))
     return current if _skeleton(first) == _skeleton(second) and numbers_agree(first, second) else svg
 
 
 def pages() -> list[Path]:
-    """The documents with a block that is run, or left out for a reason."""
+    """Documents with a block that is run or marked as not run."""
     return sorted(
         path
         for path in (ROOT / "docs").rglob("*.md")
@@ -258,10 +260,10 @@ def files(words: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
 
 
 def _load() -> None:
-    """Have the program in this process, compiled code included, for all that is forked from it."""
+    """Load the program, compiled code included, into this process for all processes forked from it."""
     # Read by every console of the program.
     os.environ["COLUMNS"] = "100"
-    # Pages run side by side, so that none starts processes of its own to do so.
+    # Pages run in parallel, so that none starts processes of its own.
     os.cpu_count = lambda: 1
     for target in TARGETS.values():
         import_module(target.partition(":")[0])

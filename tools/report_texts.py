@@ -1,4 +1,4 @@
-"""Plain text of the pages of two kept reports, with which tests compare the templates' words with."""
+"""Plain text of the pages of two kept reports, with which tests compare the words of the templates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CASES: Final = {
     "driven_stability",
     "driven_fig7_positioning",
 }
-"""Cases that are kept: their own words are not the templates'."""
+"""Cases in the kept evidence; their words are not part of the templates."""
 _DIGITS: Final = 6
 _BLOCKS: Final = "p|li|tr|h\\d|figure|table|caption|section|dt|dd|ul|ol|article|details|summary|div"
 
@@ -55,7 +55,7 @@ def report_text(evidence: dict[str, Any]) -> str:
 
 
 def _shortened(value: Any) -> Any:
-    """Six digits, and of the verification the cases kept."""
+    """Evidence with numbers to six digits and with only the kept cases."""
     if isinstance(value, dict):
         return {key: _shortened(each) for key, each in value.items()}
     if isinstance(value, list):
@@ -77,7 +77,7 @@ def packed(folder: Path) -> bytes:
 
 
 def files(words: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
-    """Words of both reports; first, of the folders of new reports on their scenes, the evidence to keep."""
+    """Texts of both reports; before them the evidence to keep, if folders of new reports are given."""
     for name, folder in zip(NAMES, words, strict=False):
         yield FOLDER / f"{name}.json.xz", packed(Path(folder))
     for name in NAMES:

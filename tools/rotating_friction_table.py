@@ -1,8 +1,8 @@
 """Friction table of the rotating tube.
 
 Each column of a rectangle is one path, followed on the medium mesh from slow rotation upwards; every point of
-it is then solved on the other meshes, starting from that flow.  A finished point is one file: a stopped run
-resumes.
+it is then solved on the other meshes, starting from that flow.  Each finished point is a file, so that a
+stopped run resumes.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
 
 @dataclass(frozen=True, kw_only=True)
 class TableSettings:
-    """All that the table depends on."""
+    """Settings that determine the table."""
 
     slow_a: tuple[float, ...]
     slow_b: tuple[float, ...]
@@ -65,7 +65,7 @@ class TableSettings:
     path_level: int = 1
     """Mesh on which the paths are followed; the other meshes start from its flows."""
     branch_kl: float = 7e5
-    """Above this Kl further steady flows appear, and a long step may land on one of them."""
+    """Kl above which further steady flows exist, so that a long step may converge to one of them."""
     branch_step: float = 0.06
     """Longest step in `a` above that Kl."""
 
@@ -289,7 +289,7 @@ def generate(*, folder: Path, settings: TableSettings, executor: Executor) -> No
 
 
 def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
-    """The table; points are kept in out/rotating_friction/."""
+    """Path and bytes of the table; points are kept in out/rotating_friction/."""
     settings = table_settings()
     folder = ROOT / "out" / "rotating_friction" / settings_hash(settings)[:12]
     with Workers(2) as executor:

@@ -17,15 +17,15 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
 BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 WIDTHS = "uncertainty"
 MANY = 8
-"""Units of one quantity that are still listed one by one."""
+"""Largest number of units of a quantity that are listed one by one."""
 HEAD = "| key | takes | when left out | meaning |\n|---|---|---|---|"
 
 
 def key_reference(schema: Schema, title: str, above: Schema | None = None) -> str:
     """One Markdown table of keys for each table of a kind of scene.
 
-    Args: `title`: of the first table. `above`: kind of scene whose tables stand above; those that are the
-    same here are only named.
+    Args: `title`: of the first table. `above`: kind of scene whose tables precede; identical tables are
+    only named.
     """
     tables = {} if above is None else above.tables
     same = [name for name in schema.tables if name in tables and _told(schema, name) == _told(above, name)]
@@ -48,7 +48,7 @@ def key_reference(schema: Schema, title: str, above: Schema | None = None) -> st
 
 
 def _told(schema: Schema | None, name: str) -> object:
-    """All that the page says of a table."""
+    """Contents of the page on a table, for comparison."""
     if schema is None or name == WIDTHS:
         return schema
     table = schema.tables[name]
@@ -57,7 +57,7 @@ def _told(schema: Schema | None, name: str) -> object:
 
 
 def widths(schema: Schema) -> list[str]:
-    """The uncertain quantities of each table: all take the same."""
+    """Lines of the table [uncertainty], whose keys all take the same values."""
     variants = {
         name: [key for key, declared in table.keys.items() if declared.uncertain]
         for name, table in schema.tables.items()
@@ -96,7 +96,7 @@ def unit_reference() -> str:
 
 
 def _units(names: list[str]) -> str:
-    """Units in code type; where every one of some units stands over every one of others, these once each."""
+    """Units in code type; numerators and denominators once each where all their quotients are units."""
     over = [
         dict.fromkeys(part)
         for part in zip(*(name.split("/", 1) for name in names if "/" in name), strict=True)
@@ -107,7 +107,7 @@ def _units(names: list[str]) -> str:
 
 
 def rows(keys: Mapping[str, Key]) -> list[str]:
-    """Head and rows of the table of some keys; the text of the page has what every table takes."""
+    """Head and rows of the table of some keys, without `origin`, which the text of the page describes."""
     return [
         HEAD,
         *(

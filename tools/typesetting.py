@@ -11,7 +11,7 @@ with warnings.catch_warnings():
 
 
 _MARGIN = 1.0
-"""px of the picture around what is set."""
+"""Margin around the equation, px."""
 
 
 def typeset(latex: str) -> str:
@@ -23,7 +23,7 @@ def typeset(latex: str) -> str:
 
 
 def typeset_inline(latex: str) -> str:
-    """One equation as `typeset` has it, with its base line on that of the text around it."""
+    """One equation as by `typeset`, with its base line on that of the surrounding text."""
     depth = _set(latex).getyofst() - _MARGIN
     return typeset(latex).replace("<svg ", f'<svg style="vertical-align: {depth:.2f}px" ', 1)
 
@@ -31,6 +31,6 @@ def typeset_inline(latex: str) -> str:
 def _set(latex: str) -> Latex:
     try:
         return Latex(latex, size=16, color="currentColor")
-    # The library has no error class of its own: wrong LaTeX ends in whatever its parser met.
+    # The library has no error class of its own: wrong LaTeX may raise any exception.
     except Exception as error:
         raise ValueError(f"this equation cannot be set: {latex}") from error

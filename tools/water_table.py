@@ -1,4 +1,4 @@
-"""Water at atmospheric pressure as Chebyshev series, from `chemicals`; the program does not need that."""
+"""Water at atmospheric pressure as Chebyshev series, from `chemicals`, which the program does not need."""
 
 from __future__ import annotations
 
@@ -35,6 +35,6 @@ def table() -> str:
 
 
 def files(_: Sequence[str]) -> Iterator[tuple[Path, bytes]]:
-    """The series, with their digest."""
+    """Path and bytes of the series, with their digest."""
     body = table()
     yield TARGET, (HEAD.format(digest=hashlib.sha256(body.encode()).hexdigest()) + body).encode()

@@ -1,7 +1,6 @@
-"""One chamber from a mesh file: read, checked with every entity named, and turned into the record of a
-disc.
+"""One chamber from a mesh file: read, checked with errors that name the entity, and converted to a record.
 
-`loading` goes through it all. A format is a reader that gives `body.Contents`, entered in
-`mesh_file.READERS`; a name of a boundary stands in `record.MEANINGS`. What can be wrong with cells and names
-is in `soundness`; with their place about the shaft and the scene's other keys, in `fitting`.
+`loading` runs all steps. A further format needs a reader that returns `body.Contents`, entered in
+`mesh_file.READERS`; a further name of a boundary, an entry in `record.MEANINGS`. `soundness` checks cells and
+names; `fitting` checks the position about the shaft and the scene's other keys.
 """

@@ -1,4 +1,4 @@
-"""The one body of cells, with named facets, that a mesh file holds; entities are named by their places."""
+"""The single body of cells of a mesh file, with named facets; messages name entities by coordinates."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ringbalance.scene.kinds import Contradiction
 
 _KINDS: Final = f"cells of one kind: {', '.join(CELL_KINDS)}"
 _MOST_SHOWN: Final = 4
-"""Places that one message lists; more are counted."""
+"""Most coordinates that one message lists; further ones are counted."""
 _LARGEST_COORDINATE: Final = 1e9
 
 
 class MeshFileError(Exception):
-    """A mesh that cannot be used. Args: `findings`: what is wrong, at least one."""
+    """A mesh that cannot be used. Args: `findings`: at least one error."""
 
     def __init__(self, findings: Iterable[Contradiction]) -> None:
         self.findings = tuple(findings)
@@ -28,18 +28,18 @@ class MeshFileError(Exception):
 
     @classmethod
     def of(cls, problem: str, allowed: str = "") -> MeshFileError:
-        """The error of a file in which nothing further can be looked at."""
+        """Error of a file that cannot be checked further."""
         return cls([Contradiction(problem=problem, allowed=allowed)])
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mark:
-    """A name, and the elements of one block that have it."""
+    """A name and the elements of one block with this name."""
 
     name: str
     block: int
     where: BoolArray
-    """Shape (elements of the block,)."""
+    """True for elements with the name, shape (elements of the block,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,26 +47,26 @@ class Contents:
     """Content of a mesh file; kinds of elements and orders of nodes are meshio's."""
 
     points: FloatArray
-    """In the file's unit, shape (nodes, 3)."""
+    """Coordinates in the file's unit, shape (nodes, 3)."""
     blocks: tuple[tuple[str, IntArray], ...]
-    """Kind of some elements, and places of their nodes in `points`, shape (elements, nodes of one)."""
+    """Kind of elements, and indices of their nodes in `points`, shape (elements, nodes of one)."""
     marks: tuple[Mark, ...]
     other_names: tuple[str, ...] = ()
-    """Names that perhaps no element has, for messages."""
+    """Further names in the file, perhaps of no element, for messages."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedFacets:
-    """Facets of one kind that have a name."""
+    """Facets of one kind with a name."""
 
     name: str
     kind: str
     nodes: IntArray
-    """Places in the body's points, shape (facets, nodes of a facet)."""
+    """Indices of nodes in the body's points, shape (facets, nodes of a facet)."""
 
     @property
     def corners(self) -> IntArray:
-        """Their first nodes."""
+        """Corner nodes, the first nodes of each facet."""
         return self.nodes[:, : CORNERS[self.kind]]
 
 
@@ -77,20 +77,20 @@ class Body:
     kind: CellKind
     points: FloatArray
     cells: IntArray
-    """Places of nodes in `points`, shape (cells, nodes of a cell)."""
+    """Indices of nodes in `points`, shape (cells, nodes of a cell)."""
     cell_names: tuple[tuple[str, BoolArray], ...]
-    """Names that cells have, and which cells."""
+    """Names of cells, each with the cells that have it."""
     named: tuple[NamedFacets, ...]
     lesser: tuple[str, ...]
     """Names of lines and points."""
     other_names: tuple[str, ...]
-    """Names that perhaps nothing has."""
+    """Further names in the file, perhaps of no element."""
     drawing: IntArray
     """Nodes of points and lines of the drawing, such as centres of arcs."""
 
     @property
     def corners(self) -> IntArray:
-        """Places of the corners of the cells."""
+        """Indices of the cells' corner nodes."""
         return self.cells[:, : CORNERS[self.kind]]
 
     def at(self, nodes: IntArray) -> str:
@@ -103,10 +103,10 @@ class Body:
 
     @classmethod
     def of(cls, contents: Contents, *, scale: float) -> Body:
-        """One body of what a file holds.
+        """The single body of a file's contents.
 
         Args: `scale`: metres in the file's unit.
-        Raises: MeshFileError: its cells or nodes are such that nothing further can be looked at.
+        Raises: MeshFileError: cells or nodes that prevent all further checks.
         """
         blocks = contents.blocks
         solid = [number for number, (kind, _) in enumerate(blocks) if dimension(kind) == 3]

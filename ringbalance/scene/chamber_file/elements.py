@@ -1,6 +1,6 @@
-"""The kinds of cells and facets that a chamber can have: nodes and faces, in meshio's order.
+"""Kinds of cells and facets of a chamber: nodes and faces, in meshio's order.
 
-Facets and edges of cells have one number each, so that equal ones are found by sorting.
+Each facet and edge gets one number from its corners, so that sorting finds equal ones.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ CORNERS: Final[Mapping[str, int]] = MappingProxyType(
         **dict.fromkeys(("hexahedron", "hexahedron20", "hexahedron27"), 8),
     }
 )
-"""Number of corners by kind of cell or facet, for all that a chamber may have."""
+"""Number of corners by kind of cell or facet, for all kinds that a chamber may have."""
 NODES: Final[Mapping[str, int]] = MappingProxyType(
     {kind: int("".join(filter(str.isdigit, kind)) or count) for kind, count in CORNERS.items()}
 )
-"""A kind of second order has its number of nodes in its name."""
+"""Number of nodes by kind; that of a second-order kind is part of its name."""
 FACET_KINDS: Final = MappingProxyType({3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"})
 """Kind of facet by its number of nodes."""
 _FACES: Final[Mapping[int, tuple[tuple[int, ...], ...]]] = MappingProxyType(
@@ -54,7 +54,7 @@ _CORNER_POINTS: Final = MappingProxyType(
     }
 )
 MOST_NODES: Final = 2_000_000
-"""Three of their numbers make one of 64 bits."""
+"""Largest number of nodes: three node numbers then fit into 64 bits."""
 
 
 def dimension(kind: str) -> int:
@@ -64,7 +64,7 @@ def dimension(kind: str) -> int:
 
 
 def between(kind: str) -> tuple[tuple[int, ...], ...]:
-    """For each node the corners in whose middle it lies on a straight cell; a corner lies at itself."""
+    """For each node the corners whose midpoint it is on a straight cell; a corner has itself."""
     count = CORNERS[kind]
     inside = (*_EDGES[count], *(_FACES[8] if count == 8 else ()), tuple(range(count)))
     return (*((corner,) for corner in range(count)), *inside)[: NODES[kind]]
@@ -91,11 +91,11 @@ def faces(kind: str) -> tuple[tuple[int, ...], ...]:
 
 @cache
 def shape_gradients(kind: str) -> FloatArray:
-    """Gradients of the shape functions, shape (points, nodes, 3), at points that decide on a cell's sign.
+    """Gradients of the shape functions, shape (points, nodes, 3), at points that determine a cell's sign.
 
     The Jacobian of a straight tetrahedron is constant; elsewhere it is a polynomial, of degree 3 on a
-    tetra10 and up to 2 (5) in each coordinate of a hexahedron of first (second) order, and is looked at on a
-    lattice with as many points in each direction as it has coefficients, or more.
+    tetra10 and up to 2 (5) in each coordinate of a hexahedron of first (second) order, and is sampled on a
+    lattice with at least as many points in each direction as it has coefficients.
     """
     powers, coefficients = _polynomials(kind)
     steps = {"tetra": 1, "tetra10": 4, "hexahedron": 2}.get(kind, 5)
@@ -114,7 +114,7 @@ def shape_gradients(kind: str) -> FloatArray:
 
 
 def shape_values(kind: str, point: FloatArray) -> FloatArray:
-    """Shape functions of a cell at one place in reference coordinates, shape (nodes,)."""
+    """Shape functions of a cell at one point in reference coordinates, shape (nodes,)."""
     powers, coefficients = _polynomials(kind)
     return np.asarray(np.prod(point**powers, axis=1) @ coefficients)
 
@@ -148,7 +148,7 @@ def boundary_facets(geometry: ChamberGeometry) -> IntArray:
 def key_of(corners: IntArray, nodes: int) -> IntArray:
     """One number for the corners of each facet, shape (...) from (..., 3 or 4).
 
-    It is made of the three smallest, which two facets of a body share only when they are the same.
+    The number combines the three smallest node numbers, which two facets share only if they are equal.
     Raises: ValueError: more than `MOST_NODES` nodes.
     """
     if nodes > MOST_NODES:
@@ -158,7 +158,7 @@ def key_of(corners: IntArray, nodes: int) -> IntArray:
 
 
 def repeats(keys: IntArray) -> IntArray:
-    """Count of each number among all, in the shape of `keys`."""
+    """Number of occurrences of each key, in the shape of `keys`."""
     _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
     return np.asarray(counts[inverse].reshape(keys.shape))
 

@@ -1,6 +1,6 @@
-"""Position of a body about the shaft, the dimensions that follow, and its contradictions with other keys.
+"""Position of a body about the shaft, its dimensions, and contradictions with other keys of the scene.
 
-The keys are chambers, unit, port and the radii that the body must cover.
+These keys are chambers, unit, port and the radii that the body must cover.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from ringbalance.scene.rules.shape import DRAWING_ROUNDING, SIZE_CHECKS
 from ringbalance.scene.units import DIMENSIONS
 
 _DIMENSION_DIGITS: Final = 7
-"""Digits of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
+"""Digits of dimensions read off a mesh: rounding in a file must not put a port just outside its wall."""
 _LEAST_FACING: Final = 0.01
-"""Radial part of the outer wall's normals, on average, below which the wall is none."""
+"""Mean radial part of the normals below which a boundary is no outer wall."""
 _EDGE_FRACTIONS: Final = tuple(step / 32 for step in range(33))
-"""Fractions of an edge of second order, between which it is straight but for 1e-3 of its bulge."""
+"""Fractions of a second-order edge, between which it is straight within 1e-3 of its bulge."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class Placed:
 
     points: FloatArray
     dimensions: Mapping[str, float]
-    """By key of [disc]."""
+    """Dimensions by key of [disc], SI."""
 
 
 def placed(
@@ -48,18 +48,18 @@ def placed(
     axis: Axis,
     middle: float | None,
 ) -> tuple[Placed, tuple[Contradiction, ...]]:
-    """A body turned so that z is the shaft and x the middle of the chamber, and why it cannot lie there.
+    """A body rotated so that z is the shaft and x the middle of the chamber, and errors of its position.
 
     Args: `surface`: the outer facets. `middle`: angle of the chamber's middle, rad, in the plane
         across the shaft, from the next of the file's axes: from x for a shaft along z, from y for x, from z
-        for y; None for the middle of what the nodes take up.
+        for y; None for the middle of the sector of the nodes.
     """
     # The shaft along z; directions keep their handedness.
     third = "xyz".index(axis[-1])
     order = [(third + 1) % 3, (third + 2) % 3, third]
     signs = np.array([1.0, -1.0, -1.0]) if axis.startswith("-") else np.ones(3)
     x, y, z = (body.points[:, order] * signs).T
-    # The nodes take up all of the circle but the widest gap.
+    # The nodes cover the circle except for the widest gap.
     ordered = np.sort(np.arctan2(y, x)[np.unique(body.cells)])
     gaps = np.diff(np.append(ordered, ordered[0] + 2 * math.pi))
     widest = int(gaps.argmax())
@@ -87,7 +87,7 @@ def placed(
         "central_angle": extent,
         "plate_thickness": 0.0,
     }
-    # As many digits as a file's rounding leaves.
+    # Only the digits that are unaffected by rounding in the file.
     rounded = {key: float(f"{value:.{_DIMENSION_DIGITS}g}") for key, value in dimensions.items()}
     return Placed(points=points, dimensions=rounded), tuple(wrong)
 
@@ -117,7 +117,7 @@ def _from_origin(first: FloatArray, last: FloatArray) -> FloatArray:
 
 
 def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[Contradiction]:
-    """The outer wall reaches farther out than the inner wall, and has the outermost nodes."""
+    """Error of an outer wall that is not outermost, or whose normals have hardly any radial part."""
     if OUTER_WALL not in boundaries:
         return
     radius = np.hypot(points[:, 0], points[:, 1])
@@ -155,7 +155,7 @@ _LARGEST_RADIUS_M, _SMALLEST_RADIUS_M = 5.0, 1e-3
 """Outer radii, m, beyond which no balancing disc is built."""
 _LENGTHS: Final = ("outer_radius", "inner_radius", "axial_width")
 _FRAME: Final = [0, 1, 2, -1]
-"""Corners of a cell that span it; for its share of the volume."""
+"""Corners of a cell whose edges span it, for its fraction of the volume."""
 
 
 def unfitting(
@@ -168,7 +168,7 @@ def unfitting(
         yield Contradiction(problem=problem, allowed="chambers in [disc]")
     chambers = reading.values.get("disc.chambers") or even_number_of_chambers(extent)
     if chambers is not None:
-        # No node lies outside the sector that a chamber has at most.
+        # No node may lie outside the largest sector of a chamber.
         half = math.pi / chambers
         angle = np.abs(np.arctan2(points[:, 1], points[:, 0]))
         outside = np.flatnonzero(angle > half * (1 + DRAWING_ROUNDING))
@@ -202,16 +202,16 @@ def unfitting(
 def _scale_findings(
     reading: SceneReading, dimensions: Mapping[str, float], *, unit: str, port: float | None
 ) -> Iterator[Contradiction]:
-    """Lengths of the scene that no chamber of this size has, and the units in which they would fit.
+    """Lengths of the scene that fit no chamber of this size, and units of the mesh with which they would fit.
 
-    A length that fits no unit is an error of its own, not one of scale.
+    A length that fits with no unit is a separate error, not one of scale.
     Args: `dimensions`: of the mesh in `unit`, SI. `port`: radius of its boundary of that name, m.
     """
 
     units = DIMENSIONS["length"].units
 
     def misfit(other: str) -> str | None:
-        """Why a chamber drawn in another unit cannot be; None where it can."""
+        """Reason why a chamber drawn in another unit is impossible; None if it is possible."""
         factor = float(units[other].factor / units[unit].factor)
         sized = {key: value * (factor if key in _LENGTHS else 1.0) for key, value in dimensions.items()}
         if not _SMALLEST_RADIUS_M <= sized["outer_radius"] <= _LARGEST_RADIUS_M:
@@ -240,7 +240,7 @@ def _scale_findings(
 def _covered_findings(
     body: Body, points: FloatArray, *, radii: Mapping[str, float], fill: float
 ) -> Iterator[Contradiction]:
-    """Ports that the liquid leaves free at the start, and a gas inlet that it covers when it is most.
+    """Errors of a port above the liquid at the start, and of a gas inlet below it at the largest fill.
 
     Args: `radii`: of "port_radius" and "inlet_radius", as far as known. `fill`: greatest fill ratio of a
         chamber, of which one holds half at the start.

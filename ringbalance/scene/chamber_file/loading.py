@@ -1,4 +1,4 @@
-"""The mesh that a scene names: read, checked and turned into the record and the dimensions of its disc."""
+"""The mesh that a scene names: read, checked and converted to the record and the dimensions of the disc."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _STEP_ENDINGS: Final = (".step", ".stp")
 _STEP_UNIT: Final = "m"
 _MESHING_TIME_S: Final = 300
 _COARSEST, _FINEST = 1 / 6, 1 / 40
-"""Size of cells over the extent of the solid."""
+"""Largest and smallest size of cells over the extent of the solid."""
 _LARGEST_FILE_BYTES: Final = 2**28
 
 
 def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, tuple[Fault, ...]]:
-    """The reading with the geometry and the dimensions of the mesh that it names, and all errors of it."""
+    """The reading with geometry and dimensions of the mesh that it names, and all errors of the mesh."""
     keys = [f"disc.{key}" for key in keys_of(MeshKeys)]
     if not reading.given("disc.mesh"):
         problem, allowed = "it has no meaning without mesh", "mesh as well, or leave the key out"
@@ -65,7 +65,7 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
         scarce = Contradiction(problem=problem, allowed="a coarser mesh")
         faults = list(superfluous)
         for each in error.findings if isinstance(error, MeshFileError) else (scarce,):
-            # What a file calls its parts may not be printable.
+            # Names in a file may not be printable.
             problem = "".join(letter if letter.isprintable() else "?" for letter in each.problem)
             faults.append(reading.fault("disc.mesh", problem=problem, allowed=each.allowed))
         return unknown, tuple(faults)
@@ -79,7 +79,7 @@ def with_chamber(reading: SceneReading, *, folder: Path) -> tuple[SceneReading, 
 
 
 def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Placed]:
-    """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
+    """The mesh of a scene. Raises: MeshFileError: with all its errors."""
     name = reading.values["disc.mesh"]
     path, ending, step = folder / name, Path(name).suffix, _is_step(Path(name))
     if ending.lower() not in (*READERS, *_STEP_ENDINGS):
@@ -107,7 +107,7 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
     ]
     if everything:
         raise MeshFileError(everything)
-    # Without nodes that no cell has.
+    # Without nodes that belong to no cell.
     used = np.unique(body.cells)
     new = np.zeros(len(body.points), dtype=np.int64)
     new[used] = np.arange(len(used))
@@ -128,16 +128,16 @@ def _chamber(reading: SceneReading, folder: Path) -> tuple[ChamberGeometry, Plac
 
 
 def _is_step(path: Path) -> bool:
-    """True for a file of a solid, which is yet to be meshed and has its own unit."""
+    """True for a file of a solid, which must be meshed and states its own unit."""
     return path.suffix.lower() in _STEP_ENDINGS
 
 
 def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
     """The mesh of a STEP file in metres, of second order.
 
-    The size of the cells over the extent of the solid is the cube root of the tolerance over 2: what
-    quadratic cells leave of a field falls with the third power of their size.
-    Raises: MeshFileError: no Gmsh is there, or it cannot mesh the solid in time.
+    The size of the cells over the extent of the solid is the cube root of the tolerance over 2: the
+    error of quadratic cells falls with the third power of their size.
+    Raises: MeshFileError: Gmsh is missing, or cannot mesh the solid in time.
     """
     if find_spec("gmsh") is None:
         problem = "a STEP file needs the extra cad, which meshes it"

@@ -1,6 +1,6 @@
 """The contents of a mesh file, in its own unit: Gmsh and VTK by meshio, Abaqus by a reader of its own.
 
-For a damaged file meshio raises anything, prints, or ends the process; here that is one error.
+For a damaged file meshio raises any exception, prints, or ends the process; this module reports one error.
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ _UNREAD_GMSH: Final = MappingProxyType(
     }
 )
 _GMSH_DATA: Final = re.compile(rb"(?ms)^\$(NodeData|ElementData|ElementNodeData)\s.*?\$End\1\s*")
-"""Results on the mesh, which meshio wants for every node."""
+"""Results on the mesh, which meshio requires for every node; left out."""
 _VTU: Final = "a .vtu file of an UnstructuredGrid, compressed by zlib, lzma or not at all"
 _FLUENT: Final = (b"(0", b"(1", b"(2")
 _MOST_UNPACKED_BYTES: Final = 8 * 12 * MOST_NODES
-"""Bytes of one array: the connectivity of cells of ten nodes and their facets, which share most nodes."""
+"""Largest size of one array, bytes: connectivity of ten-node cells and facets, which share most nodes."""
 _SPARE_BYTES: Final = 300_000_000
 _BYTES_PER_FILE_BYTE: Final = 100
-"""Bytes that reading may take in all, and for each of the file: text of a few digits becomes numbers, copied
-some times, and lists of them."""
+"""Bytes that reading may take for each byte of the file, besides `_SPARE_BYTES`: short texts become numbers,
+copied several times, and lists of numbers."""
 _COMPRESSED: Final = re.compile(rb"<VTKFile[^>]*\bcompressor=")
 _INLINE: Final = re.compile(rb"<DataArray[^>]*\bformat=.binary.[^>]*>\s*")
 _APPENDED: Final = re.compile(rb"<AppendedData\s+encoding=.(raw|base64).\s*>\s*_")
@@ -73,7 +73,7 @@ def _by_meshio(
 ) -> meshio.Mesh:
     """Raises: MeshFileError: the file is no such mesh.
 
-    Args: `allowed`: what is. `unread`: sentences about sound files, by what stands in them or in the error.
+    Args: `allowed`: accepted files. `unread`: sentences on sound files, by a text in the file or the error.
     """
     bound = _SPARE_BYTES + _BYTES_PER_FILE_BYTE * len(content)
     quiet = redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO())
@@ -86,7 +86,7 @@ def _by_meshio(
             try:
                 mesh = read(str(path))
             except (Exception, SystemExit) as error:
-                # A damaged count asks for all memory that there is.
+                # A damaged count may request all memory.
                 reason = " ".join(str(error).split())[:200]
                 for pattern, text in unread.items():
                     if re.search(pattern.encode(), content) or re.search(pattern, reason):
@@ -123,9 +123,9 @@ def _read_gmsh(content: bytes) -> Contents:
 
 
 def _groups(mesh: meshio.Mesh) -> Iterator[Mark]:
-    """Physical groups: those of version 4.1 as sets, of which an element may have several, and numbers.
+    """Physical groups: sets of version 4.1, several for an element, and group numbers.
 
-    A group that nobody named keeps its number, so that a message can name it.
+    A group without a name keeps its number, so that a message can name it.
     """
     for name, sets in mesh.cell_sets.items():
         for block, rows in enumerate(sets if not name.startswith("gmsh:") else ()):
@@ -142,13 +142,13 @@ def _groups(mesh: meshio.Mesh) -> Iterator[Mark]:
 
 
 def _known(name: str) -> str:
-    """A name of a boundary or the volume, which a file may have in any case; other names as they are."""
+    """Name of a boundary or of the volume in lower case; any other name unchanged."""
     lower = name.strip().lower()
     return lower if lower in (*KNOWN_NAMES, VOLUME) else name
 
 
 def _read_vtu(content: bytes) -> Contents:
-    """Data of cells that have a boundary's name, and are not zero on its facets, are the names."""
+    """Contents of a .vtu file: cell data with the name of a boundary are non-zero on its facets."""
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         raise MeshFileError.of("it declares XML entities, which no mesh needs", "a .vtu file without DOCTYPE")
     if b"<VTKFile" not in content[:1000]:
@@ -169,7 +169,7 @@ def _read_vtu(content: bytes) -> Contents:
 
 
 def _refuse_bomb(content: bytes) -> None:
-    """Refuse an array that would grow beyond any mesh, by the sizes that stand before its compressed blocks.
+    """Refuse an array larger than any mesh, by the sizes stated before its compressed blocks.
 
     Raises: MeshFileError.
     Source: VTK file formats, XML: number of blocks, size of a block, size of the last one.
@@ -233,35 +233,35 @@ _READ: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "end instance": (),
     }
 )
-"""Keywords of a mesh with the options that may stand there, some with one value alone."""
+"""Keywords of a mesh with their accepted options, some with a single accepted value."""
 _PASSED: Final = re.compile(
     r"heading|preprint|nset|material|density|elastic|(solid|shell|membrane|surface) section"
 )
-"""Keywords that leave the mesh as it is."""
+"""Keywords that do not change the mesh."""
 _SKIPPED: Final = re.compile(r"(surface|line|volume)\d+|_.*|", re.IGNORECASE)
-"""Names that programs give by themselves."""
+"""Names that programs assign automatically."""
 
 
 @dataclass
 class _MeshContent:
-    """Content read so far; names in small letters."""
+    """Content read so far; names in lower case."""
 
     nodes: list[FloatArray] = field(default_factory=list)
-    """Rows of number and coordinates."""
+    """Nodes: rows of number and coordinates."""
     elements: list[tuple[str, str, IntArray]] = field(default_factory=list)
-    """Kind, name, rows of number and numbers of nodes."""
+    """Kind, name, and rows of element number and node numbers."""
     sets: dict[str, list[IntArray]] = field(default_factory=dict)
-    """Numbers of elements."""
+    """Element numbers by name of the set."""
     surfaces: list[tuple[str, str, str]] = field(default_factory=list)
-    """Name; an element or a set; a face of it."""
+    """Name, element or set, and face of each line of a surface."""
 
 
 def _read_abaqus(content: bytes) -> Contents:
     """The contents of an .inp file up to its first step: nodes, elements, element sets and surfaces.
 
     Own code: meshio passes over *SURFACE, keeps the last of several *NODE, *ELSET or *ELEMENT of one name,
-    and gives the set of one *ELEMENT to another where some have none, all without a word.
-    Raises: MeshFileError: it is no such file, or damaged.
+    and assigns the set of one *ELEMENT to another where some have none, all without a warning.
+    Raises: MeshFileError: no such file, or a damaged one.
     Source: Abaqus keywords reference, *NODE, *ELEMENT, *ELSET, *SURFACE; faces of solid elements as its
         element library numbers them.
     """
@@ -301,7 +301,7 @@ def _read_abaqus(content: bytes) -> Contents:
 
 
 def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
-    """Each keyword with its options and the lines of data under it; text before the first is none."""
+    """Each keyword with its options and its data lines; text before the first keyword is ignored."""
     for block in re.split(r"(?m)^\*(?!\*)", re.sub(r"(?m)^\*\*.*$", "", text))[1:]:
         head, *data = (line for line in block.splitlines() if line.strip())
         while head.rstrip().endswith(",") and data and data[0].lstrip()[0].isalpha():
@@ -313,7 +313,7 @@ def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
 
 
 def _add(parts: _MeshContent, keyword: str, options: dict[str, str], data: list[str]) -> None:
-    """Raises: MeshFileError: a keyword or an option that might change the mesh, and that is not read."""
+    """Raises: MeshFileError: a keyword or an option that is not supported and might change the mesh."""
     if keyword == "include":
         raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
     if keyword not in _READ:
@@ -386,13 +386,13 @@ def _set(data: list[str], generate: bool, parts: _MeshContent) -> IntArray:
 
 
 def _numbers_in(name: str, parts: _MeshContent) -> IntArray:
-    """Numbers of the elements that a set, or *ELEMENT with its option, has under a name."""
+    """Numbers of the elements under a name, given by a set or by the option of *ELEMENT."""
     named = [rows[:, 0] for _, block, rows in parts.elements if block == name]
     return np.concatenate([np.empty(0, dtype=np.int64), *named, *parts.sets.get(name, [])])
 
 
 def _marks(parts: _MeshContent) -> Iterator[Mark]:
-    """Names of elements; a set of cells matters as `chamber` only."""
+    """Names of elements; a set of cells counts only if named `chamber`."""
     names = dict.fromkeys([*parts.sets, *(name for _, name, _ in parts.elements)])
     for name in (each for each in names if not _SKIPPED.fullmatch(each)):
         numbers = _numbers_in(name, parts)
@@ -410,7 +410,7 @@ def _sides(parts: _MeshContent) -> Iterator[tuple[str, IntArray]]:
             inside = np.isin(rows[:, 0], numbers)
             if not inside.any():
                 continue
-            # A shell is a face itself.
+            # A shell element is itself a face.
             face = list(range(_NODES[kind]))
             if kind in CELL_KINDS:
                 cell_faces = faces(kind)
@@ -426,4 +426,4 @@ def _sides(parts: _MeshContent) -> Iterator[tuple[str, IntArray]]:
 READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
     {".msh": _read_gmsh, ".inp": _read_abaqus, ".vtu": _read_vtu}
 )
-"""By the ending of a file's name."""
+"""Readers by the ending of a file's name."""

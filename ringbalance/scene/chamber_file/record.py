@@ -1,6 +1,4 @@
-"""The space of one chamber, gas and liquid together: keys of [disc] that name its mesh, and the mesh
-itself.
-"""
+"""Space of one chamber for gas and liquid: keys of [disc] that name its mesh, and the mesh."""
 
 from __future__ import annotations
 
@@ -52,13 +50,13 @@ class MeshKeys:
 
 
 CellKind = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27"]
-"""One kind in a mesh; names and orders of nodes are meshio's."""
+"""Kind of cells, one in a mesh; names and node orders are meshio's."""
 OUTER_WALL: Final = "outer_wall"
-"""The boundary that every chamber has."""
+"""Name of the boundary that every chamber must have."""
 PORT: Final = "port"
 WALLS: Final = "walls"
 VOLUME: Final = "chamber"
-"""Name of the cells, where they have one."""
+"""Name of the volume, where cells have a name."""
 MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
     {
         OUTER_WALL: "farthest from the shaft, where the liquid lies; needed",
@@ -84,8 +82,8 @@ class ChamberGeometry:
     """A checked mesh of one chamber.
 
     Axes: x outward through the middle of the chamber's opening angle, y with the rotation, z along the shaft
-    and zero half-way along the chamber.  Two are equal when they were read from the same bytes in the same
-    way, so that a disc with one can be the key of a cache.
+    and zero half-way along the chamber.  Two meshes are equal when they were read from the same bytes in
+    the same way, so that a disc with a mesh can be the key of a cache.
     """
 
     file: str = field(compare=False)
@@ -94,7 +92,7 @@ class ChamberGeometry:
     """SHA-256 of the file's bytes, unit and axis."""
     kind: CellKind = field(compare=False)
     points: FloatArray = field(compare=False, repr=False)
-    """Places of the nodes, m, shape (n, 3)."""
+    """Coordinates of the nodes, m, shape (n, 3)."""
     cells: IntArray = field(compare=False, repr=False)
     """Numbers of nodes, shape (cells, nodes of a cell); every cell's Jacobian is positive."""
     boundaries: Mapping[str, IntArray] = field(compare=False, repr=False)
@@ -104,7 +102,7 @@ class ChamberGeometry:
     """Stretch from the mesh of the file; None for that mesh itself."""
 
     def __str__(self) -> str:
-        """The file and what it holds, for people."""
+        """Name of the file and summary of its content."""
         return f"{self.file}: {len(self.cells)} {self.kind} cells, {', '.join(self.boundaries)}"
 
     def stretched(self, *, dimensions: Mapping[str, float], quantity: str, value: float) -> ChamberGeometry:
@@ -112,7 +110,7 @@ class ChamberGeometry:
 
         A radius r becomes R1 + (r - R1) (R2' - R1) / (R2 - R1), so that the other radius stays; angles and
         heights are multiplied.
-        Args: `dimensions`: of the mesh as it is, SI, by key of `STRETCHED`. `value`: SI.
+        Args: `dimensions`: present dimensions of the mesh, SI, by key of `STRETCHED`. `value`: SI.
         Range: small changes; a fillet or a gas tube is stretched with the rest.
         """
         x, y, z = self.points.T
@@ -134,7 +132,7 @@ class ChamberGeometry:
 
 @dataclass(frozen=True, kw_only=True)
 class Stretch:
-    """A mesh drawn out along radius, angle and shaft, each evenly."""
+    """Stretch of a mesh along radius, angle and shaft, uniform in each."""
 
     base: ChamberGeometry
     before: Mapping[str, float]

@@ -1,6 +1,6 @@
 """Soundness of a body of cells: their connections, the shape of each, and the names of boundaries.
 
-What a file has as names is compared with what a chamber needs, facet by facet.
+The names in a file are compared facet by facet with those that a chamber needs.
 """
 
 from __future__ import annotations
@@ -34,28 +34,28 @@ from ringbalance.scene.kinds import Contradiction
 from ringbalance.scene.toml import toml_text
 
 _SAME_NODE_SHARE: Final = 1e-7
-"""Distance, as a share of the body, below which two nodes are meant to be one."""
+"""Distance over the extent of the body below which two nodes are meant to be one."""
 _ON: Final = 1e-6
-"""Distance from a facet, as a share of its size, below which a node lies on it."""
+"""Distance from a facet over the facet's size below which a node lies on it."""
 _MOST_NEAR_PAIRS: Final = 5_000_000
-"""Pairs of facets and nodes near them that are looked at, the facets with the fewest first."""
+"""Most pairs of a facet and a node near it that are checked, the facets with the fewest first."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Facets:
-    """All sides of all cells; two cells that meet have one each."""
+    """Sides of all cells; a facet between two cells counts twice."""
 
     nodes: IntArray
-    """Shape (sides, nodes of a facet), in meshio's order."""
+    """Nodes of each side in meshio's order, shape (sides, nodes of a facet)."""
     corners: int
     cells: IntArray
     """Cell of each side."""
     keys: IntArray
-    """Equal for sides with the same corners."""
+    """Key of each side, equal for sides with the same corners."""
     outer: IntArray
-    """Sides that no other cell has."""
+    """Sides that belong to one cell only."""
     shared: BoolArray
-    """Keys in rising order that more than two cells have."""
+    """True for keys, in rising order, that more than two cells share."""
 
     @classmethod
     def of(cls, body: Body) -> Facets:
@@ -73,7 +73,7 @@ class Facets:
         )
 
     def findings(self, body: Body) -> Iterator[Contradiction]:
-        """Errors in the way cells hang together."""
+        """Errors in the connections of cells."""
         ordered = np.sort(body.cells, axis=1)
         twice = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
         yield from _about(body, "cells have a node twice", body.corners[twice], "cells with different nodes")
@@ -90,7 +90,7 @@ class Facets:
         parts = [*_several_volumes(body, self)]
         yield from (*crowded, *doubled, *hanging, *parts)
         if not (crowded or doubled or hanging or parts):
-            # Edges at which the outer surface meets itself.
+            # Edges at which the outer surface touches itself.
             edges = np.sort(edges_of(self.nodes[self.outer, : self.corners]).reshape(-1, 2), axis=1)
             different, counts = np.unique(edges, axis=0, return_counts=True)
             what = "the surface is open or touches itself along edges"
@@ -102,13 +102,13 @@ class Facets:
 
 
 def _about(body: Body, what: str, entities: IntArray, allowed: str) -> Iterator[Contradiction]:
-    """An error about some nodes, or about entities that are given as rows of nodes; none without any."""
+    """One error about nodes, or about entities given as rows of nodes; none if there are no entities."""
     if len(entities):
         yield Contradiction(problem=f"{what} ({len(entities)}): {body.at(entities)}", allowed=allowed)
 
 
 def _same_rows(rows: IntArray) -> IntArray:
-    """Places of rows that stand before, in any order of rows: sorted by a number made of each."""
+    """Indices of rows that repeat an earlier one: rows are sorted by a number made of each."""
     weights = np.random.default_rng(0).integers(1, 2**62, size=rows.shape[1], dtype=np.int64)
     with np.errstate(over="ignore"):
         code = (rows * weights).sum(axis=1)
@@ -118,7 +118,7 @@ def _same_rows(rows: IntArray) -> IntArray:
 
 
 def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
-    """Nodes at one place that are not the same node: the body has a slit there."""
+    """Error about distinct nodes at one point: the body has a slit there."""
     nodes = np.unique(facets.nodes[facets.outer])
     points = body.points[nodes]
     step = _SAME_NODE_SHARE * (float(np.ptp(points, axis=0).max()) or 1.0)
@@ -129,7 +129,7 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
 
 
 def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
-    """Nodes that lie on a facet of which they are no corner."""
+    """Error about nodes that lie on a facet without being its corner."""
     middles = np.unique(body.cells[:, CORNERS[body.kind] :])
     mixed = np.intersect1d(middles, body.corners)
     outer = facets.nodes[facets.outer, : facets.corners]
@@ -141,7 +141,7 @@ def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Contradiction]:
 
 
 def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> IntArray:
-    """Nodes that lie on triangles, away from the corners of these."""
+    """Nodes that lie on triangles, but at none of their corners."""
     nodes = np.unique(triangles)
     if not len(nodes):
         return nodes
@@ -183,15 +183,15 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Contradiction]:
 
 
 _CELLS_AT_ONCE: Final = 4096
-"""Cells whose Jacobians are held at one time."""
+"""Number of cells whose Jacobians are in memory at one time."""
 _FLAT: Final = 1e-9
-"""Jacobian over the cube of the longest diagonal below which a cell has no volume that rounding leaves."""
+"""Jacobian over the cube of the longest diagonal below which rounding exceeds a cell's volume."""
 
 
 def oriented(body: Body) -> tuple[Body, tuple[Contradiction, ...]]:
-    """The body with positive cells, and cells that are inverted, folded or flat.
+    """The body with positive cells, and errors about cells that are inverted, folded or flat.
 
-    A body whose every cell is negative was written in the other orientation, and is turned round.
+    A body with only negative cells was written in the opposite orientation, and is converted.
     """
     lowest, highest, size = _jacobians(body)
     flat = np.maximum(np.abs(lowest), np.abs(highest)) < _FLAT * size**3
@@ -232,7 +232,7 @@ def _misshapen(
         body.corners[flat],
         "cells whose corners do not lie in one plane",
     )
-    # Where cells of negative Jacobian are most, the others may be the wrong ones.
+    # If most cells have a negative Jacobian, the others may be the wrong ones.
     fewer = np.count_nonzero(inverted) <= len(inverted) / 2
     word = "are inverted" if fewer else "have another orientation than the others"
     allowed = "cells that all have the same orientation"
@@ -257,13 +257,13 @@ def _mirrored(kind: str) -> IntArray:
 
 
 def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tuple[Contradiction, ...]]:
-    """Facets of a body by name, each as its cell has them, and what is wrong with the names."""
+    """Facets of a body by name, with the node order of their cells, and errors of the names."""
     wrong = [*_volume_names(body), *_missing(body)]
     sides = facets.outer[np.argsort(facets.keys[facets.outer], kind="stable")]
     held = np.zeros((len(KNOWN_NAMES), len(sides)), dtype=np.bool_)
     for each in body.named:
         at, real = _places(body, facets, each, facets.keys[sides])
-        # Named elements that are no outer facet: between two cells, or of no cell.
+        # Named elements that are not on the outer surface: between two cells, or of no cell.
         _, side = _places(body, facets, each, np.sort(facets.keys))
         for strange, what in ((side & ~real, "lie between two cells"), (~side, "are no side of any cell")):
             what = f"facets named {toml_text(each.name)} {what}"
@@ -276,7 +276,7 @@ def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tupl
         if each.name in KNOWN_NAMES:
             held[KNOWN_NAMES.index(each.name), at[real]] = True
     for each in (named for named in body.named if named.name not in KNOWN_NAMES):
-        # Facets of an unknown name that have no known one beside it.
+        # Facets with an unknown name and without a known one.
         at, real = _places(body, facets, each, facets.keys[sides])
         alone = ~(real & held[:, at].any(axis=0))
         what = f"facets have the unknown name {toml_text(each.name)}{did_you_mean(each.name, KNOWN_NAMES)}"
@@ -300,7 +300,7 @@ def _places(body: Body, facets: Facets, named: NamedFacets, keys: IntArray) -> t
 
 
 def _volume_names(body: Body) -> Iterator[Contradiction]:
-    """All cells belong to the volume, or none has a name; a single group of cells is the volume."""
+    """Error unless all cells belong to the volume or none is named; a single group of cells is the volume."""
     groups = dict(body.cell_names)
     volume = next(iter(groups)) if len(groups) == 1 else VOLUME
     inside = groups.get(volume, np.zeros(len(body.cells), dtype=np.bool_))

@@ -1,7 +1,7 @@
-"""A process of its own that meshes a STEP file with Gmsh: `python -m ... solid.step solid.msh 0.1`.
+"""Separate process that meshes a STEP file with Gmsh: `python -m ... solid.step solid.msh 0.1`.
 
-Faces have the names that the STEP file gives them.  Where it names none, those at the largest and smallest
-distance from the z axis are the outer and the inner wall, and those at its ends the end walls.
+Faces have the names in the STEP file.  If it names none, the faces at the largest and smallest distance from
+the z axis are the outer and the inner wall, and those at the ends of the solid the end walls.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _mesh_step(source: str, target: str, share: float) -> None:
 
 
 def _placed(faces: list[_Entity]) -> Iterator[tuple[_Entity, str]]:
-    """Names that follow from where faces lie about the z axis."""
+    """Faces with names by their position about the z axis."""
     nodes = {}
     for face in faces:
         _, xyz, _ = gmsh.model.mesh.getNodes(*face, includeBoundary=True)

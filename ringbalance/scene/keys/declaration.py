@@ -1,12 +1,12 @@
-"""Keys of a scene file as the fields of records declare them: each key once, in its field's annotation.
+"""Declarations of keys of a scene file: each key once, in the annotation of a record's field.
 
     bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, Shown("bore d", "mm")]
 
-A field is a key when its annotation holds a `Presence`. What may be written there is the `Reader` of the
-annotation, or follows from the type: a `Literal`, a record, or a tuple of records. Reading, defaults,
+A field is a key when its annotation holds a `Presence`. Accepted values are those of the annotation's
+`ValueReader`, or follow from the type: a `Literal`, a record, or a tuple of records. Reading, defaults,
 uncertainties, descriptions and the reference in the documentation derive from these declarations.  Values are
-SI: in the first unit that `DIMENSIONS` has for the reader's dimension.  Modules with such records do without
-`from __future__ import annotations`: each annotation would be compiled again at every start.
+SI: in the first unit of the reader's dimension in `DIMENSIONS`.  Modules with such records do not use
+`from __future__ import annotations`, because each annotation would be compiled again at every start.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ class Presence:
     """Meaning of a key, and the rule when it is absent."""
 
     kind: Literal["needed", "standard", "derived", "unused"]
-    """Always needed; with a default value; following from other keys; or leaving out a term."""
+    """Needed always; with a default; derived from other keys; or, if absent, leaving out its term."""
     meaning: str
     default: object = None
     """Default value as a user would write it."""
     otherwise: str = ""
     """Rule that holds when the key is left out, in words."""
     rule: Callable[..., Any] | None = None
-    """Value that follows from those of `needs`, or None; without a rule it is theirs."""
+    """Default as a function of the values of `needs`, may return None; without a rule it is their value."""
     needs: tuple[str, ...] = ()
-    """Paths "table.key" of what the value follows from; empty when other code fills it in."""
+    """Paths "table.key" from which the value is derived; empty when other code fills it in."""
     also: tuple[str, ...] = ()
-    """Paths of what it follows from as well where that is there, else None."""
+    """Further paths from which it is derived; None for an absent value."""
 
     def value(self, *values: Any) -> Any:
-        """Value that follows from those of `needs`; None when there is none in this case."""
+        """Value derived from those of `needs`; None when the rule gives none."""
         return values[0] if self.rule is None else self.rule(*values)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entries:
-    """A key whose value is one table, or a list of tables, of which records are made."""
+    """A key whose value is one table, or a list of tables, read into records."""
 
     record: Callable[..., Any]
     keys: Mapping[str, Key]
     example: str
-    """The list as one would write it; empty for one table."""
+    """The list as a user would write it; empty for one table."""
     dimension: ClassVar[str | None] = None
 
     @property
@@ -74,15 +74,15 @@ class Key:
     takes: ValueReader | Entries
     presence: Presence
     uncertain: bool = False
-    """True if [uncertainty] may have its half-width."""
+    """True if [uncertainty] may state its half-width."""
     common: bool = False
-    """True if all devices of a scene have it alike: its uncertainty is lack of knowledge."""
+    """True if all devices of a scene have the same value, whose uncertainty is lack of knowledge."""
     shown_unit: str = ""
-    """Unit of its description; empty where its declaration has none."""
+    """Unit in descriptions; empty where the declaration has none."""
 
     @property
     def usual_unit(self) -> str:
-        """Unit in which a person writes its number; empty for what has no unit."""
+        """Unit in which users write the value; empty without unit."""
         if self.takes.dimension is None:
             return ""
         kind = DIMENSIONS[self.takes.dimension]
@@ -91,7 +91,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Shown:
-    """Description of a field for a reader."""
+    """Description of a field in reports and messages."""
 
     name: str
     """Name with symbol, such as "outer radius R2"."""
@@ -99,9 +99,9 @@ class Shown:
     _: KW_ONLY
     note: str = ""
     absent: str = ""
-    """Text in place of a value that the scene lacks; empty: no line."""
+    """Text in place of an absent value; empty: no line."""
     only_for: str = ""
-    """Control algorithm for which it is described; empty for all."""
+    """Control algorithm for which the field is described; empty for all."""
     dimension: str | None = None
     """A key of `DIMENSIONS`; None for that of the field's reader."""
 
@@ -121,9 +121,9 @@ class _Uncertain:
 
 
 UNCERTAIN = _Uncertain(common=False)
-"""It varies from device to device."""
+"""Mark of a quantity that varies from device to device."""
 UNKNOWN = _Uncertain(common=True)
-"""All devices have it alike, and it is not known exactly."""
+"""Mark of a quantity with one value for all devices that is not known exactly."""
 
 
 def needed(
@@ -131,13 +131,13 @@ def needed(
 ) -> Presence:
     """Declare a key that every scene must have.
 
-    Args: `needs`, `otherwise`, `rule`: as of `derived`, of one that follows where those others are there.
+    Args: `needs`, `otherwise`, `rule`: see `derived`; for a key that is derived where those others are given.
     """
     return Presence(kind="needed", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs)
 
 
 def standard(default: object, meaning: str) -> Presence:
-    """Declare a key with a default, given as a user would write it."""
+    """Declare a key with a default, written as by a user."""
     return Presence(kind="standard", meaning=meaning, default=default)
 
 
@@ -148,16 +148,16 @@ def derived(
     also: tuple[str, ...] = (),
     rule: Callable[..., Any] | None = None,
 ) -> Presence:
-    """Declare a key whose default follows from those at the paths `needs`, as `otherwise` says in words.
+    """Declare a key whose default is derived from the paths `needs`; `otherwise` describes the rule.
 
-    Args: `also`: paths of what comes after them, None where a file lacks it. `rule`: a function with a name:
+    Args: `also`: paths of further arguments of the rule, None where absent. `rule`: a function with a name:
         a lambda in an annotation does not see its module.
     """
     return Presence(kind="derived", meaning=meaning, otherwise=otherwise, rule=rule, needs=needs, also=also)
 
 
 def unused(otherwise: str, meaning: str) -> Presence:
-    """Declare a key without which a term is left out; `otherwise` says what holds then."""
+    """Declare a key without which the model leaves out a term; `otherwise` describes that case."""
     return Presence(kind="unused", meaning=meaning, otherwise=otherwise)
 
 
@@ -193,7 +193,7 @@ def _part(hint: Any, kind: type[Part]) -> Part | None:
 
 
 def _parts(hint: Any) -> Iterator[Any]:
-    """Everything inside an annotation: its types, and what was put beside them."""
+    """Types and metadata inside an annotation, nested ones included."""
     yield hint
     for inner in get_args(hint):
         yield from _parts(inner)

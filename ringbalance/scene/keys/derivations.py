@@ -1,4 +1,4 @@
-"""Geometry and grades from which defaults follow, and by which rules judge what is given."""
+"""Geometry and balance grades, for defaults and for rules."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def swept_area(*, radius: npt.ArrayLike, central_angle: float, plate_thickness: 
 def even_number_of_chambers(central_angle: float) -> int | None:
     """Number of chambers of an angle theta (rad) that fill the circle; None when it would not be even.
 
-    n = 2 pi / theta, when that is an even whole number from 4 on to within 0.001, as drawings round angles.
+    n = 2 pi / theta if within 0.001 of an even integer of 4 or more, because drawings round angles.
     """
     exact = 2 * math.pi / central_angle
     nearest = round(exact) if exact <= len(LETTERS) else 0
@@ -56,19 +56,18 @@ def trial_sequence(chambers: int) -> tuple[str, ...]:
 
 
 def shortest_path(*, port_radius: float, hump_radius: float | None, separation: float) -> float:
-    """Length that no path between two ports can fall below.
+    """Lower bound of the length of a path between two ports, m.
 
     Both ports lie at r_p, an angle psi apart; the path keeps to r >= r_m and touches r_m somewhere.  Its
-    projection along the shaft is no longer than itself, so the plane is enough.
+    projection along the shaft is not longer than the path, so that the plane case suffices.
 
     - no hump: the chord, 2 r_p sin(psi/2);
     - the chord passes inside the crest's circle, r_p cos(psi/2) < r_m: the taut string around that circle,
       2 sqrt(r_p^2 - r_m^2) + r_m (psi - 2 acos(r_m/r_p));
     - else the longer of the chord and of the way in and out, 2 (r_p - r_m).
-    Args: `port_radius`: r_p, m. `hump_radius`: r_m, m, at most r_p; None for a path that may go anywhere.
+    Args: `port_radius`: r_p, m. `hump_radius`: r_m, m, at most r_p; None without a siphon crest.
         `separation`: psi, rad, within [0, pi].
-    Returns: Length, m.
-    Range: the last case is a bound that is not reached; the others are lengths of actual paths.
+    Range: the last case is a bound below every path; the others are lengths of actual paths.
     Source: elementary geometry (shortest path around a circle).
     """
     chord = 2 * port_radius * np.sin(separation / 2)

@@ -1,6 +1,6 @@
-"""Readers of a key's value: they turn a TOML value into SI, or say what is allowed.
+"""Readers of a key's value: conversion of a TOML value to SI, or an error with the accepted values.
 
-A reader stands in the annotation of a record's field, see `declaration`.
+A reader is part of the annotation of a record's field, see `declaration`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _LARGEST_NUMBER = 1e9
 _LINE_CHARACTERS = 200
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 LEAST_CHAMBERS = 4
-"""Two pairs: one corrects along its own line only."""
+"""Least number of chambers, two pairs: one pair corrects along a single line only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class ValueReader:
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """The interval that a value must lie in, as numbers and as people write it."""
+    """Interval of accepted values, as numbers and as users write it."""
 
     above: float | None = None
     """Exclusive."""
@@ -49,7 +49,7 @@ class Bounds:
     """Exclusive."""
 
     def holds(self, value: float) -> bool:
-        """True for a value, in the unit of the bounds, that lies inside."""
+        """True for a value inside the interval, in the unit of the bounds."""
         return (
             (self.above is None or value > self.above)
             and (self.at_least is None or value >= self.at_least)
@@ -93,13 +93,13 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> ValueReader:
 
 
 def _pressure(bounds: Bounds, *, gauge: bool) -> ValueReader:
-    """Reader of a gauge or an absolute pressure, in whose unit that may be marked: "7 barg", "1 bara"."""
+    """Reader of a gauge or an absolute pressure, whose unit may have that mark: "7 barg", "1 bara"."""
     plain = quantity("pressure", bounds)
     return replace(plain, read=lambda value: plain.read(counted_pressure(value, gauge=gauge)))
 
 
 def _balance_grade() -> ValueReader:
-    """Reader of a balance quality grade of ISO 21940-11, m/s: "G 2.5", or the velocity it stands for."""
+    """Reader of a balance quality grade of ISO 21940-11, m/s: "G 2.5", or its velocity."""
     plain = quantity("velocity", POSITIVE)
     allowed = f'a grade such as "G 2.5", or {plain.allowed}'
 
@@ -121,14 +121,14 @@ def angle_of_turn() -> ValueReader:
 
     def read(value: object) -> float:
         angle = parse_quantity(value, "angle")
-        # 360 deg is the full turn itself, however it was rounded.
+        # A rounded 360 deg is a full turn.
         return angle if abs(angle) <= 2 * math.pi * (1 + 1e-12) else math.remainder(angle, 2 * math.pi)
 
     return ValueReader(read=read, allowed=allowed, summary="an angle", dimension="angle")
 
 
 def share(bounds: Bounds, *, example: float) -> ValueReader:
-    """Reader of a share of one: a bare number or a percentage."""
+    """Reader of a fraction: a plain number or a percentage."""
     allowed = f'a share {bounds}, such as {example:g} or "{100 * example:g} %"'
 
     def read(value: object) -> float:
@@ -141,7 +141,7 @@ def share(bounds: Bounds, *, example: float) -> ValueReader:
 
 
 def number(bounds: Bounds) -> ValueReader:
-    """Reader of a bare number that has no unit."""
+    """Reader of a plain number without unit."""
     allowed = f"a bare number {bounds}".replace("number at", "number of at").strip()
 
     def read(value: object) -> float:
@@ -174,7 +174,7 @@ def _whole(value: object, allowed: str) -> int:
 
 
 def chamber_count() -> ValueReader:
-    """Reader of the number of chambers: even, at least two pairs, and no more than there are letters for."""
+    """Reader of the number of chambers: even, at least two pairs, and at most the number of letters."""
     allowed = f"an even whole number from {LEAST_CHAMBERS} to {len(LETTERS)}"
 
     def read(value: object) -> int:
@@ -191,7 +191,7 @@ def chamber_count() -> ValueReader:
 
 
 def whole(lowest: int, highest: int, *, highest_text: str = "") -> ValueReader:
-    """Reader of a whole number; `highest_text` is the highest as people write it."""
+    """Reader of a whole number; `highest_text` is the highest as users write it."""
     interval = f"from {lowest} to {highest_text or highest}"
     allowed = f"a whole number {interval}"
 
@@ -205,7 +205,7 @@ def whole(lowest: int, highest: int, *, highest_text: str = "") -> ValueReader:
 
 
 def each_of(reader: ValueReader, *, example: str, count: int = 0) -> ValueReader:
-    """Reader of a list of values of one sort, as many as `count` unless it is zero; its values are tuples."""
+    """Reader of a list of values of one kind, `count` of them unless that is zero; its values are tuples."""
     size = f"a list of {count}" if count else "a list"
     allowed = f"{size} such as {example}; each {reader.allowed}"
 
@@ -247,7 +247,7 @@ def choice(words: Any) -> ValueReader:
 
 
 def one_of(words: Callable[[], tuple[str, ...]]) -> ValueReader:
-    """Reader of one of the words that are there when it reads."""
+    """Reader of one of the words that a function returns at the time of reading."""
 
     def quoted() -> str:
         return " or ".join(f'"{option}"' for option in words())

@@ -1,6 +1,6 @@
-"""A TOML document against the declared keys: what could be read, and an error for all that could not.
+"""Reading of a TOML document by the declared keys: values, and an error for each that cannot be read.
 
-What a file leaves out follows from its other values where a default says so, or is an error.
+An absent value is derived from others where a default says so; else it is an error.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ringbalance.scene.toml import toml_key, toml_text
 from ringbalance.scene.units import FieldError, format_quantity
 
 _MOST_GUESSED_KEYS = 100
-"""Unknown keys of a file for which the key that was meant is looked for: a third of a millisecond each."""
+"""Most unknown keys of a file for which the intended key is guessed; each takes a third of a millisecond."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +26,7 @@ class _Rejected:
 
     steps: KeyPath
     content: object
-    """Present value."""
+    """Value in the file."""
     kind: Literal["value", "missing", "unknown"] = "value"
     problem: str = ""
     allowed: str = ""
@@ -34,10 +34,10 @@ class _Rejected:
 
 @dataclass(frozen=True, kw_only=True)
 class TableRead:
-    """One table of a document as it was read: what is the same object there is not read again."""
+    """One table of a document with its values, reused for the same object in a later document."""
 
     content: Any
-    """Content as TOML has it; None for a missing table."""
+    """Content parsed from TOML; None for a missing table."""
     values: Mapping[str, Any]
     """SI values by path, standard defaults included."""
     rejected: tuple[_Rejected, ...]
@@ -50,15 +50,15 @@ class SceneReading:
     file: str
     """Name of the file, for messages."""
     document: Mapping[str, Any]
-    """Content of the file as TOML has it."""
+    """Content of the file, parsed from TOML."""
     values: Mapping[str, Any]
-    """SI values by path, defaults included; absent are keys that do not apply or could not be read."""
+    """SI values by path, defaults included, without keys that do not apply or could not be read."""
     broken: frozenset[str]
-    """Paths, and names of whole tables, that stand in the file but could not be read."""
+    """Paths and names of whole tables in the file that could not be read."""
     schema: Schema
-    """Keys and tables that such a file can hold."""
+    """Keys and tables of this kind of file."""
     derived: frozenset[str] = frozenset()
-    """Paths of values that another file gives, which this one names."""
+    """Paths of values from another file, such as a mesh, that this one names."""
     tables: Mapping[str, TableRead] = field(default_factory=dict)
     """Tables of the document, by name."""
 
@@ -67,7 +67,7 @@ class SceneReading:
         return replace(self, values={**self.values, **values})
 
     def following(self, values: Mapping[str, Any]) -> SceneReading:
-        """Copy with more values that another file gives."""
+        """Copy with more values from another file."""
         return replace(self.adding(values), derived=self.derived | frozenset(values))
 
     def given(self, path: str) -> bool:
@@ -80,7 +80,7 @@ class SceneReading:
         return all(path in self.values for path in paths)
 
     def lacks(self, path: str) -> bool:
-        """True when a value is missing, rather than present but unreadable."""
+        """True when a value is missing; False when it is present but unreadable."""
         return path not in self.values and not {path, path.rpartition(".")[0]} & self.broken
 
     def allowed(self, path: str) -> str:
@@ -88,7 +88,7 @@ class SceneReading:
         return self.schema.key_at(tuple(path.split("."))).takes.allowed
 
     def fault(self, path: str, *, problem: str, allowed: str) -> Fault:
-        """An error about a value, with what the file has there or the default that is used."""
+        """An error about a value, with the text in the file or the default."""
         table, _, key = path.rpartition(".")
         if self.given(path):
             value = toml_text(self._table(table)[key])
@@ -103,19 +103,19 @@ class SceneReading:
         return Fault(file=self.file, table=table, key=key, value=value, problem=problem, allowed=allowed)
 
     def missing(self, path: str, problem: str = "every scene needs it") -> Fault:
-        """An error about a value that is not there."""
+        """An error about a missing value."""
         return self.fault(path, problem=problem, allowed=self.allowed(path))
 
     def _table(self, table: str) -> Mapping[str, Any]:
         content = self.document.get(table, {}) if table else self.document
-        # A check against Mapping takes ten times as long, and rules ask for thousands of scenes.
+        # A check against Mapping takes ten times as long, and rules call this for thousands of scenes.
         return content if isinstance(content, dict) else {}
 
     def completed(self) -> SceneReading:
-        """Fill in the defaults that follow from other values, as far as those are known.
+        """Fill in the defaults that are derived from other known values.
 
-        What a default follows from is there already, because a key is declared after it; a needed key follows
-        from what the file gives.
+        A key is declared after those from which its default is derived, so that their values are known first;
+        a needed key is derived from values in the file.
         """
         unnamed = self.lacks("name")
         reading = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
@@ -151,9 +151,9 @@ class SceneReading:
 def read_document(
     document: Mapping[str, Any], *, file: str, schema: Schema, before: Mapping[str, TableRead] | None = None
 ) -> tuple[SceneReading, tuple[Fault, ...]]:
-    """Read a TOML document: its values, and an error for each value, key or table that could not.
+    """Read a TOML document: values, and an error for each value, key or table that cannot be read.
 
-    Args: `before`: tables of another document that this one was made from.
+    Args: `before`: tables of the document from which this one was made.
     """
     tables = {}
     for name, table in schema.tables.items():
@@ -181,7 +181,7 @@ def read_document(
     reading = SceneReading(
         file=file, document=document, values=values, broken=frozenset(broken), schema=schema, tables=tables
     )
-    # A key that is missing where a misspelt one was meant for it is one error, not two.
+    # A misspelt key and the missing key that it was meant for are one error, not two.
     reported = [
         each
         for each in rejected
@@ -203,7 +203,7 @@ def _read_table(
 def _read_keys(
     content: Mapping[str, Any], keys: Mapping[str, Key], steps: KeyPath, before: TableRead | None = None
 ) -> tuple[dict[str, Any], list[_Rejected]]:
-    """Values of keys, defaults included; a key that an entry of another key lacks is rejected at once."""
+    """Values of keys, defaults included; a key missing in an entry of another key is rejected at once."""
     values: dict[str, Any] = {}
     rejected: list[_Rejected] = []
     for name, key in keys.items():
@@ -213,7 +213,7 @@ def _read_keys(
             continue
         content_of_key = content.get(name, key.presence.default)
         path = f"{steps[0]}.{name}" if steps else name
-        # Read there already, from the same object.
+        # Values of the same object were read before.
         read = before is not None and path in before.values
         if before and read and (before.content or {}).get(name, key.presence.default) is content_of_key:
             values[name] = before.values[path]
@@ -254,7 +254,10 @@ def _read_value(content: object, key: Key, steps: KeyPath) -> tuple[Any, list[_R
 
 
 def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None) -> Fault:
-    """Args: `meant`: path that an unknown key was probably meant for; None where that was not looked for."""
+    """Error for a rejected value, key or table.
+
+    Args: `meant`: path that an unknown key was probably meant for; None where none was searched.
+    """
     steps, problem, allowed = rejected.steps, rejected.problem, rejected.allowed
     unknown_table = len(steps) == 1 and isinstance(rejected.content, Mapping)
     is_table = str(steps[0]) in schema.tables or unknown_table

@@ -1,4 +1,4 @@
-"""The tables of a scene file as the records declare its keys."""
+"""Tables of a scene file, from the keys that records declare."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ringbalance.scene.registry import balancers
 
 KeyPath = tuple[int | str, ...]
 ORIGIN = "origin"
-"""Key of every table that says where its values come from."""
+"""Key of every table for the origin of its values."""
 _UNCERTAINTY = "expanded uncertainties (95 %) of the inputs"
 
 
@@ -30,27 +30,27 @@ class TableSchema:
     text: str
     keys: Mapping[str, Key]
     record: type | None = None
-    """Record made of the table; None when the scene has its values elsewhere."""
+    """Record that the table is read into; None when its values are in other fields of the scene."""
 
     @classmethod
     def of(cls, record: type, text: str) -> TableSchema:
-        """A table that becomes a record. Args: `text`: what it describes."""
+        """A table that is read into a record. Args: `text`: its description."""
         return cls(text=text, keys=keys_of(record), record=record)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Schema:
-    """All that a kind of scene file can hold."""
+    """Keys and tables of a kind of scene file."""
 
     top: Mapping[str, Key]
     """Keys before the first table."""
     tables: Mapping[str, TableSchema]
     scene: Callable[..., Any]
-    """Record made of all tables."""
+    """Record that all tables are read into."""
 
     @cached_property
     def following(self) -> tuple[tuple[str, Presence], ...]:
-        """Path and presence of each key whose default follows from other values, in order."""
+        """Path and presence of each key whose default is derived from other values, in order."""
         return tuple(
             (f"{name}.{key}", declared.presence)
             for name, table in self.tables.items()
@@ -60,7 +60,7 @@ class Schema:
 
     @cached_property
     def needed(self) -> Mapping[str, tuple[str, ...]]:
-        """By table the keys that every scene must have."""
+        """Keys that every scene must have, by table."""
         return MappingProxyType(
             {
                 name: tuple(key for key, declared in table.keys.items() if declared.presence.kind == "needed")
@@ -69,7 +69,7 @@ class Schema:
         )
 
     def key_at(self, steps: KeyPath) -> Key:
-        """The key at a path of table, key and so on; entries of lists are passed over."""
+        """The key at a path of table, key and so on; indices of list entries are ignored."""
         *tables, name = (step for step in steps if isinstance(step, str))
         return self.keys_in(tables)[name] if tables else self.top[name]
 
@@ -95,10 +95,10 @@ class Schema:
         scene: Callable[..., Any],
         uncertainty: TableSchema | None = None,
     ) -> Schema:
-        """The schema of a kind of balancer, with what every scene file has.
+        """The schema of a kind of balancer, with the keys of every scene file.
 
-        Args: `balancer`: how that key may be absent. `uncertainty`: that table, by default with a table of
-            half-widths for each table, where tables share names of keys.
+        Args: `balancer`: presence of the key with the name. `uncertainty`: that table; by default it has
+            a subtable of half-widths for each table, for tables that share names of keys.
         """
         if uncertainty is None:
             by_table = {}

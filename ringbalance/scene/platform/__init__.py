@@ -1,5 +1,5 @@
 """Services of the machine: files written whole, processes, the terminal, compiled code.
 
-Another output goes through `files`, another pool of processes through `processes`, another compiled function
-takes a decorator of `compiled`, whose code `kept_code` alone reads and writes; nothing here knows a scene.
+Every output goes through `files`, every pool of processes through `processes`; every compiled function has a
+decorator of `compiled`, whose code only `kept_code` reads and writes. Nothing in this package uses a scene.
 """

@@ -1,4 +1,4 @@
-"""Plain functions of numbers and arrays that compiled code calls with numbers; here no compiler loads."""
+"""Plain functions of numbers and arrays that compiled code can call with numbers; loads no compiler."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def chosen(condition: Any, first: Any, second: Any) -> Any:
 
 
 def called_both_ways(function: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
-    """Marked functions that a function may call by name, and those that they may call in turn."""
+    """Marked functions that a function may call by name, directly or through other marked ones."""
     todo, seen = [function], {id(function)}
     while todo:
         for each in todo.pop().__globals__.copy().values():

@@ -1,14 +1,13 @@
 """Functions compiled to machine code by numba, kept between runs, compiled again when any of them changes.
 
-Numba looks only at a function's own file to see whether kept code is stale, though it holds the code of
-every compiled function that it calls.  The files that it is kept in are therefore named after all of their
-sources.
+Numba checks only a function's own file to see whether kept code is stale, though that code contains every
+compiled function that it calls.  The files of kept code are therefore named after all of their sources.
 
 Numba turns a result that is an array or a named tuple into a Python object by calling Python functions, and
-does not look whether such a call failed.  A signal that has arrived during the compiled call is handled in
+does not check whether such a call failed.  A signal that has arrived during the compiled call is handled in
 the first of them: when its handler raises, as that of Ctrl-C does, an array ends in an error of the
 interpreter, and a named tuple, with a null pointer in it, the process in a segmentation fault.  Handlers
-therefore only take note during the call, and act after it.
+therefore only record the signal during the call, and act after it.
 """
 
 from __future__ import annotations
@@ -39,9 +38,9 @@ R = TypeVar("R")
 _OPTIONS: Final[dict[str, Any]] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 _FOR_COMPILED_CODE: Final[dict[str, Any]] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _PLAIN: Final = frozenset({"None", "bool", "int", "float", "complex", "tuple", "Pair"})
-"""Names in the annotation of a result that numba makes without calling a Python function."""
+"""Types of results, as annotated, that numba makes without calling a Python function."""
 _MARKS: Final = tuple(f"from {name} import".encode() for name in (__name__, both_ways.__module__))
-"""In each source that holds compiled functions."""
+"""Import lines, one of which is in each source of compiled functions."""
 
 # A private part of numba: without it, functions are compiled as numba does and signals are not deferred.
 _Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
@@ -60,9 +59,9 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def in_place(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile a function that makes no array, so that it counts no references to its arguments.
+    """Compile a function that makes no array, without counting references to its arguments.
 
-    A seventh of the time of a short function goes into such counts, each safe against other threads.
+    Such counts, each safe against other threads, take a seventh of the time of a short function.
     """
     return _dispatcher(function, _nrt=False)
 
@@ -90,10 +89,10 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
         _callable_too(each)
     dispatcher = numba.njit(function, **_OPTIONS, **options)
     if not hasattr(dispatcher, "py_func"):
-        # NUMBA_DISABLE_JIT is set: it is the function itself.
+        # With NUMBA_DISABLE_JIT set, this is the function itself.
         return cast(Callable[P, R], dispatcher)
     if _Dispatcher is not object:
-        # By its annotation the result may hold an array or a named tuple, unless all of its words are plain.
+        # The result may contain an array or a named tuple unless all words of its annotation are plain.
         result = str(function.__annotations__.get("return", "unknown"))
         kind = _Called if set(re.findall(r"\w+", result)) <= _PLAIN else _Guarded
         dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)
@@ -108,8 +107,8 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
 class _Called(_Dispatcher):  # type: ignore[misc]
     """Numba's dispatcher of a function that Python calls; compiled code calls another one.
 
-    Most functions are called by compiled code alone, which needs neither a way in from Python nor a file of
-    its own: those of the outermost function hold them.  That saves a good part of the time.
+    Most functions are called only by compiled code and need neither an entry from Python nor a separate file:
+    the code of the outermost function contains them.  That saves much of the compile time.
     """
 
     def __init__(self, **arguments: Any) -> None:
@@ -149,7 +148,7 @@ class _Inner(_Dispatcher):  # type: ignore[misc]
         self._compiler._customize_flags = _without_address
 
     def compile(self, sig: Any) -> Any:
-        """Compile a signature for those that call it. Returns: what stands for its address."""
+        """Compile a signature for its callers. Returns: placeholder of its address."""
         args, result = _normalized(sig)
         if args not in self.overloads:
             with global_compiler_lock, self._compiling_counter:
@@ -161,10 +160,10 @@ class _Inner(_Dispatcher):  # type: ignore[misc]
 
 
 def _left_to_callers(library: Any) -> list[Any]:
-    """Leave linking, optimisation and machine code of a library to the outermost caller, if numba lets us.
+    """Leave linking, optimisation and machine code of a library to the outermost caller, if numba permits it.
 
-    Returns: The library with those that it needs, which each caller then needs as well: every one is linked
-    once, into the outermost, and not into each caller on the way.
+    Returns: The library and those that it needs, which each caller then needs too: every one is linked once,
+    into the outermost caller, and not into each caller in between.
     """
     if not all(hasattr(library, name) for name in _FINAL_STEPS):
         return [library]
@@ -181,7 +180,7 @@ def _left_to_callers(library: Any) -> list[Any]:
 
 
 class _NoAddress:
-    """Tells compiled functions without an address apart."""
+    """Placeholder that identifies a compiled function without an address."""
 
 
 def _without_address(flags: Any) -> Any:
@@ -216,11 +215,11 @@ _COMPILED: Final = ("controller", "reduced_model")
 
 _IMPORT: Final = re.compile(rb"^from ringbalance\.([\w.]+) import (\([^)]*\)|.*)$", re.MULTILINE)
 _CONSTANT: Final = re.compile(rb"\b(?:[A-Z][A-Z_0-9]*|Regime)\b")
-"""Imported name whose value is in the compiled code."""
+"""Pattern of an imported constant, whose value is part of the compiled code."""
 
 
 def _compiled_sources() -> tuple[Path, ...]:
-    """Sources that hold compiled functions, the machinery's own, and those that define constants of both."""
+    """Sources of compiled functions and of their compilation, and those that define constants of both."""
     this_file, root = Path(__file__), Path(__file__).parents[2]
     paths = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
     pending = [path for path in paths if any(mark in path.read_bytes() for mark in _MARKS)]
@@ -256,18 +255,18 @@ _NAMES: Final = (
     "SIGUSR2",
 )
 _SIGNALS: Final = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
-"""Whose handlers may raise: those that end a program or limit its time."""
+"""Signals whose handlers may raise: those that end a program or limit its time."""
 
 
 class _Deferred:
-    """A signal's handler that takes note; the one before it is called later."""
+    """Signal handler that records a signal; the previous handler is called later."""
 
     def __init__(self, before: _Handler) -> None:
         self.before = before
         self.arrived = False
 
     def __call__(self, _number: int, _frame: FrameType | None) -> None:
-        """Take note."""
+        """Record that the signal has arrived."""
         self.arrived = True
 
 
@@ -275,7 +274,7 @@ class _Deferred:
 def _signals_deferred() -> Iterator[None]:
     """Let Python's signal handlers act at the end of the block, in the main thread; elsewhere none ever run.
 
-    _Handlers that are not Python functions, such as the system's own for SIGTERM, act at once as before.
+    Handlers that are not Python functions, such as the system's for SIGTERM, act at once as before.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -293,7 +292,7 @@ def _signals_deferred() -> Iterator[None]:
 
 
 def _give_back(deferred: dict[int, _Deferred]) -> None:
-    """Put every handler back into its place, whatever those raise whose signal has arrived."""
+    """Restore every handler, even if handlers of signals that have arrived raise."""
     if not deferred:
         return
     number, handler = deferred.popitem()
@@ -307,7 +306,7 @@ def _give_back(deferred: dict[int, _Deferred]) -> None:
 
 @contextmanager
 def _signals_live() -> Iterator[None]:
-    """Within `_signals_deferred`: let handlers act at once again, for Python code that takes long."""
+    """Let handlers act at once again within `_signals_deferred`, for Python code that takes long."""
     main = threading.current_thread() is threading.main_thread()
     handlers = {number: signal.getsignal(number) for number in _SIGNALS} if main else {}
     deferred = {number: held for number, held in handlers.items() if isinstance(held, _Deferred)}

@@ -34,7 +34,7 @@ class _Warnings(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write the text of a warning. Args: `record`: of the log."""
         if record.levelno == logging.WARNING:
-            # Closed, or none at all: nobody reads it.
+            # Closed, or none at all: no output.
             with suppress(AttributeError, OSError, ValueError):
                 sys.stderr.write(f"{record.getMessage()}\n")
                 sys.stderr.flush()
@@ -62,7 +62,7 @@ _PROGRESS: Final[ContextVar[Progress]] = ContextVar("progress")
 
 @contextmanager
 def shown_by(progress: Progress) -> Iterator[None]:
-    """Let what a block announces from its depths be shown."""
+    """Let texts that functions within a block announce be shown."""
     token = _PROGRESS.set(progress)
     try:
         yield
@@ -72,7 +72,7 @@ def shown_by(progress: Progress) -> Iterator[None]:
 
 @contextmanager
 def announced(text: str) -> Iterator[None]:
-    """Show a text while a block runs, and then what was shown before; nothing outside a command."""
+    """Show a text while a block runs, then the previous text again; without effect outside a command."""
     progress = _PROGRESS.get(None)
     before = progress.text if progress else ""
     if progress:
@@ -86,7 +86,7 @@ def announced(text: str) -> Iterator[None]:
 
 @contextmanager
 def displayed(*, brief: bool, quiet: bool, log: Path | None) -> Iterator[None]:
-    """Let a block show this much, and add what happens in it to a file.
+    """Set the display of a block, and add its messages to a log file.
 
     Raises: OSError: the file cannot be written.
     """

@@ -1,9 +1,9 @@
-"""Outputs are written whole or not at all, and what cannot be written is refused before the work.
+"""Outputs are written whole or not at all; an output that cannot be written is refused before the work.
 
-An output grows in a draft: a hidden file or folder, locked for as long as its writer lives. One that nobody
-locks was left by a process that was killed; whoever writes to the same folder next removes it. Where files
-cannot be locked, its age decides. What can be made again, and is only kept to save time, stands in the
-user's own cache folder.
+An output grows in a draft: a hidden file or folder, locked while its writer runs. A draft without a lock was
+left by a killed process; the next process that writes to the folder removes it. Where files cannot be locked,
+the draft's age decides. Files that can be made again, and are kept only to save time, are in the user's cache
+folder.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ _NAME: Final = re.compile(re.escape(_PREFIX) + "[0-9a-f]{16}")
 _LOCK: Final = "lock"
 _FILES: Final = "files"
 _SYSTEM: Final = ("/dev/", "/proc/")
-"""Folders whose links lead to what the process has open."""
+"""Folders whose links lead to open files of the process."""
 _MOST_KEPT_BYTES: Final = 2**28
 _LOCKING_TIME_S: Final = 60.0
-"""Time in which a folder that is being made gets its lock."""
+"""Longest time until a new folder has its lock."""
 _LONGEST_WORK_S: Final = 86400.0
 """Age at which a draft counts as abandoned where files cannot be locked."""
 
@@ -44,8 +44,8 @@ _LONGEST_WORK_S: Final = 86400.0
 def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path:
     """Write a file so that a reader never sees half of it, making its folder when there is none.
 
-    After a power cut the old content or the new one is there, never an empty file: the content reaches the
-    disk before the name does.
+    After a power cut the file has the old content or the new one, and is never empty: the content reaches
+    the disk before the name does.
     Args: `path`: of the file; a link there is replaced, one to its folder is followed, a device or a pipe is
         written to directly. `data`: its content; text is written as UTF-8. `private`: only this user may read
         or write it.
@@ -66,7 +66,7 @@ def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path
             stream.flush()
             os.fsync(stream.fileno())
             if fcntl is not None:
-                # Under the lock, so that nobody takes the draft for an abandoned one.
+                # Under the lock, so that no other process takes the draft for an abandoned one.
                 os.replace(draft, target)
         if fcntl is None:
             os.replace(draft, target)
@@ -108,10 +108,10 @@ def check_file(path: Path, *, apart_from: Path | None = None) -> None:
 
 
 def read_bounded(path: str | Path, *, what: str, most: int, regular: bool = False) -> tuple[bytes, str]:
-    """The bytes of a file, and what is wrong with it: empty, or that it cannot be read or is too large.
+    """The bytes of a file, and its error: it cannot be read or is too large; empty without one.
 
-    Args: `what`: such as "scene file". `most`: bytes that are still read. `regular`: whether a pipe is
-        refused, which nobody may ever write to.
+    Args: `what`: such as "scene file". `most`: largest size, bytes. `regular`: True to refuse a pipe, to
+        which perhaps no process ever writes.
     """
     try:
         if regular and not stat.S_ISREG(os.stat(path).st_mode):
@@ -130,7 +130,7 @@ def read_bounded(path: str | Path, *, what: str, most: int, regular: bool = Fals
 
 
 def read_kept(path: Path) -> bytes:
-    """The bytes of a file that the program keeps for itself, whatever stands in its place by now.
+    """The bytes of a file that the program keeps for itself; any other object in its place is refused.
 
     Raises: OSError: it cannot be read, is a link, no file, or larger than any that is kept.
     """
@@ -143,7 +143,7 @@ def read_kept(path: Path) -> bytes:
 
 
 def discard(path: Path) -> None:
-    """Remove a file, a link or a folder with all that it holds, as far as that is possible."""
+    """Remove a file, a link or a folder with its content, as far as possible."""
     try:
         path.unlink(missing_ok=True)
     except OSError:
@@ -156,11 +156,10 @@ def staged(folder: Path, *, files: Sequence[str] = (), folders: Sequence[str] = 
 
     The folder is tried before the work, with a file moved into it. The files grow in a hidden folder inside
     it, or in the nearest folder that exists, so that they never cross devices.
-    Args: `folder`: where the files shall stand in the end; a link to a folder is followed. `files`: names
-        that it will hold, moved after all others, in this order. `folders`: names of sub-folders that it will
-        hold.
+    Args: `folder`: final folder; a link to a folder is followed. `files`: names of final files, moved
+        after all others, in this order. `folders`: names of final sub-folders.
     Yields: The folder to write into; after an exception nothing of it is moved.
-    Raises: OSError: the folder cannot be written, or something else stands where it or a part of it belongs.
+    Raises: OSError: the folder cannot be written, or it or a part of it exists as another kind of object.
     """
     with ExitStack() as stack:
         with _refused(folder):
@@ -186,8 +185,7 @@ def staged(folder: Path, *, files: Sequence[str] = (), folders: Sequence[str] = 
 
 
 def _is_special(path: Path) -> bool:
-    """True for a device, a pipe or a socket, and for /dev/stdout and the like: nothing that a rename should
-    replace."""
+    """True for a device, a pipe, a socket, /dev/stdout and the like, which no rename should replace."""
     if path.is_symlink() and f"{_through_links(path.parent)}/".startswith(_SYSTEM):
         return True
     return path.exists() and not path.is_file() and not path.is_dir()
@@ -207,7 +205,7 @@ def _nearest(folder: Path) -> Path:
 
 
 def _folder(folder: Path, files: Sequence[str], folders: Sequence[str]) -> Path:
-    """The folder behind the links, when all that is there already is of the right kind."""
+    """The folder behind the links. Raises: OSError: an existing part is of the wrong kind."""
     for each in (folder, *(folder / name for name in folders)):
         if each.is_symlink() and not each.exists():
             raise FileNotFoundError(
@@ -224,7 +222,7 @@ def _folder(folder: Path, files: Sequence[str], folders: Sequence[str]) -> Path:
 
 @contextmanager
 def _refused(path: Path) -> Iterator[None]:
-    """Report what the machine refuses with the path that the user gave."""
+    """Report an error of the system with the path that the user gave."""
     try:
         yield
     except OSError as error:
@@ -256,9 +254,9 @@ def _move(source: Path, target: Path) -> None:
 
 
 def cache_folder() -> Path:
-    """The user's folder for what ringbalance can make again, after the XDG base directory specification."""
+    """The user's cache folder for ringbalance, by the XDG base directory specification."""
     cache_home = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    # A relative one is to be ignored, says the specification.
+    # The specification requires that a relative path is ignored.
     return (cache_home if cache_home.is_absolute() else Path.home() / ".cache") / "ringbalance"
 
 
@@ -286,7 +284,7 @@ def draft_folder(folder: Path) -> Iterator[Path]:
 
 
 def _remove_abandoned(folder: Path) -> None:
-    """Remove the drafts of killed processes; those of living ones stay, and what cannot be removed."""
+    """Remove the drafts of killed processes, as far as possible; those of running ones stay."""
     with suppress(OSError):
         for path in [folder / name for name in os.listdir(folder) if _NAME.fullmatch(name)]:
             with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Work as a list of jobs: each begins once the answers that it needs are there, in a process that is free."""
+"""Work as a list of jobs: each begins, in a free process, once the results that it needs are available."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ class Job:
 
     name: str
     do: Callable[..., Any]
-    """A function of an importable module; takes the answers of `needs` in their order."""
+    """A function of an importable module; takes the results of `needs` in their order."""
     needs: tuple[str, ...] = ()
-    """Names of the jobs whose answers it takes."""
+    """Names of the jobs whose results it takes."""
     title: str = ""
-    """Text for those who wait; empty: the name."""
+    """Text for the progress; empty: the name."""
 
 
 def answers_of(
     jobs: Sequence[Job], pool: Workers | None, progress: Callable[[str], None] = lambda _: None
 ) -> Iterator[tuple[str, Any]]:
-    """Names and answers of jobs as they come, by a pool and this process: the first that can begin is begun.
+    """Names and results of jobs as they finish, by a pool and this process: the first ready job begins first.
 
-    What a lost worker had begun is done again in this process. Leaving early cancels what has not begun.
-    Args: `pool`: None: this process does everything. `progress`: takes the title of what this process begins.
+    Jobs of a lost worker are repeated in this process. Leaving early cancels jobs that have not begun.
+    Args: `pool`: None: this process does all jobs. `progress`: takes the title of each job of this process.
     """
     waiting, answers = list(jobs), dict[str, Any]()
     under_way: dict[Job, tuple[Callable[[], Any], Future[Any]]] = {}
@@ -44,7 +44,7 @@ def answers_of(
                 raise ValueError(f"no job gives what {waiting[0].name} needs: {', '.join(waiting[0].needs)}")
             ended = [job for job, (_, future) in under_way.items() if future.done()]
             if not ended:
-                # What no worker has begun, this process does.
+                # This process does a job that no worker has begun.
                 free = next((job for job in filter(under_way.get, jobs) if under_way[job][1].cancel()), None)
                 if free is None:
                     wait([future for _, future in under_way.values()], return_when=FIRST_COMPLETED)

@@ -1,9 +1,9 @@
-"""Compiled code kept in files, one for each signature of a function, and what else saves time.
+"""Compiled code kept in files, one for each signature of a function, and other files that save time.
 
-Different from numba's own, whose index can lead to code of an earlier source: a file's name follows from all
-that decides its content, and it begins with a checksum of the rest, is written whole and brought to the disk.
-What cannot be read is discarded and made again.  A file that cannot be written costs time in later runs and
-is no error.  What another user may have written is not read, for kept code is executed.
+Numba's own index can lead to code of an earlier source.  Here a file's name depends on all that determines
+its content; the file begins with a checksum of the rest, is written whole and synced to the disk.  An
+unreadable file is discarded and made again.  A file that cannot be written costs time in later runs and is no
+error.  A file that another user may have written is not read, because kept code is executed.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ except ImportError:
 
 CODE: Final = ".nbc"
 OTHER: Final = ".kept"
-"""Ending of files that another room keeps beside the code, and makes again without them."""
+"""Ending of files that other packages keep beside the code and can make again."""
 _TURN: Final = ".turn"
-"""Empty, held by the process that compiles a function."""
+"""Ending of an empty file, locked by the process that compiles a function."""
 _LONGEST_TURN_S: Final = 60.0
-"""Longest wait for another process: several times what the longest function takes."""
+"""Longest wait for another process: several times the compile time of the longest function."""
 _LONGEST_KEPT_S: Final = 60 * 86400.0
-"""Age at which a file is removed when another one is kept."""
+"""Age at which a file is removed when another one is stored."""
 _MOST_KEPT_BYTES: Final = 5e8
-"""Size of all files: beyond, the oldest go. Each version of the program keeps some 30 MB."""
+"""Largest size of all files: beyond, the oldest are removed. Each version of the program keeps some 30 MB."""
 _CHECKSUM_BYTES: Final = hashlib.sha256().digest_size
 
 _dumps: Any = serialize.dumps
@@ -49,13 +49,13 @@ _rebuild: Any = compiler.CompileResult._rebuild
 
 
 def code_root() -> Path:
-    """Folder that holds what is kept; NUMBA_CACHE_DIR moves it, and it may not exist yet."""
+    """Folder of kept files, which may not exist yet; NUMBA_CACHE_DIR moves it."""
     folder = os.environ.get("NUMBA_CACHE_DIR")
     return Path(folder) / "ringbalance" if folder else cache_folder()
 
 
 def checked_content(path: Path) -> bytes:
-    """Content of a kept file without the checksum; OSError or ValueError when it cannot be used."""
+    """Content of a kept file without the checksum; raises OSError or ValueError for an unusable one."""
     if _may_be_changed_by_others(path):
         raise PermissionError(f"{path} may have been written by another user")
     data = read_kept(path)
@@ -65,7 +65,7 @@ def checked_content(path: Path) -> bytes:
 
 
 def write_checked(path: Path, content: bytes) -> None:
-    """Keep a file that `checked_content` reads; OSError when that cannot be done."""
+    """Store a file for `checked_content`; raises OSError when that is impossible."""
     if path.is_dir():
         discard(path)
     _make_private(path.parent)
@@ -77,7 +77,7 @@ def write_checked(path: Path, content: bytes) -> None:
 def trusted(folder: Path) -> bool:
     """True for a folder whose content may be used: nobody else can have written it.
 
-    A folder of this user's that others may write is made private first. Otherwise that is said once.
+    A folder of this user that others may write to is made private first; if that fails, one message says so.
     """
     with contextlib.suppress(OSError):
         if folder.exists():
@@ -93,8 +93,8 @@ def trusted(folder: Path) -> bool:
 
 
 def _make_private(folder: Path) -> None:
-    """Make a folder, and those above it that are missing, for this user alone; one of this user's own that
-    others may write becomes private."""
+    """Make a folder, and missing ones above it, for this user alone; an existing one of this user that others
+    may write to becomes private."""
     if not folder.parent.exists():
         _make_private(folder.parent)
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -103,7 +103,7 @@ def _make_private(folder: Path) -> None:
 
 
 def _may_be_changed_by_others(path: Path) -> bool:
-    """A missing file is nobody's; without owners of files (Windows) there is none."""
+    """True if another user can write a file; False if it is missing, or without owners of files (Windows)."""
     if not hasattr(os, "geteuid"):
         return False
     try:
@@ -114,10 +114,10 @@ def _may_be_changed_by_others(path: Path) -> bool:
 
 
 class KeptCode:
-    """The kept code of one function, in the place of numba's own cache of it.
+    """The kept code of one function, in place of numba's own cache.
 
-    Args: `digest`: of all sources whose code the function's may hold.
-    Raises: TypeError: a function made in another one, whose code depends on what it was made with.
+    Args: `digest`: of all sources whose code the function's code may contain.
+    Raises: TypeError: a closure, whose code depends on the values that it encloses.
     """
 
     def __init__(self, function: Callable[..., Any], digest: str) -> None:
@@ -139,7 +139,7 @@ class KeptCode:
 
     @contextlib.contextmanager
     def in_turn(self) -> Iterator[None]:
-        """Within, what `load_overload` does not find one process compiles, and the others wait for it."""
+        """Let one process compile code that `load_overload` does not find, while the others wait."""
         try:
             yield
         finally:
@@ -148,7 +148,7 @@ class KeptCode:
                 self._turn = None
 
     def load_overload(self, sig: object, target_context: Any) -> object:
-        """The compiled code of a signature, or None: it is then compiled."""
+        """The kept code of a signature; None if it must be compiled."""
         if not trusted(code_root()):
             return None
         target_context.refresh()
@@ -168,13 +168,13 @@ class KeptCode:
         except FileNotFoundError:
             return None
         except Exception:
-            # A checksum holds nobody to a format: what another release of a library wrote may raise anything.
+            # A right checksum ensures no format: files of another library release may raise anything.
             pass
         discard(path)
         return None
 
     def save_overload(self, sig: object, data: Any) -> None:
-        """Keep the compiled code of a signature, where that can be done."""
+        """Store the compiled code of a signature, if possible."""
         bound_to_process = data.library.has_dynamic_globals or any(not each.can_cache for each in data.lifted)
         if bound_to_process or not trusted(code_root()):
             return
@@ -190,7 +190,7 @@ class KeptCode:
 
 
 def _turn(path: Path) -> int | None:
-    """A descriptor that no other process has until it is closed; None where it cannot be had in time."""
+    """Descriptor with an exclusive lock until it is closed; None if it is not available in time."""
     if fcntl is None:
         return None
     try:
@@ -214,7 +214,7 @@ def _turn(path: Path) -> int | None:
 
 @cache
 def _remove_old() -> None:
-    """Remove once in a process what was kept long ago, and the oldest of what takes too much room."""
+    """Remove, once in a process, old files, and the oldest ones beyond the largest size of all."""
     files = []
     for path in [path for kind in (CODE, OTHER, _TURN) for path in code_root().glob(f"*{kind}")]:
         with contextlib.suppress(OSError):

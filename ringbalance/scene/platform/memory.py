@@ -1,4 +1,4 @@
-"""Memory of a process: how often garbage is looked for, and a bound on what a block of code may allocate."""
+"""Memory of a process: frequency of garbage collection, and a bound on the allocation of a block of code."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Final
 
 COLLECTED_AT: Final = (50_000, 50, 1000)
 """Objects between two collections, then collections of one generation for one of the next.  The interpreter's
-own 700, 10, 10 look through all that stays (modules, meshes, results): 4 % of a report's processor time."""
+700, 10, 10 check all lasting objects (modules, meshes, results): 4 % of a report's processor time."""
 
 
 @contextmanager
 def seldom_collected() -> Iterator[None]:
-    """Look for garbage more seldom within a block that makes much and keeps most of it."""
+    """Collect garbage less often within a block that makes many objects and keeps most of them."""
     before = gc.get_threshold()
     gc.set_threshold(*COLLECTED_AT)
     try:
@@ -34,10 +34,10 @@ _STATM: Final = Path("/proc/self/statm")
 
 @contextmanager
 def bounded_memory(more: int) -> Iterator[None]:
-    """Let a block take at most so many bytes of addresses more than there are: beyond, it has a MemoryError.
+    """Let a block use at most so many more bytes of address space; beyond, a MemoryError is raised.
 
-    For code of others that reads a file and believes the counts in it. No bound where the system does not
-    tell how many there are, as where /proc is not mounted.
+    For libraries that read a file and trust the counts in it. Without effect where the system does not report
+    the present size, such as without /proc.
     """
     if sys.platform != "linux" or not _STATM.exists():
         yield

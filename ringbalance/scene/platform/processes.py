@@ -1,4 +1,4 @@
-"""Processes that work for this one: they leave reporting to it, and end when it does, however it ends."""
+"""Worker processes: reporting is left to this process; workers end when it ends, in whatever way."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ _WORKER_ENDED: Final = (
     "again in this process. Should that be ended too, close other programs and run again"
 )
 _BROKEN: Final[WeakSet[Executor]] = WeakSet()
-"""Executors of which it was said that the system ended a worker."""
+"""Executors for which the loss of a worker was already reported."""
 _ALONE: Final = "ringbalance: no further process can be used here (%s); one process does all the work"
 
 
 class _Cancellable(Future[_R]):
     """A future that stays cancelled when the pool breaks, as from Python 3.12 on.
 
-    Before, the error of a lost worker ends the pool's thread at the first cancelled future, with a traceback,
-    and futures behind it are waited for without end.
+    In earlier versions the error of a lost worker ends the pool's thread at the first cancelled future, with
+    a traceback, and waiting for later futures never ends.
     """
 
     def set_exception(self, exception: BaseException | None) -> None:
@@ -56,18 +56,18 @@ class _Cancellable(Future[_R]):
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool of fresh processes, one thread each, that are ended at once when its `with` block is left.
+    """A pool of new processes, one thread each, which are ended at once when the `with` block is left.
 
-    Args: `count`: of processes, started when there is work for them.
+    Args: `count`: number of processes, which start when there is work for them.
     """
 
     def __init__(self, count: int) -> None:
-        # When this process is killed, multiprocessing removes its semaphores, and need not say so.
+        # When this process is killed, multiprocessing removes its semaphores; its warning is suppressed.
         with _environment({"PYTHONWARNINGS": "ignore::UserWarning:multiprocessing.resource_tracker"}):
             super().__init__(count, mp_context=get_context("spawn"), initializer=_begin)
 
     def submit(self, fn: Callable[_P, _R], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_R]:
-        """Have a worker call a function of an importable module; without a worker left, BrokenProcessPool."""
+        """Call in a worker a function of an importable module. Raises: BrokenProcessPool: no worker left."""
         with _quiet_start():
             try:
                 future = super().submit(fn, *args, **kwargs)
@@ -79,19 +79,19 @@ class Workers(ProcessPoolExecutor):
         return future
 
     def result(self, future: Future[_R], again: Callable[[], _R]) -> _R:
-        """Result of a worker, or, when the system ended it, what this process finds itself.
+        """Result of a worker, or of this process if the system ended the worker.
 
-        A worker that was killed for memory leaves this process more of it, and one process at a time needs
-        less than several side by side; a report is not lost for it.
-        Args: `future`: of `submit`. `again`: does the same work here.
-        Returns: The result; with a note on standard error where the work was done again.
+        A worker that was killed for memory leaves more of it to this process, and one process at a time needs
+        less than several in parallel; so a report is not lost.
+        Args: `future`: as returned by `submit`. `again`: does the same work in this process.
+        Returns: The result; with a note on standard error where the work was repeated.
         """
         return _result(self, future, again)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the workers: nobody wants what is still under way."""
+        """End the workers: unfinished results are no longer needed."""
         # From Python 3.14 on this is `kill_workers`. An interrupt may come between the start of a process and
         # its entry in the pool's list: then those that multiprocessing knows are ended, too.
         started = set((self._processes or {}).values())
@@ -101,7 +101,7 @@ class Workers(ProcessPoolExecutor):
 
 
 def dealt(executor: Executor, calls: Sequence[Callable[[], _R]]) -> Iterator[tuple[int, _R]]:
-    """Numbers and answers of calls as they come; what a lost worker had to do is done again in this process.
+    """Indices and results of calls as they finish; calls of a lost worker are repeated in this process.
 
     Args: `executor`: any, its workers may be on other machines. `calls`: can be pickled.
     """
@@ -117,7 +117,7 @@ def dealt(executor: Executor, calls: Sequence[Callable[[], _R]]) -> Iterator[tup
         for future in as_completed(list(numbers)):
             yield numbers[future], _result(executor, future, calls[numbers[future]])
     finally:
-        # Nobody wants the rest when the caller stops early.
+        # The rest is not needed when the caller stops early.
         for future in numbers:
             future.cancel()
 
@@ -136,12 +136,12 @@ def _result(executor: Executor, future: Future[_R], again: Callable[[], _R]) -> 
 def beside(
     workers: int | Workers | None, *, loading: Callable[[], object] | None = None
 ) -> Iterator[Workers | None]:
-    """The other ones of so many processes, this one included; None where there are none.
+    """Workers beside this process, for so many processes in all; None for one process.
 
-    A system without semaphores for processes (no writable /dev/shm, as in some containers) has none either,
-    which is said on standard error.
-    Args: `workers`: those that are at work already stay so afterwards. `loading`: called by new ones at
-    once, while this process goes on.
+    None, too, with a message on standard error, on a system without semaphores for processes (no writable
+    /dev/shm, as in some containers).
+    Args: `workers`: existing workers are used and not ended afterwards. `loading`: called by new workers at
+    once, while this process continues.
     """
     if workers is None or workers == 1 or isinstance(workers, Workers):
         yield None if isinstance(workers, int) else workers
@@ -160,7 +160,7 @@ def beside(
 
 
 def end_with(gone: Callable[[], object]) -> None:
-    """End this process as soon as another is gone. Args: `gone`: returns when the other process is gone."""
+    """End this process as soon as another ends. Args: `gone`: returns when the other process has ended."""
 
     def watch() -> None:
         gone()
@@ -175,13 +175,13 @@ def _begin() -> None:
     parent = parent_process()
     if parent is not None:
         end_with(parent.join)
-    # Blocked while it started, see `_quiet_start`; without this the pool could not end it.
+    # The signal was blocked at the start, see `_quiet_start`; now the pool can end this worker.
     _mask("SIG_UNBLOCK", signal.SIGTERM)
 
 
 @contextmanager
 def _quiet_start() -> Iterator[None]:
-    """Processes started here use one thread, and leave an interrupt from the terminal to this one."""
+    """Let processes that a block starts use one thread and leave a terminal's interrupt to this process."""
     with _environment(dict.fromkeys(_THREADS, "1")):
         _mask("SIG_BLOCK", signal.SIGINT, signal.SIGTERM)
         try:
@@ -192,7 +192,7 @@ def _quiet_start() -> Iterator[None]:
 
 @contextmanager
 def _environment(changes: Mapping[str, str]) -> Iterator[None]:
-    """Environment variables for what is started meanwhile."""
+    """Set environment variables for processes that a block starts."""
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)
     try:
@@ -206,6 +206,6 @@ def _environment(changes: Mapping[str, str]) -> Iterator[None]:
 
 
 def _mask(how: str, *signals: signal.Signals) -> None:
-    """Change the signals that this thread, and what it starts, holds back; nothing on Windows."""
+    """Change the signals that this thread and processes started by it block; no effect on Windows."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(getattr(signal, how), signals)

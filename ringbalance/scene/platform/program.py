@@ -1,4 +1,4 @@
-"""Which program this is: what another version computed, or another version of a package, is not reused."""
+"""Identity of the program: results of another version of it, or of a package, are not reused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 _PACKAGES: Final = ("numpy", "scipy", "numba", "fluids", "scikit-fem", "pyamg", "meshio")
-"""Whose versions may change a number."""
+"""Packages whose versions may change a number."""
 _ROOMS: Final = (
     *("scene", "results", "mesh", "physics", "reduced_model", "controller", "identification"),
     *("design", "verification", "scenes"),
@@ -21,7 +21,7 @@ _SUFFIXES: Final = frozenset({".py", ".toml", ".csv", ".json", ".xz"})
 
 @cache
 def program_digest() -> str:
-    """Digest of the files that decide an answer, the packages below them and the kind of processor."""
+    """Digest of the files that determine results, the packages that they use and the kind of processor."""
     versions = [
         platform.python_version(),
         platform.machine(),

@@ -1,4 +1,4 @@
-"""A line that says how far a function of Python is: kept up to date in place where that can be done."""
+"""Line with the progress of a Python function, updated in place where possible."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from time import monotonic
 from typing import Any, Final
 
 _UPDATE_INTERVAL_S: Final = 0.05
-"""Time from one text to the next where each takes the place of the last."""
+"""Time between texts that replace each other."""
 _LINE_INTERVAL_S: Final = 30.0
-"""Time from one line to the next in a file or a pipe; the first comes as late."""
+"""Time between lines in a file or a pipe, and until the first."""
 
 
 class ProgressLine:
@@ -28,7 +28,7 @@ class ProgressLine:
         ipython = sys.modules.get("IPython")
         self._update: Callable[..., Any] | None = None
         if ipython is not None and hasattr(ipython.get_ipython(), "kernel"):
-            # A line that replaces one in the output of a cell.
+            # Line that replaces the previous one in the output of a notebook cell.
             handle = ipython.display.display({"text/plain": ""}, raw=True, display_id=True)
             self._update = handle.update
         in_place = self._update is not None or sys.stderr.isatty()

@@ -1,7 +1,7 @@
 """Output of a command: a console for its results, a console for messages, progress and the time taken.
 
-Progress goes to standard error: a bar on a terminal, elsewhere a line now and then; a run shorter than ten
-seconds that writes to no terminal says nothing.
+Progress goes to standard error: a bar on a terminal, elsewhere a line from time to time; a run shorter than
+ten seconds without a terminal writes none.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from rich.text import Text
 from ringbalance.scene.platform.display import LOG, display, shown_by
 
 FIRST_LINE_S: Final = 10.0
-"""Time without a terminal before the first line."""
+"""Time before the first line without a terminal."""
 NEXT_LINE_S: Final = 30.0
 _LOG_INTERVAL_S: Final = 1.0
 _LOADED: Final = time.perf_counter()
 _STAT: Final = Path("/proc/self/stat")
 _START_FIELD: Final = 19
-"""Field behind the program's name in brackets: ticks from the machine's start to the process's."""
+"""Index of the start time, ticks since the machine's start, among the fields after the bracketed name."""
 
 
 class _Terminal(Console):
     """A rich console over standard output (results) or standard error (messages)."""
 
     def on_broken_pipe(self) -> None:
-        """Stop printing messages when nobody reads them; rich would discard the results too.
+        """Stop printing messages without a reader; rich would discard the results too.
 
         Raises: BrokenPipeError: the reader of the results went away.
         """
@@ -46,7 +46,7 @@ class _Terminal(Console):
             raise BrokenPipeError
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Text as the stream will write it, so that columns are as wide as what stands in them."""
+        """Text as the stream writes it, so that columns are as wide as their texts."""
         errors = getattr(self.file, "errors", None) or "strict"
         if not text.isascii() and errors not in {"strict", "surrogateescape"}:
             text = text.encode(self.encoding, errors).decode(self.encoding, "surrogateescape")
@@ -76,9 +76,9 @@ def print_error(text: str) -> None:
 
 
 class Activity:
-    """Present activity of a command; lives inside one `activity`.
+    """Present activity of a command, within a block of `activity`.
 
-    Args: `text`: what it does first. `bar`: the display on a terminal.
+    Args: `text`: first activity. `bar`: display on a terminal.
     """
 
     def __init__(self, text: str, bar: Progress) -> None:
@@ -88,7 +88,7 @@ class Activity:
         self._task: TaskID = bar.add_task(escape(text), total=None)
 
     def show(self, text: str, *, done: float | None = None, total: float | None = None) -> None:
-        """Replace what is shown.
+        """Replace the displayed activity.
 
         Args: `text`: the activity, with its numbers. `done`: amount of work that is done. `total`: amount of
             work altogether, in the same unit; None where it is not known.
@@ -104,8 +104,8 @@ class Activity:
 def activity(command: str, text: str) -> Iterator[Activity]:
     """Show what a command is doing while a block runs.
 
-    Args: `command`: its name, which begins each line. `text`: what it does first.
-    Yields: The activity, to be kept up to date.
+    Args: `command`: name that begins each line. `text`: first activity.
+    Yields: The activity, to be updated by the block.
     """
     LOG.info("%s: %s", command, text)
     console, quiet = _messages_console(), display().quiet
@@ -128,13 +128,13 @@ def _write_lines(command: str, shown: Activity, ended: Event) -> None:
         try:
             sys.stderr.write(f"{command}: {shown.text} ({monotonic() - start:.0f} s)\n")
             sys.stderr.flush()
-        except (AttributeError, OSError, ValueError):  # closed, or none at all: nobody reads it
+        except (AttributeError, OSError, ValueError):  # closed, or none at all: no output
             return
         wait = NEXT_LINE_S
 
 
 def since_start() -> float:
-    """Wall time since this process began, s; where the system does not tell, since this module was loaded."""
+    """Wall time since this process began, s, or, if unknown, since this module was loaded."""
     try:
         fields = _STAT.read_text(encoding="utf-8").rpartition(")")[2].split()
         begun = int(fields[_START_FIELD]) / os.sysconf("SC_CLK_TCK")

@@ -17,11 +17,11 @@ from ringbalance.scene.units import DIMENSIONS
 
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[[01]\])?")
 _ROUND_OFF: Final = 1e-6
-"""Error of a correlation: files have at least seven digits."""
+"""Accepted rounding error of a correlation; files state at least seven digits."""
 
 
 def fitted_faults(reading: SceneReading) -> Iterator[Fault]:
-    """One error for each quantity, unit or list of correlations that cannot be; else one for all of them."""
+    """One error for each wrong quantity, unit or list of correlations; else at most one for the matrix."""
     quantities: tuple[FittedQuantity, ...] = reading.values.get("fitted.quantities", ())
     if not quantities:
         return
@@ -73,7 +73,7 @@ def fitted_faults(reading: SceneReading) -> Iterator[Fault]:
 def _quantity_error(
     reading: SceneReading, name: str, before: list[str], uncertain: list[str]
 ) -> tuple[str, str] | None:
-    """Problem and what is allowed, where the scene has no such uncertain quantity or has it twice."""
+    """Error of a name that is no uncertain quantity of the scene, or that occurs twice."""
     if name in before:
         return "it stands there twice", "each quantity once"
     causes = get_args(ErrorCause) if reading.schema is LIQUID_RING else ()

@@ -1,4 +1,4 @@
-"""The kind of scene whose balancer is a liquid ring."""
+"""Kind of scene of a liquid-ring balancer."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ _NARROWEST = 1 / 2000
 _SHALLOWEST = 1e-8
 """Depth over outer radius of a full ring; calibration goes down to a fortieth of its fill."""
 DRAWING_ROUNDING = 1e-5
-"""Relative: "1.5708 rad" is a right angle."""
+"""Relative rounding of values in drawings: "1.5708 rad" is a right angle."""
 
 
 def _radii_in_order(inner: float, outer: float) -> Contradiction | None:
@@ -51,7 +51,7 @@ def _fill_has_depth(share: float, inner: float, outer: float) -> Contradiction |
     lowest = _SHALLOWEST * outer * (2 - _SHALLOWEST) * outer / ((outer - inner) * (outer + inner))
     if share >= lowest:
         return None
-    # The allowed value is rounded up, so that what the message names passes.
+    # The allowed value is rounded up, so that the value in the message passes.
     return Contradiction(
         problem=f"the ring would be shallower than {_SHALLOWEST:g} of outer_radius "
         f"({written(outer, 'mm')}), too shallow to be resolved",
@@ -197,7 +197,7 @@ def _crest_inside_port(crest: float, port: float) -> Contradiction | None:
 
 
 def _bore_fits_bends(bore: float, bends: tuple[Bend, ...]) -> Contradiction | None:
-    """The inner side of each bend has a radius of its own: d/2 <= radius of the centre line."""
+    """The inner side of each bend is curved: d/2 <= radius of the centre line."""
     tightest = min((bend.radius for bend in bends), default=math.inf)
     if bore <= 2 * tightest * (1 + _ROUNDING):
         return None
@@ -283,7 +283,7 @@ _NO_PATH = (_port_in_chamber, _crest_in_disc, _crest_inside_port)
 
 
 def _drawn(reading: SceneReading) -> bool:
-    """True when keys give the chamber; a mesh has checks of its own."""
+    """True when keys describe the chamber; a mesh has separate checks."""
     return not reading.known("disc.geometry")
 
 
@@ -295,7 +295,7 @@ SIZE_CHECKS: tuple[Check, ...] = (
     check(_length_reaches_over_crest, _LENGTH, _ANGLE, _PORT, _CREST, moot=_NO_PATH),
     check(_length_reaches, _LENGTH, _ANGLE, _PORT, moot=(_port_in_chamber, _length_reaches_over_crest)),
 )
-"""Lengths of the tube that a chamber of the right size has room for."""
+"""Checks of tube lengths that depend on the size of the chamber."""
 CHECKS: tuple[Check, ...] = (
     check(_radii_in_order, _INNER, _OUTER),
     check(_chamber_has_depth, _INNER, _OUTER, moot=_NO_RING),

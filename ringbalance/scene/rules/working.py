@@ -1,6 +1,6 @@
-"""Rules of work for liquid, gas, controller and uncertainties; and how far the program's physics holds.
+"""Rules for liquid, gas, controller and uncertainties, and limits of validity of the program's physics.
 
-No disc turns faster, gas has one temperature, liquid one density:
+The limits concern the strength of discs, gas of one temperature and liquid of one density:
 
 **Rim speed.** Turning stretches a thin ring by rho v^2, so its rim is no faster than (sigma/rho)^(1/2), its
 strength over its density, and a solid disc's at most (8/(3 + nu))^(1/2) = 1.6 times that: 250 to 500 m/s in
@@ -9,12 +9,12 @@ steel, aluminium and titanium, 1 to 1.4 km/s in rings wound of carbon fibre alon
 
 **Gas from the shaft to the liquid.**  With n = v^2/(2 R T) its pressure grows by exp(n) where heat comes and
 goes, and by (1 + (1 - 1/gamma) n)^(gamma/(gamma - 1)) where none does: 0.8 % apart at n = 1/4, 11 % at n = 1,
-a factor of 2.3 at n = 3.  The program takes the first, and refuses to above n = 1/4, 205 m/s at 20 degC.
+a factor of 2.3 at n = 3.  The program takes the first, and refuses scenes above n = 1/4, 205 m/s at 20 degC.
 
 **Density of the liquid.**  A pressure p makes it denser by p/K.  Up to 2 % the mean of a ring, in which the
 pressure rises from the gas's to the wall's, is off by no more than a usual tolerance of 1 %.  A tube that no
 more than p drives is no faster than (2 p/rho)^(1/2), so 2 % is also 0.2 of the speed of sound, (K/rho)^(1/2).
-This is no refusal but a status of what is calculated, `reduced_model.chamber.contributions`.
+Beyond, a scene is not refused; its results get a status, see `reduced_model.chamber.contributions`.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ _LARGEST_RIM_SPEED_M_S: Final = 1000.0
 AIR_CONSTANT: Final = 287.05
 """R of dry air, J/(kg K)."""
 _LARGEST_EXPONENT: Final = 0.25
-"""n of a gas column."""
+"""Largest exponent n of a gas column."""
 LARGEST_COMPRESSION: Final = 0.02
-"""p/K."""
+"""Largest compression p/K of the liquid."""
 METAL_DENSITY_KG_M3: Final = 3000.0
-"""kg/m^3; what is denser is taken for a liquid metal."""
+"""Density above which a liquid is taken for a liquid metal, kg/m^3."""
 _WATER, _METAL, _OTHER = 2.0e9, 25e9, 0.8e9
 _ROUNDED: Final = 1 - 5e-4
-"""Less than four digits may be rounded up by."""
+"""Factor that covers the rounding of a number to four digits."""
 
 
 def bulk_modulus(liquid: Liquid) -> float:
-    """K, Pa, on the safe side: of water, of a liquid metal, or of any other liquid.
+    """Bulk modulus K, Pa, a lower bound: of water, of a liquid metal, or of any other liquid.
 
     Source: water from 0 to 100 degC 1.96 to 2.29 GPa, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002)
-        387 (IAPWS-95); mercury 25 GPa, gallium more; silicone and perfluorinated oils, the softest that are
+        387 (IAPWS-95); mercury 25 GPa, gallium more; silicone and perfluorinated oils, the softest
         in use, 0.8 to 1 GPa by their speeds of sound, recalled and not read.
     """
     if liquid.density > METAL_DENSITY_KG_M3:
@@ -129,7 +129,7 @@ def _period_covers_lag(period: float, lag: float) -> Contradiction | None:
 
 
 def _trial_time_executed(step: float, minimum: float, maximum: float) -> Contradiction | None:
-    """A valve-open time lies between the shortest and the longest that are executed."""
+    """A valve-open time lies between the shortest and the longest that the valve executes."""
     if minimum <= step <= maximum:
         return None
     least = f"minimum_gas_time ({written(minimum, 's')})"
@@ -149,7 +149,7 @@ def _steps_in_order(short: float, long: float) -> Contradiction | None:
 
 
 def _sequence_complete(sequence: tuple[str, ...], chambers: int) -> Contradiction | None:
-    """Every chamber stands in the sequence once."""
+    """The sequence has every chamber once."""
     letters = LETTERS[:chambers]
     if sorted(sequence) == list(letters):
         return None
@@ -204,7 +204,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def uncertainty_faults(reading: SceneReading) -> Iterator[Fault]:
-    """One error for each uncertainty of a quantity that the scene lacks, or that is larger than it."""
+    """One error for each uncertainty of a quantity that the scene lacks, or larger than the quantity."""
     for path in reading.tables["uncertainty"].values:
         key = path.removeprefix("uncertainty.")
         if key not in UNCERTAIN_QUANTITIES or not reading.known(path):

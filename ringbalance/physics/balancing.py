@@ -21,7 +21,7 @@ _ANGLES_RAD: Final[FloatArray] = np.concatenate(
 
 
 def unbalance_reduction_ratio(*, before: float, after: float) -> float:
-    """URR = 1 - U1/U0 of one correction.
+    """Unbalance reduction ratio of one correction, URR = 1 - U1/U0.
 
     Source: ISO 21940-21:2012.
     """
@@ -29,7 +29,7 @@ def unbalance_reduction_ratio(*, before: float, after: float) -> float:
 
 
 def rms_velocity(*, amplitude: float, speed: float) -> float:
-    """A W / sqrt(2), m/s, of a sine of the running speed.
+    """Root-mean-square velocity of a sine at the running speed, A W / sqrt(2), m/s.
 
     Source: the quantity that ISO 20816-1:2016 judges.
     """
@@ -37,12 +37,13 @@ def rms_velocity(*, amplitude: float, speed: float) -> float:
 
 
 def critical_speed(*, mass: float, stiffness: float) -> float:
-    """sqrt(K/M) of a rotor on isotropic bearings, rad/s, undamped: there the lag is a quarter turn."""
+    """Undamped critical speed of a rotor on isotropic bearings, sqrt(K/M), rad/s: its lag is a quarter
+    turn."""
     return math.sqrt(stiffness / mass)
 
 
 def amplification_factor(*, mass: float, stiffness: float, damping: float) -> float | None:
-    """sqrt(K M)/C, 1/(2 zeta); None without damping, and where that is so strong that nothing peaks.
+    """Amplification factor sqrt(K M)/C = 1/(2 zeta); None without damping, or with too much for a peak.
 
     Source: the limit of API 617's N_c/(N_2 - N_1) for light damping, which is within 3 % of it from 7 on.
     """
@@ -55,7 +56,7 @@ def peak_sensitivity(*, loop_factor: float, integral: float = 0.0, derivative: f
     """Largest |1/(1 + L)| on the unit circle, L = h (1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z))/(z - 1).
 
     2/(2 - h) with P alone, up to h = 2.  i = dt/Ti (`integral`), q = Td/dt (`derivative`).  A residual that
-    turns round at every sample, h > 1, drops its integral, and as its amplitude has no sign the loop is
+    changes sign at every sample, h > 1, has no integral part, and as its amplitude has no sign the loop is
     L = -h (1 + q (1 - 1/z))/(z + 1).
     Source: ISO 14839-3:2006, which judges the loops of magnetic bearings by it; used here for comparison.
     """
@@ -69,5 +70,5 @@ def peak_sensitivity(*, loop_factor: float, integral: float = 0.0, derivative: f
 
 
 def zone(sensitivity: float) -> str:
-    """A to D by ISO 14839-3."""
+    """Zone A to D of ISO 14839-3 for a peak sensitivity."""
     return next(name for most, name in ZONES if sensitivity <= most)

@@ -1,8 +1,7 @@
-"""Distance of a number from its limit of vanishing mesh size, judged from three meshes.
+"""Discretisation error of a number, estimated from three meshes.
 
 The procedure of Celik et al. (2008), with the order capped at the formal one of the quantity at hand.
-Differences that are only round-off, oscillate or grow are said to be so; none of them is dressed up as an
-order.
+Differences that are only round-off, oscillate or grow are reported as such, not as an order.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 
 
 class GridVerdict(StrEnum):
-    """Kind of the sequence of values."""
+    """Convergence behaviour of the values on three meshes."""
 
     MONOTONE = "monotone"
     OSCILLATORY = "oscillatory"
@@ -73,12 +72,13 @@ def gci(
     """Grid convergence of one number by Celik's procedure.
 
     p = |ln|e32/e21| + q(p)| / ln r21, q(p) = ln((r21^p - s)/(r32^p - s)), s = sign(e32/e21),
-    GCI = 1.25 e_a / (r21^p - 1); the half-width takes p no higher than the formal order, and no less than
-    what the two coarser meshes foretell.
+    GCI = 1.25 e_a / (r21^p - 1); the half-width takes p no higher than the formal order, and is at least what
+    the two coarser meshes predict.
     Args:
-        values: of the number, finest mesh first, in any one unit, three.
-        sizes: of the cells, finest first, in any one unit, strictly increasing.
-        formal_order: at which this number should converge; a functional gains over the field it comes from.
+        values: three values of the number, finest mesh first, in any one unit.
+        sizes: three sizes of the cells, finest first, in any one unit, strictly increasing.
+        formal_order: order at which this number should converge; that of a functional is higher than its
+            field's.
         round_off: bound of the noise in each value, in its unit; never taken below 8 ulp of the largest
             value.
         safety: factor on the estimated error.
@@ -96,7 +96,7 @@ def gci(
     noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
     e21, e32 = float(phi[1] - phi[0]), float(phi[2] - phi[1])
     r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
-    # The last change is rounding if the coarser pair foretells it, and not if errors cross zero by accident.
+    # The last change is rounding only if the coarser pair predicts it: errors may cross zero by accident.
     foretold = abs(e32) / (r32**formal_order - 1) / r21**formal_order
     if abs(e21) <= noise and foretold <= 10 * noise:
         return _record(GridVerdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + abs(e21))

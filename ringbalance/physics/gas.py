@@ -1,4 +1,4 @@
-r"""Gas of a chamber: its supply through valve and line by ISO 6358, its column as it spins, what it costs.
+r"""Gas of a chamber: flow through valve and line by ISO 6358, rotating gas column, and consumption.
 
     m' = C rho_0 p_1 sqrt(T_0/T_1) phi(p_2/p_1)
 with phi = 1 up to the critical ratio b (choked), sqrt(1 - ((r - b)/(1 - b))^2) above it (subsonic), and
@@ -48,7 +48,7 @@ _NORMAL_TEMPERATURE_K: Final = 273.15
 def flow_shape(ratio: float, critical_ratio: float) -> float:
     """phi(r), the mass flow over its choked value: 1 up to b, 0 at r = 1.
 
-    An ellipse above b, and straight from r = 0.999 on, where the flow is laminar and its slope infinite.
+    An ellipse above b, straight from r = 0.999 on, where flow is laminar and the slope would be infinite.
     """
     if ratio <= critical_ratio:
         return 1.0
@@ -58,7 +58,7 @@ def flow_shape(ratio: float, critical_ratio: float) -> float:
 
 
 def flow_shape_slope(ratio: float, critical_ratio: float, shape: float) -> float:
-    """dphi/dr, with phi(r) given."""
+    """Slope dphi/dr of `flow_shape`, from phi(r)."""
     if ratio <= critical_ratio:
         return 0.0
     if ratio > max(LAMINAR_RATIO, critical_ratio):
@@ -71,27 +71,27 @@ class GasLine:
     """Valve and line of one chamber, with a supply and the surroundings at its other end."""
 
     supply_pressure: float
-    """Absolute, Pa."""
+    """Absolute supply pressure, Pa."""
     ambient_pressure: float
-    """Absolute, Pa."""
+    """Absolute ambient pressure, Pa."""
     temperature: float
     """Temperature of the supply and the surroundings, K."""
     conductance: float
-    """C, m^3/(s Pa)."""
+    """Sonic conductance C, m^3/(s Pa)."""
     critical_ratio: float
-    """b."""
+    """Critical pressure ratio b."""
     process: GasProcess
 
     @classmethod
     def of(cls, gas: Gas) -> GasLine | None:
-        """The line of a scene's gas; None where the scene does not give its two numbers."""
+        """Gas line of a scene; None if the scene lacks its conductance or critical ratio."""
         if gas.conductance is None or gas.critical_ratio is None:
             return None
         return GasLine.with_conductance(gas, conductance=gas.conductance, critical_ratio=gas.critical_ratio)
 
     @classmethod
     def with_conductance(cls, gas: Gas, *, conductance: float, critical_ratio: float) -> GasLine:
-        """A line with given numbers under a scene's pressures and temperature."""
+        """Gas line with a conductance and critical ratio, at a scene's pressures and temperature."""
         return cls(
             supply_pressure=gas.pressure + gas.ambient_pressure,
             ambient_pressure=gas.ambient_pressure,
@@ -102,7 +102,7 @@ class GasLine:
         )
 
     def time_constant(self, *, volume: float) -> float:
-        """tau = V/(C p_0) sqrt(T_0/T), s."""
+        """Time constant of filling, tau = V/(C p_0) sqrt(T_0/T), s."""
         warm = math.sqrt(REFERENCE_TEMPERATURE_K / self.temperature)
         return volume / (self.conductance * REFERENCE_PRESSURE_PA) * warm
 
@@ -118,7 +118,7 @@ class GasLine:
         return np.minimum(np.asarray(ratio) - b, 0.0) + (1 - b) * self._angle(ratio)
 
     def choked_filling_time(self, *, volume: float) -> float:
-        """V p/(C p_1 p_0) sqrt(T_0/T), s: a lower bound on the time from ambient to the supply's pressure."""
+        """Lower bound of the time from ambient to supply pressure, V p/(C p_1 p_0) sqrt(T_0/T), s."""
         return self.time_constant(volume=volume) * (1 - self.ambient_pressure / self.supply_pressure)
 
     def venting_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:
@@ -151,10 +151,10 @@ def _sine_integral(angle: npt.ArrayLike, b: float) -> FloatArray:
 
 
 def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
-    """R T m' of air through a choked nozzle, W: the most that passes an opening.
+    """Largest flow of air through an opening, R T m' of a choked nozzle, W.
 
     Args:
-        pressure: upstream, absolute, Pa.
+        pressure: absolute pressure upstream, Pa.
     Source: isentropic flow, m' = p A sqrt(gamma/(R T)) (2/(gamma + 1))^((gamma + 1)/(2 (gamma - 1))).
     """
     gamma = HEAT_CAPACITY_RATIO
@@ -163,11 +163,11 @@ def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
 
 
 def pressure_factor(scene: Scene) -> float:
-    """Gauge pressure of the gas on the liquid over the one where the scene's pressure is measured.
+    """Gauge pressure of the gas on the liquid over that at the place of measurement.
 
-    Measured on the shaft's axis it is the ratio of an isothermal column that turns with the disc up to the
-    surface at equal fills, exp(omega^2 a^2/(2 R T)), for the driven chamber and, because it vents to the same
-    place, for the opposite one: p_abs f - p_a f = p f.
+    For a measurement on the shaft's axis it is f = exp(omega^2 a^2/(2 R T)), the pressure ratio of an
+    isothermal gas column that rotates with the disc, up to the surface at equal fills. Both chambers have it,
+    because the opposite one vents to the same place: p_abs f - p_a f = p f.
     Range: an exponent up to 1/4, `scene.rules.working`; a scene beyond is refused.
     Source: dp/dr = rho omega^2 r with rho = p/(R T).
     """
@@ -180,9 +180,9 @@ def pressure_factor(scene: Scene) -> float:
 
 
 def vented_pressure(scene: Scene) -> float:
-    """Absolute pressure of the gas on the liquid of a vented chamber, from which gauge pressures there count.
+    """Absolute gas pressure on the liquid of a vented chamber, the reference of gauge pressures there.
 
-    The surroundings', times `pressure_factor` where the scene's pressures hold on the shaft.
+    Ambient pressure, times `pressure_factor` where the scene's pressures hold on the shaft.
     """
     return scene.gas.ambient_pressure * pressure_factor(scene)
 
@@ -193,11 +193,11 @@ def normal_volume(*, pressure_volume: float, temperature: float) -> float:
 
 
 def compression_work(*, pressure_volume: float, pressure: float, ambient_pressure: float) -> float:
-    """Least work that makes the gas of a given p V from the surroundings, p V ln(p/p_a), J.
+    """Least work to compress ambient gas to a given p V, p V ln(p/p_a), J.
 
     Args:
         pressure_volume: p V of the gas used, at the supply's temperature, J.
-        pressure: of the supply, absolute, Pa.
+        pressure: absolute supply pressure, Pa.
     Source: isothermal compression; 84 J for 51 ml at 0.7 MPa gauge.
     """
     return pressure_volume * math.log(pressure / ambient_pressure)

@@ -10,7 +10,7 @@ from ringbalance.scene.arrays import FloatArray
 
 
 class StatusCode(StrEnum):
-    """Kinds of end of a solve."""
+    """Outcome of a solve."""
 
     OK = "ok"
     OUT_OF_RANGE = "out_of_range"
@@ -20,7 +20,7 @@ class StatusCode(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """End of a solve and, when it did not succeed, what to do next."""
+    """Outcome of a solve and, if it failed, advice on what to do next."""
 
     code: StatusCode = StatusCode.OK
     text: str = "solved"
@@ -33,7 +33,7 @@ class Status:
 
 @dataclass(frozen=True, kw_only=True)
 class Statistics:
-    """Counted work and residuals of a solve; wall time is kept apart because it does not reproduce."""
+    """Operation counts and residuals of a solve; wall time is excluded because it is not reproducible."""
 
     unknowns: int = 0
     iterations: int = 0

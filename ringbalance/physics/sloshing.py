@@ -1,4 +1,4 @@
-"""Small oscillations of the liquid ring: natural frequencies, and the answer to gravity across the shaft.
+"""Small oscillations of the liquid ring: natural frequencies, and the response to gravity across the shaft.
 
 Natural frequencies scale with the speed, so a fill at which one of them equals it is resonant with gravity
 across the shaft at every speed. A new force on the free surface or another damping goes into
@@ -27,7 +27,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
 FORMAL_ORDER: Final = 4.0
-"""Order of an eigenvalue of quadratic elements: twice that of its mode in the energy's norm."""
+"""Order of an eigenvalue of quadratic elements: twice that of its mode in the energy norm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,9 +45,9 @@ class _SloshingModes:
 def _systems(
     disc: Disc, radius: float, cells: tuple[tuple[int, int], ...]
 ) -> Iterator[tuple[SloshingSystem, float]]:
-    """The problem below a surface of a radius, m, and its unit of length, m, finest mesh first.
+    """Systems below a surface of a radius, m, each with its unit of length, m, finest mesh first.
 
-    Of a sector on meshes with these cells; of an imported chamber's middle section on two.
+    A sector has meshes with these cells, the middle section of an imported chamber has two.
     """
     if disc.geometry is None:
         for each in cells:
@@ -62,8 +62,8 @@ def _half_widths(
 ) -> FloatArray:
     """Uncertainties (95 %) of the values on the finest mesh. Args: `values`: shape (meshes, quantities).
 
-    Source: grid convergence of Celik et al. (2008); of a section in straight lines, of order two, all that
-    halving them changes, and what the facets of a wall, between its nodes, miss of the depth.
+    Source: grid convergence of Celik et al. (2008); for a section in straight lines, of order two, the whole
+    change by halving them, and the error of the depth by the facets of a wall.
     """
     if disc.geometry is not None:
         outer = disc.outer_radius
@@ -92,13 +92,13 @@ def sloshing_modes(
     pi/theta.
     Args:
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
-        modes: how many, at least 1.
+        modes: number of modes, at least 1.
         cells: three meshes, finest first; default twice `default_cells` and two coarser ones, with
             more cells along the angle for many modes.  An imported chamber is solved in its middle section.
     Raises: ValueError: fill ratios outside (0, 1], no modes, or not three meshes.
     Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
     omega^2 a; the ends are flat and the section is the same along the shaft, so gravity across it drives no
-    others.
+    other waves.
     Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `section_system`.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
@@ -122,8 +122,8 @@ def sloshing_modes(
 def default_sloshing_cells(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, int], ...]:
     """Three meshes that keep the lowest four frequencies of a chamber within 1e-4.
 
-    Args: `disc`: the disc; only its central angle counts. `modes`: how many are wanted; each has half a wave
-        more along the angle than the one before.
+    Args: `disc`: the disc; only its central angle counts. `modes`: number of modes; each has half a wave more
+        along the angle than the one before.
     Returns: Cells along the radius and the angle, finest first.
     Source: about five cells a wave on the coarsest mesh bring a quadratic element into its asymptotic range.
     """
@@ -133,9 +133,9 @@ def default_sloshing_cells(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, in
 
 
 def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ...]:
-    """Fills at which a natural frequency equals the speed, s_n(x) = 1, whatever the speed.
+    """Fill ratios at which a natural frequency equals the speed, s_n(x) = 1, at any speed.
 
-    Args: `modes`: how many of the lowest modes are looked at; higher ones resonate in thinner rings and are
+    Args: `modes`: number of modes, lowest first; higher ones resonate in thinner rings and are
         damped more.
     Returns: Mode number (from 1) and fill ratio of each, by mode.
     Raises: ValueError: no modes.
@@ -191,11 +191,11 @@ def _extremes(
 ) -> tuple[FloatArray, FloatArray]:
     """Extremes of a forced response while all natural frequencies vary within `FREQUENCY_UNCERTAINTY`.
 
-    Frequencies that are q times as high answer to gravity as those of the theory do to a force at s = 1/q.
+    With frequencies q times as high the liquid responds to gravity as by theory to a force at s = 1/q.
     Args:
-        response: takes frequency ratios of the force, shape (m,), to values, shape (m, quantities).
-        natural: natural frequencies over the speed: peaks are looked for there.
-    Returns: Lower and upper ends, shape (quantities,) each: seldom as far from the value on both sides.
+        response: function from frequency ratios of the force, shape (m,), to values, shape (m, quantities).
+        natural: natural frequencies over the speed, at which peaks may lie.
+    Returns: Lower and upper ends, shape (quantities,) each: in general not symmetric about the value.
     """
     low, high = 1 / HIGHEST_TRUE, 1 / LOWEST_TRUE
     peaks = natural[(natural > low) & (natural < high)]
@@ -221,14 +221,15 @@ class SloshingResponse:
     surface_radius: FloatArray
     """a, m, shape (n,)."""
     amplification: Estimate
-    """Change of the chamber's moment over that of a surface which follows gravity at once, shape (n,).
+    """Change of the chamber's moment over that with a surface which follows gravity instantly, shape (n,).
 
-    Half-widths are those of the solution alone, here and below; the intervals hold them, too."""
+    Half-widths, here and below, are those of the numerical solution alone; the intervals include them."""
     amplification_interval: FloatArray
-    """Lower and upper end (95 %) of the amplification, shape (n, 2), natural frequencies being known to
-    `FREQUENCY_UNCERTAINTY` only.  Where a mode may meet the force, the upper end rests on the damping."""
+    """Lower and upper end (95 %) of the amplification by `FREQUENCY_UNCERTAINTY`, shape (n, 2). Where a mode
+    may be resonant, the upper end depends on the damping."""
     pressure_amplification: Estimate
-    """Change of the mean pressure on the outer wall over that under such a surface, shape (n,)."""
+    """Change of the mean pressure on the outer wall over that with an instantly following surface, shape
+    (n,)."""
     pressure_amplification_interval: FloatArray
     """Lower and upper end (95 %) of the pressure's amplification, shape (n, 2)."""
     surface_amplitude: Estimate
@@ -247,19 +248,19 @@ def sloshing_response(
     gravity: float,
     cells: tuple[tuple[int, int], ...] | None = None,
 ) -> SloshingResponse:
-    """Answer of the liquid in one chamber to gravity that turns in the disc's frame.
+    """Response of the liquid in one chamber to gravity that turns in the disc's frame.
 
     (-s^2 S + 2 i s C + A + i s sqrt(i s E) W) psi = i s F with G = g r exp(i (angle + s omega t)), E =
-    nu/(omega R2^2); the reference is A psi = i s F, a surface always across the sum of both fields.  The
+    nu/(omega R2^2); the reference is A psi = i s F, a surface always normal to the sum of both fields.  The
     wall pressure follows from psi by p'/rho = G + c - i s phi - 2 psi.
     Args:
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
         cells: three meshes, finest first; default those of `sloshing_modes`.
-    Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
+    Returns: SloshingResponse; its status reports waves that might not be small, or no ring under gravity.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
-    Validity: small planar waves, of an imported chamber those of its middle section: waves along the shaft,
-        and what a section that changes along it does to them, are left out; thin Stokes layers on all walls
+    Validity: small planar waves, of an imported chamber those of its middle section: waves along the shaft
+        and the effect of a section that changes along it are neglected; thin Stokes layers on all walls
         without the Coriolis force, which makes the damping, and with it a peak, good to a factor of two.
     Source: derived in `section_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
     """
@@ -287,7 +288,7 @@ def sloshing_response(
     )
     scale = gravity / angular_velocity**2
     amplitude = Estimate(value=scale * answers[:, 0, 1], uncertainty=scale * widths[:, 1])
-    # Peaks are looked for on the mesh in the middle, if there are three.
+    # Peaks are searched for on the middle one of three meshes.
     middle = 0 if disc.geometry is not None else len(meshes) // 3
     systems = (next(islice(_systems(disc, float(a), meshes), middle, None))[0] for a in radii)
     ends = np.array(
@@ -296,7 +297,7 @@ def sloshing_response(
             for system in systems
         ]
     )
-    # At either end the solution errs by about the same share as in the middle.
+    # The relative error of the solution is about the same at either end as in the middle.
     share = widths / answers[:, 0]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
     return SloshingResponse(
@@ -324,7 +325,7 @@ def _answers(system: SloshingSystem, ratios: FloatArray, ekman: float) -> FloatA
         np.linalg.solve(matrix, forcing)[:, :, 0].T
         for matrix in (swinging + layers, system.centrifugal.astype(np.complex128))
     )
-    # Of the swing of the liquid's first moment, both components.
+    # Amplitude of the liquid's first moment, both components.
     moment, reference = (np.linalg.norm(system.outflow[1:] @ psi, axis=0) for psi in (damped, still))
     displacement = np.abs(system.flux @ damped).max(axis=0) / ratios
     pressure = (

@@ -13,9 +13,9 @@ for (phi, q') = int grad psi . grad psi', it becomes
     (-s^2 S + 2 i s C + A + i s sqrt(i s E) W) psi = i s F
 
 with S the kinetic energy (the stiffness matrix condensed onto the surface), C antisymmetric, A the
-centrifugal stiffness, W what the Stokes layers on the walls take (E = nu/(omega R2^2)), and F = (G, q').
+centrifugal stiffness, W the loss in the Stokes layers on the walls (E = nu/(omega R2^2)), and F = (G, q').
 
-The pressure is p'/rho = G + c - i s phi - 2 psi, and its mean over the free surface's moved place is zero, so
+The pressure is p'/rho = G + c - i s phi - 2 psi, and its mean over the displaced free surface is zero, so
 the mean over the outer wall, where psi = 0, is
 
     mean_w p'/rho = mean_w G - mean_a G - i s (mean_w phi - mean_a phi) + 2 mean_a psi
@@ -68,11 +68,11 @@ class SloshingSystem:
     surface_mean: FloatArray
     """Row that takes psi to its mean over the free surface, shape (n,)."""
     wall_drive: complex
-    """Mean of x + i y over the outer wall less that over the free surface: the pressure of a surface that
-    follows gravity at once."""
+    """Mean of x + i y over the outer wall less that over the free surface: the pressure with a surface that
+    follows gravity instantly."""
 
     def natural_frequencies(self) -> FloatArray:
-        """All positive s, ascending.
+        """All natural frequencies s > 0 over the speed, ascending.
 
         With S = L L^T and y = L^T psi the oscillator y'' + 2 C y' + A y = 0 is d/dt (y', A^(1/2) y) = B (...)
         with a real antisymmetric B, whose eigenvalues are +- i s.
@@ -95,7 +95,7 @@ class SloshingSystem:
 def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]) -> SloshingSystem:
     """Assemble and condense the problem in the chamber of a disc, on one mesh.
 
-    Args: `disc`: the disc; its width counts in the loss at the two ends alone. `surface_radius`: a, m.
+    Args: `disc`: the disc, whose width enters only the loss at the two ends. `surface_radius`: a, m.
         `cells`: along the radius and the angle.
     Raises: ValueError: as `chamber_mesh`.
     """
@@ -109,7 +109,7 @@ def imported_system(
 ) -> tuple[SloshingSystem, float]:
     """Assemble the problem in the middle section of an imported chamber; its unit of length is in m.
 
-    Args: `coarse`: on the corners of the cells alone.
+    Args: `coarse`: true for a mesh on the corners of the cells alone.
     Raises: ValueError: as `middle_section`.
     """
     section: LiquidSection = middle_section(geometry, surface_radius=surface_radius, coarse=coarse)
@@ -144,8 +144,9 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
     extension[inner] = -splu(matrix[inner][:, inner].tocsc()).solve(into)
     condensed = matrix[free] @ extension
     kinetic = np.asarray((condensed + condensed.T) / 2, dtype=np.float64)
-    # The Stokes layers on the two ends see all of the flow, so their share is the kinetic energy's. Along the
-    # sides it is the integral of the squared velocity, from the flux through them, zero at the edges.
+    # The Stokes layers on the two ends cover the whole flow, so their loss is proportional to the kinetic
+    # energy. Along the sides it is the integral of the squared velocity, from the flux through them, zero at
+    # the edges.
     wetted, flux = np.setdiff1d(walls, surface), matrix @ extension
     inverse = splu(mass.assemble(sides)[wetted][:, wetted].tocsc())
     wall_loss = ends * kinetic + np.asarray(flux[wetted].T @ inverse.solve(flux[wetted]))
@@ -156,7 +157,7 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
         rows[facets, :, numbers] += normal[0] * function.grad[1] - normal[1] * function.grad[0]
     means = [load / load.sum() for load in map(unit_load.assemble, (on_facets(OUTER_WALL), top))]
     difference, points = means[0] - means[1], basis.doflocs[0] + 1j * basis.doflocs[1]
-    # The difference of means of phi, from psi, whose conjugate phi is.
+    # Difference of the means of phi, the harmonic conjugate of psi, from psi.
     adjoint = np.zeros(basis.N)
     adjoint[1:] = splu(matrix[1:][:, 1:].tocsc()).solve(difference[1:])
 
@@ -180,7 +181,7 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
 class _FilmMapping(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
     """Mapping for films, where rounding exceeds the 1e-12 at which scikit-fem's Newton method ends.
 
-    Shape functions are evaluated once for all components, and points of a facet are looked for once.
+    Shape functions are evaluated once for all components, and points of a facet are located once.
     """
 
     def __init__(self, mesh: Any, element: Any, of_facets: Any) -> None:

@@ -1,9 +1,10 @@
 """Integrals of the pressure in one chamber: volume, moment, wall pressure, force and torque on walls.
 
-In an imported chamber it is solved here: laplace(p) = 2 rho omega^2 in the liquid, p = 0 on the free surface
-and n . grad p = rho omega^2 r e_r . n on walls, by quadratic tetrahedra on a mesh that follows the surface.
-The exact pressure is known, rho omega^2 (r^2 - a^2)/2; what the elements leave of it is the error of the
-discretisation.  What the facets of a wall leave of a smooth wall is estimated apart.
+In an imported chamber the pressure is solved here: laplace(p) = 2 rho omega^2 in the liquid, p = 0 on the
+free surface and n . grad p = rho omega^2 r e_r . n on walls, by quadratic tetrahedra on a mesh that follows
+the surface. The exact pressure is known, rho omega^2 (r^2 - a^2)/2; the deviation from it is the
+discretisation error. The
+error of facets in place of a smooth wall is estimated separately.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 @dataclass(frozen=True, kw_only=True)
 class _LiquidIntegrals:
-    """Integrals over the liquid of one chamber: totals."""
+    """Totals of the liquid in one chamber."""
 
     volume: float
     """m^3."""
@@ -45,7 +46,7 @@ class _LiquidIntegrals:
     force: Mapping[str, FloatArray]
     """Force of the liquid on each wall, N, shape (3,)."""
     torque: Mapping[str, float]
-    """Its torque about the shaft, with the rotation, N m."""
+    """Torque of the liquid on each wall about the shaft, with the rotation, N m."""
 
     @property
     def mirrored_alike(self) -> list[float]:
@@ -99,19 +100,19 @@ class _BoundaryLoad:
     """Force of the liquid on one boundary."""
 
     force: Estimate
-    """N, shape (3,), in the chamber's axes."""
+    """Force in the chamber's axes, N, shape (3,)."""
     area: float
-    """m^2, of the part that the liquid touches."""
+    """Area of the wetted part, m^2."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImportedRing:
-    """Liquid at rest in an imported chamber: totals."""
+    """Totals of the liquid at rest in an imported chamber."""
 
     wall_pressure: Estimate
-    """Mean over the part of the outer wall that the liquid touches, gauge, Pa, shape ()."""
+    """Mean gauge pressure on the wetted part of the outer wall, Pa, shape ()."""
     loads: Mapping[str, _BoundaryLoad]
-    """By boundary, the free surface left out."""
+    """Load on each boundary except the free surface."""
     volume: float
     """m^3."""
     first_moment: FloatArray
@@ -144,7 +145,7 @@ def solved_ring(
         density * angular_velocity**2 / 2 * (mesh.doflocs[0] ** 2 + mesh.doflocs[1] ** 2 - surface_radius**2)
     )
     walls = {name: side(mesh, name) for name in mesh.boundaries if name != FREE_SURFACE}
-    # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
+    # The error of r^2 by the facets of the outer wall is taken for the other walls as well.
     doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
     mean, still = (_mean(walls[OUTER_WALL], values) for values in (linear.values, exact))
     return ImportedRing(
@@ -162,7 +163,7 @@ def _mean(wall: BoundarySide, nodal: FloatArray) -> float:
 
 
 def _load(wall: BoundarySide, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
-    """Load on a wall, with a doubt of the pressure by the walls' facets, Pa."""
+    """Load on a wall; `doubt` is the error of the pressure by the walls' facets, Pa."""
     force, still = ((wall.area * wall.at_points(values)).sum(axis=(1, 2)) for values in (nodal, exact))
     area = float(wall.weights.sum())
     return _BoundaryLoad(

@@ -1,8 +1,8 @@
 """Totals of the liquid ring in one chamber: volume, wall pressure, moment and force on the disc.
 
-Every number comes from finite elements on three meshes and carries the half-width that the grid
-convergence of exactly this number gives it, with the rounding that this cannot see.  With gravity across the
-shaft each number is the mean over a turn.
+Every number comes from finite elements on three meshes, with a half-width by its own grid convergence and by
+the rounding that convergence does not show.  With gravity across the shaft each number is the mean over a
+turn.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ class RingQuantities:
     fill_ratio: FloatArray
     """x, shape (n,)."""
     liquid_volume: Estimate
-    """m^3, shape (n,)."""
+    """Volume of the liquid, m^3, shape (n,)."""
     wall_pressure: Estimate
-    """Mean over the outer wall, of the liquid alone (gas counted as zero), Pa, shape (n,)."""
+    """Mean liquid pressure on the outer wall (gas pressure zero), Pa, shape (n,)."""
     moment: Estimate
     """U = rho times the integral of x over the liquid, kg m, shape (n,)."""
     moment_per_volume: Estimate
@@ -60,7 +60,7 @@ class RingQuantities:
     ripple: Mapping[str, FloatArray]
     """First harmonic over a turn of "wall_pressure" (Pa) and "moment" (kg m), zero-to-peak, shape (n,)."""
     convergence: Mapping[str, tuple[GridConvergence, ...]]
-    """Judgement on each quantity by its name, one per fill ratio."""
+    """Grid convergence of each quantity by its name, one record per fill ratio."""
     mesh_values: Mapping[str, FloatArray]
     """Each quantity on every mesh, finest first, shape (meshes, n)."""
     cells: tuple[tuple[int, ...], ...]
@@ -96,9 +96,8 @@ def ring_quantities(
         cells: three meshes, finest first, each with half the cells of the one before; default `default_cells`
             and two coarser ones; they decide the dimension when given.
     Returns: The totals; status is that of the first fill that is not solved.
-    Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density or speed
-        that make no sense; two dimensions for gravity along the shaft; not three
-        meshes.
+    Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; invalid density or
+        speed; two dimensions for gravity along the shaft; not three meshes.
     Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
         doi:10.1115/1.2960953.
     """
@@ -157,11 +156,11 @@ class _TurnMeans:
     ripple: FloatArray = field(default_factory=lambda: np.zeros(2))
     """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
     surfaces: tuple[FloatArray, ...] = ()
-    """Found surfaces, one per angle, m."""
+    """Radii of the computed surfaces, one array per angle, m."""
     status: Status = field(default_factory=Status)
     statistics: Statistics = field(default_factory=Statistics)
     rounding: float = 0.0
-    """Largest rounding of a found surface's place, in mean depths."""
+    """Largest rounding of a computed surface's position, in mean depths."""
 
 
 def _on_meshes(
@@ -197,7 +196,7 @@ def _turn_mean(
     """
     solutions = []
     for k, liquid in enumerate(turn):
-        # Below a free surface that is concentric, or found where there is gravity.
+        # The free surface is concentric, or computed where there is gravity.
         if liquid.gravity:
             start = refined_surface(starts[k]) if starts else None
             solution = solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=x, cells=cells, start=start)
@@ -285,10 +284,10 @@ def _rounding(disc: Disc, cells: tuple[int, ...], x: float, moved: float) -> flo
     """Bound of the rounding of every total over its natural size; zero for an empty chamber, which is exact.
 
     eps [c R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2], plus
-    the rounding of a found surface's place, in mean depths.
+    the rounding of a computed surface's position, in mean depths.
     Source: coordinates of a film cancel (c = 20, in three dimensions 1000: a hexahedron's polynomials have
-        large coefficients), and narrow cells make the matrix stiff; the factors are five to ten times what
-        was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
+        large coefficients), and narrow cells make the matrix stiff; the factors are five to ten times the
+        deviations seen from closed forms between 1 and 180 degrees and depths down to 10 nm.
     """
     if x == 0:
         return 0.0

@@ -1,4 +1,4 @@
-"""The pressure of the liquid in a chamber that turns: a Poisson problem with the gas on its free surface.
+"""Pressure of the liquid in a rotating chamber: a Poisson problem with the gas on the free surface.
 
 In the rotating frame liquid at rest obeys grad p = f, f = rho (omega^2 r e_r + g). With p = p_gas on the
 free surface the weak form is
@@ -6,7 +6,7 @@ free surface the weak form is
     int grad p . grad v = int f . grad v      for all v that vanish on the free surface,
 
 which holds laplace(p) = div f in the liquid and n . grad p = n . f on all walls at once. Manufactured
-solutions put their own f and p_gas into the same record, so they run through the same lines. The elements
+solutions put their own f and p_gas into the same record, so that they test the same code. The elements
 are quadratic ones of scikit-fem on the liquid's meshes.
 """
 
@@ -52,7 +52,7 @@ def quadratic_basis(mesh: Any) -> Any:
 def stiffness(basis: Any) -> csr_matrix:
     """Matrix of the integrals of grad u . grad v.
 
-    By one product a cell: a form of scikit-fem calls Python for each pair of functions.
+    One matrix product per cell, because a form of scikit-fem calls Python for each pair of functions.
     """
     slopes = np.stack([each[0].grad * np.sqrt(basis.dx) for each in basis.basis])
     rows = np.moveaxis(slopes, 2, 0).reshape(basis.nelems, len(slopes), -1)
@@ -66,8 +66,8 @@ def stiffness(basis: Any) -> csr_matrix:
 class BoundarySide:
     """Quadrature points of one named boundary of a mesh, in the mesh's unit of length.
 
-    A side is integrated on its own facets: a facet basis of scikit-fem looks for each point in its cell by
-    Newton's method, at sixty times the cost, and not in films.
+    A side is integrated on its own facets: a facet basis of scikit-fem locates each point in its cell by
+    Newton's method, at sixty times the cost, and fails in films.
     """
 
     nodes: IntArray
@@ -90,7 +90,7 @@ class BoundarySide:
         return np.asarray(self.area / self.weights)
 
     def at_points(self, nodal: FloatArray) -> FloatArray:
-        """Values at the points of a field given at all nodes."""
+        """Values at the points, of a field given at all nodes."""
         return np.asarray(nodal[self.nodes].T @ self.values)
 
     def load(self, density: FloatArray, *, unknowns: int) -> FloatArray:
@@ -107,7 +107,7 @@ class BoundarySide:
 
 
 def side(mesh: Any, boundary: str) -> BoundarySide:
-    """A boundary of a mesh of quadratic cells, by its name."""
+    """Quadrature points of a named boundary of a mesh of quadratic cells."""
     facets = mesh.boundaries[boundary]
     corners, edges = mesh.facets, mesh.dofs.edge_dofs
     parts = [corners, *([edges[0, mesh.f2e]] if len(edges) else []), mesh.dofs.facet_dofs]
@@ -214,12 +214,12 @@ def _judged(matrix: csr_matrix, right: FloatArray, values: FloatArray, iteration
 
 @dataclass(frozen=True, kw_only=True)
 class PressureProblem:
-    """Right-hand sides of the pressure problem, as functions of the place; all lengths in metres."""
+    """Right-hand sides of the pressure problem, as functions of position; all lengths in metres."""
 
     force: Callable[[FloatArray], FloatArray]
-    """f(x), Pa/m, from places of shape (dimension, ...), in their shape."""
+    """Body force f(x), Pa/m, at points of shape (dimension, ...), in the same shape."""
     surface_pressure: Callable[[FloatArray], FloatArray]
-    """p_gas(x), Pa, gauge."""
+    """Gauge pressure p_gas(x) on the free surface, Pa."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,12 +233,12 @@ class RotatingLiquid:
     gravity: tuple[float, ...] = ()
     """g in the chamber's axes at this instant, m/s^2, two or three components; empty: left out."""
     gas_pressure: float = 0.0
-    """On the free surface, Pa, gauge."""
+    """Gauge pressure of the gas on the free surface, Pa."""
 
     def body_force(self, places: FloatArray) -> FloatArray:
         """Force per volume, rho (omega^2 r e_r + g).
 
-        Args: `places`: m, shape (dimension, ...).
+        Args: `places`: coordinates, m, shape (dimension, ...).
         Source: Eq. 9 of the liquid-ring paper, with gravity added.
         """
         force = np.array(places, dtype=np.float64) * self.angular_velocity**2
@@ -248,7 +248,7 @@ class RotatingLiquid:
         return self.density * force
 
     def problem(self) -> PressureProblem:
-        """Its right-hand sides: the body force and the gas pressure."""
+        """Right-hand sides of the pressure problem: the body force and the gas pressure."""
         return PressureProblem(
             force=self.body_force,
             surface_pressure=lambda places: np.full(places.shape[1:], self.gas_pressure),
@@ -263,7 +263,7 @@ class PressureSolution:
     basis: Any
     """`skfem.Basis` of the quadratic elements on it, lengths in the mesh's unit."""
     pressure: FloatArray
-    """At the nodes of `chamber`, Pa, gauge, shape (nodes,)."""
+    """Gauge pressure at the nodes of `chamber`, Pa, shape (nodes,)."""
     surface_gradient: FloatArray
     """n . grad p at the nodes of the free surface, Pa/m, n out of the liquid; the shape of
     chamber.grid[0]."""
@@ -291,12 +291,13 @@ class WeakProblem:
 
     @classmethod
     def of(cls, basis: Any, force: Callable[[FloatArray], FloatArray], *, unit: float = 1.0) -> WeakProblem:
-        """Args: `force`: f, Pa/m, at places in m. `unit`: of the mesh's lengths, m."""
+        """Assemble the weak form. Args: `force`: f, Pa/m, at points in m. `unit`: of the mesh's lengths,
+        m."""
         field = DiscreteField(unit * force(unit * np.asarray(basis.global_coordinates())))
         return cls(basis=basis, stiffness=stiffness(basis), load=_work.assemble(basis, force=field))
 
     def solve(self, *, start: FloatArray, fixed: IntArray) -> _LinearSolution:
-        """Solve with the values of `start` kept at some nodes; the solution at all nodes."""
+        """Solve for the values at all nodes, with those of `start` kept at the nodes `fixed`."""
         free = np.setdiff1d(np.arange(start.size), fixed)
         matrix = csr_matrix(self.stiffness[free][:, free])
         right = (self.load - self.stiffness @ start)[free]

@@ -1,8 +1,8 @@
-"""The free surface under gravity, found and not assumed: the isobar below which the liquid just fits.
+"""Free surface under gravity, computed and not assumed: the isobar that encloses the liquid's volume.
 
-The force field has a potential, so the pressure that it makes can be had up to a constant without knowing
-which boundary is free: with the normal force given on all of them.  Where that pressure is not constant along
-the surface, the surface is in the wrong place; its nodes move along their radii until it is, the volume held.
+The force field has a potential, so its pressure follows, up to a constant, from the normal force on all
+boundaries, whichever of them is free. Where that pressure varies along the surface, the surface is misplaced;
+its nodes move along their radii until the pressure is constant, at constant volume.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ _MAX_STEPS = 40
 _STEP_TOLERANCE = 1e-9
 """Largest last move of a node, in mean depths."""
 _ROUNDING = 1e-5
-"""Below this a move that no longer shrinks is rounding, in mean depths: in a film depths are differences."""
+"""Move, in mean depths, below which one that no longer shrinks is rounding: in a film depths are
+differences."""
 _SAFE_SHARE = 0.9
-"""Share of the way to a wall that a node may go in one step."""
+"""Fraction of the distance to a wall that a node may move in one step."""
 _VOLUME_ROUNDING = 1e-15
 _NEAREST = 1e-3
-"""Gap to a wall, in mean depths, at which the search gives up: the surface wants to cross the wall."""
+"""Gap to a wall, in mean depths, at which the search ends: the surface would cross the wall."""
 
 
 _DRY = Status(
@@ -57,8 +58,8 @@ class _FoundSurface:
     basis: Any
     status: Status
     statistics: Statistics
-    """Steps as iterations; of the last one the largest move of a node ("surface_last_move") and what of it is
-    rounding ("surface_rounding"), both in mean depths; "volume_error", relative."""
+    """Number of steps as iterations; the largest move of a node in the last step ("surface_last_move") and
+    the rounding in it ("surface_rounding"), both in mean depths; "volume_error", relative."""
 
 
 def solve_with_gravity(
@@ -174,7 +175,7 @@ def _settled(move: float, before: float) -> bool:
 
 
 def refined_surface(radius: FloatArray) -> FloatArray:
-    """Surface radii carried to a mesh with twice the cells by cubic interpolation, m: only a start."""
+    """Surface radii on a mesh with twice the cells by cubic interpolation, m, as a starting value."""
     for axis, count in enumerate(radius.shape):
         finer = np.linspace(0, count - 1, 2 * count - 1)
         radius = np.asarray(CubicSpline(np.arange(count), radius, axis=axis)(finer))
@@ -195,7 +196,7 @@ def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid)
 def _newton_step(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float) -> FloatArray:
     """Radial move of every surface node, m."""
     unit = chamber.length_scale
-    # With the force given on the whole boundary the pressure is free by a constant: one node holds it.
+    # With the force given on the whole boundary the pressure has a free constant: one node fixes it.
     weak = WeakProblem.of(basis, liquid.body_force, unit=unit)
     pressure = weak.solve(start=np.zeros(basis.N), fixed=np.zeros(1, dtype=np.int64)).values
     surface = side(chamber.mesh, FREE_SURFACE)
@@ -209,7 +210,7 @@ def _newton_step(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, targe
 
 
 def _hold_volume(disc: Disc, chamber: ChamberMesh, basis: Any, target: float) -> tuple[ChamberMesh, Any]:
-    """Take the last rounding out of the volume by equal moves of all nodes."""
+    """Remove the last rounding of the volume by equal moves of all nodes."""
     for _ in range(3):
         surplus = float(basis.dx.sum()) - target
         if abs(surplus) <= _VOLUME_ROUNDING * target:

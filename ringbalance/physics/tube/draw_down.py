@@ -33,8 +33,8 @@ def _draw_down_depth(
 
     - over a point sink, h = 0.6884 (Q^2/g_c)^(1/5): Bernoulli's equation from the surface at rest to its
       axis, h = y + [Q/(2 pi y^2)]^2/(2 g_c), has a solution y only above this h, at y^5 = Q^2/(2 pi^2 g_c);
-    - over the rim as over a weir, h = (3/2) [Q/(pi d sqrt(g_c))]^(2/3), critical depth 2 h/3 along pi d: of a
-      deeper layer more would fall into the port than the tube takes, and it stays drowned.
+    - over the rim as over a weir, h = (3/2) [Q/(pi d sqrt(g_c))]^(2/3), critical depth 2 h/3 along pi d: from
+      a deeper layer more would fall into the port than the tube takes, and the port stays submerged.
 
     Around it the liquid comes as a viscous layer of depth y on the wall,
     Q(s) = 2 pi s (g_c/(3 nu)) y^3 dy/ds. With Q(s) = Q (1 - s^2/R^2), as the whole layer drains, from
@@ -43,18 +43,19 @@ def _draw_down_depth(
     H = (h^4 + (6 nu Q/(pi g_c)) [ln(R/r) - 3/4])^(1/4).
     Args: `flow_rate`: Q, m^3/s, any shape. `acceleration`: g_c towards the port, m/s^2. `bore`: d of the
         round port, m. `kinematic_viscosity`: nu, m^2/s. `feed_radius`: R, of the circle with the wall's
-        area, m; needed with a viscosity. `below`: liquid under the port, c, which makes the layer y + c deep.
+        area, m; needed with a viscosity. `below`: depth c of the liquid under the port, m, which makes the
+        layer y + c deep.
     Raises: ValueError: an acceleration that is not positive and finite.
-    Range: a port in the middle of its wall; a laminar layer, thin against R. Of a turbulent one, which water
-        can form, friction is larger and its share of the depth still below a hundredth. The sink is inviscid
-        and without swirl about the port's axis. A bathtub vortex draws gas from deeper; the rotation of a
-        disc makes none, because its axis lies in the surface.
+    Range: a port in the middle of its wall; a laminar layer, thin against R. A turbulent layer, possible with
+        water, has more friction, which is still below a hundredth of the depth. The sink is inviscid and
+        without swirl about the port's axis. A bathtub vortex draws gas from deeper; the rotation of a disc
+        makes none, because its axis lies in the surface.
     Source: derived; the sink's power and factor are those of Lubin and Springer, "The formation of a dip on
         the surface of a liquid draining from a tank", J. Fluid Mech. 29 (1967) 385, who found it in
-        experiments; the rim is the broad-crested weir, bent into a circle: that the level over an outlet
-        which lets gas in follows from the flow alone, and that such a model bounds the level over one that
-        runs full, says the abstract of Proc. IMechE 198 (1984), doi:10.1243/PIME_PROC_1984_198_016_02; the
-        layer is lubrication theory.
+        experiments; the rim is the broad-crested weir, bent into a circle: the abstract of Proc. IMechE 198
+        (1984), doi:10.1243/PIME_PROC_1984_198_016_02, states that the level over an outlet which lets gas in
+        follows from the flow alone, and that such a model bounds the level over one that runs full; the layer
+        is lubrication theory.
     """
     if not np.all((np.asarray(acceleration) > 0) & np.isfinite(acceleration)):
         raise ValueError("acceleration must be positive and finite: a disc at rest holds no liquid")

@@ -18,7 +18,7 @@ STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
 """Critical Re without rotation: the recalled formula at its lower end, R_Om = 28, about 2303."""
 _TURBULENT_JOIN: Final = 500.0
 _CURVED_RATIOS: Final = (1.0, 0.25)
-"""T of the curved tube that is like the turning one, over Kt: by equal forces, and by equal gradients."""
+"""T of the equivalent curved tube over Kt of the rotating tube: by equal forces, and by equal gradients."""
 
 
 def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> FloatArray:
@@ -39,7 +39,7 @@ def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.
 def turbulent_ratio_uncertainty(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> FloatArray:
     """Expanded uncertainty (95 %) of `turbulent_friction_ratio`, zero without rotation.
 
-    The formula is recalled and unverified, so it reaches the farthest of what else could be: no effect at
+    The formula is recalled and unverified, so the half-width reaches the farthest alternative: no effect at
     all, and `_curved_friction_ratio` of the bend whose centrifugal force equals the Coriolis force,
     a/R_c = S, or S/2.
     """
@@ -95,7 +95,7 @@ def friction_factor(
         `critical_ratio`: c, critical Re over the straight tube's, broadcasts.
     Returns: f, of the broadcast shape; with all factors one it is Churchill's formula.
     Range: the formula states none. Tests hold it against data of smooth tubes for Re from 11 to 1e6, and of
-        sand-roughened ones up to eps/d = 0.033; `friction_uncertainty` says how far it may be off.
+        sand-roughened ones up to eps/d = 0.033; its expanded uncertainty is `friction_uncertainty`.
     Source: Churchill, Chem. Eng. 84 (1977) 91; the three factors are ours.
     """
     re = np.asarray(reynolds, dtype=np.float64)
@@ -151,8 +151,8 @@ def friction_uncertainty(
     # The turbulent branch without its onset term; below Re = 1000 its logarithm changes sign.
     onset = _log_power(clipped(re, 1000.0, 1e12), relative_roughness)
     turbulent = 8 * np.asarray(turbulent_ratio) * onset**-0.125
-    # Where rotation has raised the laminar branch above the turbulent one there is no jump to be early or
-    # late for: what was measured in rotating ducts lies at the laminar branch or above it.
+    # Where rotation has raised the laminar branch above the turbulent one the transition has no jump: values
+    # measured in rotating ducts lie at the laminar branch or above it.
     branch_gap = np.maximum(turbulent - 64 * np.asarray(laminar_ratio, dtype=np.float64) / re, 0.0)
     parts = (
         (0.01 + 0.035 * turned) * f,

@@ -1,13 +1,13 @@
-"""Losses at places of the tube: its ends and its bends, by finite elements where flow is laminar.
+"""Local losses of the tube, at its ends and its bends, by finite elements where flow is laminar.
 
-**Ends** cost what stands here beyond the kinetic energy that the "+1" in k + 1 already counts.
+**Ends**: their losses are those beyond the kinetic energy that the "+1" in k + 1 already counts.
 
 **Bends**, smooth ones: by correlation where flow is turbulent. What a laminar bend costs beyond the friction
 of its own arc was computed for r = 2 d and 90 degrees at rest: 0.18, 0.55, 0.94 and 1.14 at Re 20, 50, 100
 and 200 (`verification.reference.bent_tube`). K_0 De^2/(De^2 + De_0^2) with the Dean number De = Re
 sqrt(d/2r) meets them within 0.05; other shapes are scaled by it and carry a wide half-width. In a tube that
-turns, curvature acts as rotation, R' = R +- s with s = (4/3) Re d/2r (`verification.reference.bent_tube`): a
-bend then costs more or less by its sense of turning, which a scene does not give.
+turns, curvature acts as rotation, R' = R +- s with s = (4/3) Re d/2r (`verification.reference.bent_tube`):
+the loss of a bend then depends on its sense of turning, which a scene does not give.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _DOMAIN_ERROR = 1e-3
 _BEYOND_TABLE = 0.3
 """Expanded uncertainty (95 %) of K added above the table, where steady laminar flow is not to be expected."""
 _FULL_REYNOLDS: Final = 2500.0
-"""Re at which it is whole, rising from the end of the table on: errors of k, a share of it, do not step."""
+"""Re at which that addition is complete, rising from the end of the table on: errors of k do not step."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +65,7 @@ class _EndTable:
 
 @lru_cache(maxsize=2)
 def _end_table(end: str) -> _EndTable:
-    """The table of the "entrance" or the "exit", as it comes with the package."""
+    """Packaged table of the "entrance" or the "exit"."""
     rows = [r for r in packaged_rows("ringbalance.physics", "data", "end_losses.csv") if r["end"] == end]
     power = 1 if end == "entrance" else 0
     nodes = [row for row in rows if row["kind"] == "node"]
@@ -85,7 +85,7 @@ def _end_table(end: str) -> _EndTable:
 
 
 def _end_value(end: str, reynolds: npt.ArrayLike) -> FloatArray:
-    """K alone, at half the cost of `_end_loss`."""
+    """Value of `_end_loss` without its uncertainty, at half the cost."""
     re = np.asarray(reynolds, dtype=np.float64)
     if not (np.all(re > 0.0) and np.all(np.isfinite(re))):
         raise ValueError("reynolds must be finite and above zero")
@@ -125,7 +125,7 @@ def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
 def _laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
     """Loss of a sharp-edged entrance from a large reservoir, laminar.
 
-    K_ent = 2 (p_reservoir - p_tube)/(rho U^2) with the developed line of p carried back to the entrance; it
+    K_ent = 2 (p_reservoir - p_tube)/(rho U^2) with the developed line of p extrapolated to the entrance; it
     contains the developed stream's kinetic factor 2.  Creeping: 0.986 * 6 pi/Re.
     Returns: Estimate of K_ent, the same shape; OUT_OF_RANGE above Re = 2000.
     Raises: ValueError: a Reynolds number that is not finite and above zero.
@@ -138,7 +138,7 @@ def _laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
 def _laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
     """Loss of a sharp-edged exit into a large reservoir, laminar and developed; otherwise as the entrance.
 
-    K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p carried on to the mouth; about
+    K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p extrapolated to the mouth; about
     zero at high Re, where the stream leaves with the pressure of the reservoir.
     """
     return _end_loss("exit", reynolds)
@@ -218,7 +218,7 @@ def exit_loss(
 ) -> FloatArray:
     """Addition of a laminar exit to the "+1": alpha - 1 + K_exit, as the stream carries alpha u^2/2 away.
 
-    Turbulent it is zero, because there the "+1" is the whole exit loss.
+    In turbulent flow it is zero, because there the "+1" is the whole exit loss.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
         laminar flow, broadcasts.
     Source: alpha of `kinetic_factor`; K_exit from `_laminar_exit_loss`, which is for the profile
@@ -250,9 +250,9 @@ _BEND_UNCERTAINTY: Final = 0.25
 _LAMINAR_BEND_UNCERTAINTY: Final = 0.6
 """Expanded uncertainty (95 %) of a laminar bend's loss at rest, relative: one shape was computed."""
 _LARGEST_EXCESS: Final = 1.25
-"""K_0, for 90 degrees and r = 2 d."""
+"""Largest laminar excess K_0 of a bend, for 90 degrees and r = 2 d."""
 _HALF_WAY_DEAN: Final = 28.0
-"""De_0."""
+"""Dean number De_0 at which half of K_0 is reached."""
 MOMENTUM_FACTOR: Final = 4 / 3
 """Mean of u^2 over U^2 in Poiseuille flow."""
 
@@ -266,7 +266,7 @@ def bend_loss(
     rotation_reynolds: npt.ArrayLike = 0.0,
     critical_ratio: npt.ArrayLike = 1.0,
 ) -> FloatArray:
-    """Loss coefficient of one bend, with the friction of its own arc in it.
+    """Loss coefficient of one bend, including the friction of its arc.
 
     K = f phi r/d + (1 - w) K_lam + w (K_tur - f phi r/d), w from laminar to turbulent;
     K_lam = K_0 (phi/90 deg) 2 sqrt(d/2r) De^2/(De^2 + De_0^2) s^2/(s^2 + R^2).
@@ -318,7 +318,7 @@ def _broadcast(
 
 
 def _laminar_excess(bend: Bend, bore: float, re: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Addition of a laminar bend at rest to the friction of its arc, and s, its curvature as a rotation."""
+    """Excess loss of a laminar bend at rest over its arc's friction, and s, its curvature as a rotation."""
     tight = bore / (2 * bend.radius)
     dean, shift = re * np.sqrt(tight), MOMENTUM_FACTOR * re * tight
     shape = bend.angle / (math.pi / 2) * np.sqrt(tight) / 0.5
@@ -326,10 +326,10 @@ def _laminar_excess(bend: Bend, bore: float, re: FloatArray) -> tuple[FloatArray
 
 
 def _turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLike) -> FloatArray:
-    """Loss coefficient of one bend in turbulent flow, with the friction of its own arc in it.
+    """Loss coefficient of one bend in turbulent flow, including the friction of its arc.
 
     K = f phi r/d + (0.10 + 2.4 f) sin(phi/2) + 6.6 f (sqrt(sin(phi/2)) + sin(phi/2)) (d/r)^(4 phi/pi)
-    Beyond 180 degrees, where the sine would fall again, what stands beside the friction of the arc is that of
+    Beyond 180 degrees, where the sine would fall again, the part beyond the friction of the arc is that of
     180 degrees times phi/180 deg.
     Args: `bend`: angle phi and centre-line radius r. `friction_factor`: f (Darcy) of the straight tube at the
         same Re, any shape.

@@ -1,7 +1,7 @@
 """Loss coefficient k(u) of the connecting tube, k = 2 (H_A - H_C)/u^2 - 1, and its uncertainty.
 
-That is each correlation's spread and each uncertain input's effect; and where correlations are used outside
-what their sources state.
+The uncertainty combines the spread of each correlation and the effect of each uncertain input; notes report
+where correlations are used outside the range of their sources.
 """
 
 from __future__ import annotations
@@ -60,8 +60,7 @@ BUILT_CAUSES: Final[Mapping[str, tuple[str, float]]] = {
 Correlations are for straight round tubes and clean edges.  A tube that follows the circle of the crest has a
 secondary flow of its own, not small against that of rotation; a bore out of round changes f by some percent;
 an edge broken by 2 % of the bore takes a fifth off K; handbooks give K of one bend with a spread of half of
-it. For parameters that are fitted to a tube that was built; the uncertainty of k for a design has none of
-them.
+it. They apply to parameters fitted to a built tube; the uncertainty of k for a design has none of them.
 """
 TUBE_INPUTS: Final = (
     "bore",
@@ -80,13 +79,13 @@ _EKMAN: Final = 47.21
 _LARGEST_ERROR_SHARE: Final = 0.5
 """Largest error of a constant k, over k."""
 _LEAST_SHARE: Final = 0.1
-"""Least fraction of another k that the errors of its models leave."""
+"""Least fraction of a k by correlations that the errors of its models leave."""
 DEVELOPMENT_SHARE: Final = 1.0
-"""Half-width of what development adds, over rotation's extra friction on one developing length.
+"""Half-width of the loss by developing flow, over rotation's extra friction on one developing length.
 
 One stands for an inlet that the secondary flow reaches only after that length.  Three-dimensional solutions
 of the inlet, a parabola or a blunt profile, at (Re, R) = (100, 100), (200, 50) and (20, 200), gave from -0.70
-to +0.20, beyond what the same inlet costs at rest: a blunt one loses less where rotation keeps flow blunt.
+to +0.20, beyond the loss of the same inlet at rest: a blunt one loses less where rotation keeps flow blunt.
 """
 
 
@@ -170,14 +169,14 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
 
 
 def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
-    """The state with the errors that `Tube.model_errors` supposes of its models.
+    """State of the tube with the errors of its models that `Tube.model_errors` assumes.
 
     e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
     measured smooth tubes have.
-    Errors of a constant k count for half of it at most, and of another they leave a tenth: no error makes a
-    loss a gain.
+    Errors of a constant k are limited to half of it, and errors of another k leave at least a tenth: no error
+    turns a loss into a gain.
     """
     if not tube.model_errors:
         return state
@@ -225,13 +224,13 @@ def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:
 def developing_length(
     *, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike, friction_ratio: npt.ArrayLike
 ) -> FloatArray:
-    """Way on which the slowest disturbance of laminar rotating flow falls by e, in diameters, as a bound.
+    """Bound of the length on which the slowest disturbance of laminar rotating flow falls by e, in diameters.
 
     l/d = 0.2 + Re/(57 F) + sqrt(R)/47.21
 
-    The three are the creeping end effect; the carrying of vorticity, 0.0175 Re without rotation; and the
-    exact limit of fast rotation without inertia, geostrophic flow over the section's depth that friction in
-    its Ekman layers wears down.
+    The three terms are the creeping end effect; the convection of vorticity, 0.0175 Re without rotation; and
+    the exact limit of fast rotation without inertia, geostrophic flow over the section's depth that friction
+    in its Ekman layers damps.
     Args: `friction_ratio`: F of developed laminar flow there, broadcasts.
     Returns: l/d, of the broadcast shape: at least the length of the section's eigenproblem, at most 3 times
         it.
@@ -268,7 +267,7 @@ LARGEST_REYNOLDS: Final = 1e6
 LARGEST_ROUGHNESS: Final = 0.05
 """eps/d up to which the friction formula is compared with data, rounded up from 0.033."""
 VELOCITIES: Final = (0.1, 20.0)
-"""m/s: range for which k is calibrated."""
+"""Range of velocities for which k is calibrated, m/s."""
 
 
 class FlowState(StrEnum):
@@ -286,9 +285,9 @@ class TubeLoss:
     velocity: FloatArray
     """u, m/s, positive."""
     reynolds: FloatArray
-    """Re."""
+    """Reynolds number Re."""
     rotation_reynolds: float
-    """R_Om."""
+    """Rotation Reynolds number R_Om."""
     k: Estimate
     """k with its expanded uncertainty (95 %), all parts combined as the root of the sum of their squares."""
     terms: Mapping[str, FloatArray]
@@ -300,7 +299,7 @@ class TubeLoss:
     in_range: BoolArray
     """False wherever a correlation is used outside the range that its source states."""
     range_notes: Mapping[str, BoolArray]
-    """Why not: a sentence, and where it holds."""
+    """Reason as a sentence, and the velocities at which it applies."""
     state: TubeState
     """State of the tube at these velocities."""
 
@@ -357,7 +356,7 @@ def flow_states(state: TubeState) -> npt.NDArray[np.str_]:
 
 
 def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[str, BoolArray]:
-    """For each sentence that holds anywhere on why a correlation is stretched, where it holds."""
+    """Reasons why a correlation is used outside its range, each with the velocities at which it applies."""
     re, rotation = state.reynolds, state.rotation_reynolds
     laminar = re < state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
     unsteady = ~laminar & (re < state.critical_ratio * FULLY_TURBULENT_REYNOLDS)

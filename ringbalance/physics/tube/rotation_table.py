@@ -1,8 +1,8 @@
 """Laminar friction ratio of the rotating tube from the table of finite-element solutions.
 
-Inside the table: bicubic splines, in coordinates in which F is smooth, of what ln F differs by from a closed
-formula that has F's exact slow limit; two rectangles joined smoothly between S = 2.5 and 4.5.  Outside:
-carried on from the table's edge with a wide uncertainty, and said so.
+Inside the table: bicubic splines of the difference of ln F from a closed formula with F's exact slow limit,
+in coordinates in which F is smooth; two rectangles joined smoothly between S = 2.5 and 4.5. Outside:
+extrapolated from the table's edge, with a wide uncertainty and the status OUT_OF_RANGE.
 
 The rectangles overlap, because no single pair of coordinates is regular in both limits; with Kl = R Re,
 S = R/Re and R = omega d^2/nu:
@@ -35,22 +35,22 @@ _JOIN = (2.5, 4.5)
 _OUTSIDE_UNCERTAINTY = 0.3
 """Relative expanded uncertainty (95 %) far outside the table: no source holds there."""
 _STEADY_KL, _UNSTEADY = 3e6, 0.244
-"""Kl up to which flow was found steady, and what is added for flow that is not, relative, per decade above.
+"""Kl up to which flow is steady, and uncertainty added for unsteady flow, relative, per decade above.
 
 Flow that fluctuates needs more pressure than the steady solution of the table.  Measured in square ducts at
 Kl = 1.8e7, S = 0.5: 19 % more (Pallares, Grau and Davidson), which sets the slope; computed in time in the
-tube at Kl = 1.05e7, S = 0.52: 2 % more on 9 by 14 cells, 6 % on 7 by 11.  Solved steady beyond the table, F
-as carried on is within 0.8 % up to Kl = 2.1e7.
+tube at Kl = 1.05e7, S = 0.52: 2 % more on 9 by 14 cells, 6 % on 7 by 11.  Steady solutions beyond the table
+are within 0.8 % of the extrapolated F up to Kl = 2.1e7.
 """
 
 
 def slow_first(kl: npt.ArrayLike) -> FloatArray:
-    """a = ln(1 + Kl/300)."""
+    """First coordinate of the slow rectangle, a = ln(1 + Kl/300)."""
     return np.log1p(np.asarray(kl, dtype=np.float64) / KL_SCALE)
 
 
 def fast_first(rotation_reynolds: npt.ArrayLike) -> FloatArray:
-    """a = ln(1 + R/20)."""
+    """First coordinate of the fast rectangle, a = ln(1 + R/20)."""
     return np.log1p(np.asarray(rotation_reynolds, dtype=np.float64) / ROTATION_SCALE)
 
 
@@ -76,14 +76,14 @@ class Rectangle:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _FrictionTable:
-    """The table with its interpolants."""
+    """Table of laminar friction ratios with its interpolants."""
 
     slow: Rectangle
     fast: Rectangle
     interpolation_error: float
-    """Largest relative gap to the points solved between nodes for Kl up to 1e6; R up to 1e4 at least."""
+    """Largest relative gap to points solved between nodes, for Kl up to 1e6 (slow) and R up to 1e4 (fast)."""
     edge_interpolation_error: float
-    """Largest relative gap to the points solved towards the edge of the table."""
+    """Largest relative gap to points solved between nodes beyond those, towards the edge of the table."""
     rows: tuple[Mapping[str, str], ...]
     """Rows of the file."""
 
@@ -214,7 +214,7 @@ def _checked(reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> tuple
 
 
 def laminar_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> FloatArray:
-    """The value of `rotating_friction_ratio` alone, at half its cost."""
+    """Value of `rotating_friction_ratio` without its uncertainty, at half the cost."""
     re, rotation = _checked(reynolds, rotation_reynolds)
     return _ratio(_table_point(re, rotation), rotation)
 
@@ -223,7 +223,7 @@ def _ratio(at: _TablePoint, rotation: FloatArray) -> FloatArray:
     table = _friction_table()
     slow = np.exp(_logarithm(table.slow, *at.slow, where=at.weight < 1))
     fast = np.exp(_logarithm(table.fast, *at.fast, where=at.weight > 0))
-    # Beyond the edge with the growth that Ito and Nanbu, and fast rotation, have.
+    # Growth beyond the edge: by Ito and Nanbu, and by the limit of fast rotation.
     growth = _ito_nanbu_laminar(kl=np.maximum(at.kl, KL_LIMIT)) / _ito_nanbu_laminar(kl=KL_LIMIT)
     more = 0.07863 * (np.sqrt(np.maximum(rotation, ROTATION_LIMIT)) - np.sqrt(ROTATION_LIMIT))
     return np.asarray((1 - at.weight) * (slow * growth) + at.weight * (fast + more))

@@ -37,23 +37,23 @@ class TubeState:
     """Numbers and terms of the tube's loss; arrays of one shape."""
 
     reynolds: FloatArray
-    """Re."""
+    """Reynolds number Re."""
     rotation_reynolds: FloatArray
-    """R_Om."""
+    """Rotation Reynolds number R_Om."""
     critical_ratio: FloatArray
     """Critical Re over the straight tube's."""
     rotating_friction: FloatArray
-    """f with rotation."""
+    """Darcy friction factor f with rotation."""
     bends: tuple[FloatArray, ...]
-    """K of each bend, in order along the path."""
+    """Loss coefficient K of each bend, in order along the path."""
     kinetic_factor: FloatArray
-    """alpha."""
+    """Kinetic-energy factor alpha."""
     terms: Mapping[str, FloatArray]
     """Summands of k."""
 
     @property
     def k(self) -> FloatArray:
-        """Sum of the terms."""
+        """Loss coefficient k, the sum of the terms."""
         return np.asarray(sum(self.terms.values()), dtype=np.float64)
 
     @property
@@ -66,8 +66,8 @@ class TubeState:
         """The part of k between the driven chamber and a place on the crest, a fraction of the path.
 
         Entrance, that share of what is spread along the path, and the bends of the first leg.  A bend belongs
-        to a leg, wherever the crest is, so that nothing jumps when the crest moves.  Both legs have equal
-        numbers; the crest halves the middle one of an odd number.
+        to a leg, wherever the crest is, so that the loss is continuous as the crest moves.  Both legs have
+        equally many; the crest halves the middle one of an odd number.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
         spread = share * self.spread_loss

@@ -136,7 +136,7 @@ AxisLabel = tuple[str, str]
 
 
 def line(index: int, *, size: float | None = None) -> dict[str, Any]:
-    """Properties of one of several curves: a colour and dashes of its own, or markers of a size."""
+    """Properties of one of several curves: its own colour, with its own dashes or with markers of `size`."""
     index %= len(_LINE_COLOURS)
     if size is None:
         return {"color": _LINE_COLOURS[index], "linestyle": _DASHES[index]}
@@ -292,7 +292,7 @@ def amplitudes(curves: Sequence[tuple[ArrayLike, ArrayLike, dict[str, Any]]], li
 
 
 def _to_page(text: str, name: str) -> str:
-    """Bare svg element: variables for colours and font, ids of its own, no fixed size."""
+    """Bare svg element with variables for colours and font, unique ids and no fixed size."""
     body = text[text.index("<svg") :]
     # The page's style sheet has this rule once.
     body = re.sub(r"<(metadata|style).*?</\1>\s*", "", body, flags=re.DOTALL)
@@ -326,7 +326,7 @@ def draw(
     wide: bool = False,
     height: float = 2.7,
 ) -> Drawing:
-    """Draw one figure: its paints one after the other, its axes in the units that suit, and above it the
+    """Draw one figure: its paints in their order, its axes in suitable units, and above it the
     legend of what is labelled.
 
     Args: `name`: stem of the file. `columns`: of the legend; 0: no legend. `height`: inches of 72 units.
@@ -353,7 +353,7 @@ def draw(
 
 
 def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], label: AxisLabel) -> None:
-    """Label an axis, with its ticks in the unit that suits its ends."""
+    """Label an axis, with ticks in the unit that suits its ends."""
     name, unit = label
     display = display_unit(unit, *limits)
     axis.set_label_text(f"{name} in {display.symbol}" if name and display.symbol else name or display.symbol)

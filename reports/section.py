@@ -72,7 +72,7 @@ class Section:
     show: Callable[[Record, Record], Record | None] = _everything
     """Function of the section's and the whole evidence: texts and drawings for the template, or None."""
     always: bool = False
-    """True if it is shown without evidence of its own, which is then empty."""
+    """True if the section is shown even without evidence, then with an empty record."""
     template: str = ""
     """File in `templates`; empty: the one of the section's name."""
 

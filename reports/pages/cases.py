@@ -114,7 +114,7 @@ def _form(quantity: JudgedQuantity) -> Record:
 
 
 def _error(quantity: JudgedQuantity) -> str:
-    """Error to the second digit of its half-width, or to two digits of its own where those are fewer."""
+    """Error to the second digit of its half-width, or to two significant digits where those are fewer."""
     error, width = quantity.get("error"), quantity.get("uncertainty")
     fine = error and width and (width < _FINE_RATIO * abs(error) or _range(quantity))
     return printed(error, None if fine else width, digits=2, unit=quantity.get("unit") or "1")

@@ -165,10 +165,10 @@ def _view(waves: Record, _evidence: Record) -> Record:
 
 
 def _to_avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, imported: bool) -> list[Record]:
-    """Ranges of the fill in which a mode that gravity drives may be resonant, its frequency being uncertain.
+    """Ranges of the fill in which a gravity-driven mode may be resonant, with its uncertain frequency.
 
-    Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
-    Args: `ratios`: frequencies over the speed, a row a mode. `met`: modes resonant at some fill by theory.
+    Gravity hardly excites even modes of a sector, since it acts in one direction on the whole chamber.
+    Args: `ratios`: frequencies over the speed, a row per mode. `met`: modes resonant at some fill by theory.
     """
     low, high = _RESONANT_RATIOS
     within = [

@@ -202,7 +202,7 @@ def _column_code(margin: float | None, width: float | None) -> str:
 
 
 def _crest(record: Record, _evidence: Record) -> Record | None:
-    """Gauge pressure along the path, one line a regime, dotted where the tube is not full."""
+    """Gauge pressure along the path, one line per regime, dotted where the tube is not full."""
     states = record["states"]
     if not states:
         return None

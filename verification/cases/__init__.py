@@ -1,4 +1,4 @@
-"""Claims and their criteria, one folder a case; their computation, in modules of related cases.
+"""Claims and their criteria, one folder per case, and their computation, in modules of related cases.
 
 A folder has no `__init__.py` and is entered in no list: it is found by its case.toml, and is package data.
 Modules are loaded when a case is run: listing the cases loads none of them.

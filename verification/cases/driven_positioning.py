@@ -51,7 +51,7 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     """
     efforts = _efforts(scene, step=_STEP_S[level])
     grown = {name: growth(each) for name, each in efforts.items()}
-    # The first mass ratio at the third weight, near the paper's own choice.
+    # The first mass ratio at the third weight ratio, which is close to the paper's choice.
     shown = {name: each[0, 2] for name, each in efforts.items()}
     over_speed = figure(
         "effort of one move over the speed",
@@ -97,7 +97,7 @@ def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> E
 
 
 def _efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
-    """Effort J(q, r) of one move, N m s, by the way in which friction is compensated: the paper's Fig. 6.
+    """Effort J(q, r) of one move, N m s, by the kind of friction compensation: the paper's Fig. 6.
 
     Returns: Arrays of shape (mass ratios, weight ratios, speed ratios).
     """
@@ -254,5 +254,5 @@ def _nearer(start: FloatArray, goal: FloatArray, *, pace_ratio: float) -> float:
 
 
 def _distance(difference: FloatArray) -> FloatArray:
-    """The shorter way round between two masses, rad."""
+    """Distance between two masses along the shorter arc, rad."""
     return np.asarray(np.abs(np.pi - (np.pi - difference) % (2 * np.pi)), dtype=np.float64)

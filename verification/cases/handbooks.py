@@ -168,7 +168,7 @@ def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     if not all(_bend_holds(tube, bend, _JUDGED_FROM_RE, "Miller") for bend in tube.bends):
         raise NotRunError("a bend lies outside 10 to 180 degrees or 0.5 to 10 bores, where methods hold")
     reynolds = np.geomspace(slowest, VELOCITIES[1], _CURVE_POINTS) * per_velocity
-    # Methods for friction that leave Colebrook's equation in the range they state, and how far at worst.
+    # Friction methods beyond the allowed departure from Colebrook's equation, with their largest departure.
     rough, worst = tube.roughness / tube.bore, dict[str, float]()
     for re in map(float, reynolds[reynolds >= _TURBULENT_FROM_RE]):
         exact = friction_factor(re, rough, Method="Clamond")

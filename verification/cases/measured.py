@@ -1,4 +1,4 @@
-"""Measurements that a case predicts in a way of its own: friction in tubes and ducts, pressure, a rotor."""
+"""Measurements and their predictions by cases: friction in tubes and ducts, pressure, a rotor."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _FULLY_ROUGH: Final = 70.0
 CALIBRATING: Final = (*(f"tube {number} (bore)" for number in range(1, 6)), "cut (bore)")
 """Points of Eisenklam to which the bore of their tube was fitted, not judged."""
 _DEVELOPED: Final = 0.0125
-"""L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""
+"""L/(d Re) from which the expected effect of the undeveloped profile is within the outlet's interval."""
 _CONTRADICTED_PA: Final = 1.5e5
 """Pressure below which the cut tube contradicts the others."""
 _SQUARE: Final = ((0.5, 2000.0, 8e-6, 0.06), (1.0, 1000.0, 1e-5, 0.06), (1.0, 2000.0, 4e-6, 0.04))

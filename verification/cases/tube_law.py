@@ -108,7 +108,7 @@ def bernoulli(scene: Scene, level: Level, defect: str | None = None) -> Evidence
         FigureCurve("calibrated law", "m/s", flow.velocity, uncertainty=flow.uncertainty),
         FigureCurve("Eq. 14 with one k", "m/s", one_k, style="paper"),
     )
-    # Half the exit's share of k + 1 beyond '+1' is its effect on the velocity.
+    # The exit's excess over '+1' changes the velocity by half its fraction of k + 1.
     by_exit = as_found(exit_velocity=abs(exit_loss) / (2 * (k + 1)))
     return Evidence(
         quantities={**bernoulli_ends(scene).quantities, **by_exit},
@@ -221,7 +221,7 @@ def _over_fills(scene: Scene) -> TubeLoss:
 
 
 def _with_bore(scene: Scene, factor: float) -> TubeLoss:
-    """Loss with the bore multiplied; a bend's radius is at least the bore, so a wide tube still bends."""
+    """Loss with the bore times a factor; bend radii are at least the bore, so that wide tubes can bend."""
     tube, bore = scene.tube, factor * scene.tube.bore
     bends = tuple(dataclasses.replace(bend, radius=max(bend.radius, bore)) for bend in tube.bends)
     return _under_gas(dataclasses.replace(scene, tube=dataclasses.replace(tube, bore=bore, bends=bends)))

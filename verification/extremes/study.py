@@ -57,7 +57,7 @@ SIZES: Final[Mapping[Level, Size]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class AxisSweep:
-    """One axis from end to end: even steps, and closer ones where the ending changes."""
+    """One axis from end to end, in even steps, with smaller ones where the ending changes."""
 
     axis: InputAxis
     shares: FloatArray
@@ -94,8 +94,8 @@ class AxisSweep:
     def spans(self) -> list[Record]:
         """Intervals with one ending, from one end of the axis to the other.
 
-        Each with its first and last value in the axis' unit, the endings of its points and loops, and the
-        program's message at the end towards the nearest answer.
+        Each has its first and last value in the unit of the axis, the ending of its points and loops, and the
+        message of its first point, the first interval that of its last point.
         """
         values, spans = self.values, []
         for _, group in groupby(range(len(values)), key=lambda i: _outcome(self.judgements[i])):
@@ -114,7 +114,7 @@ class AxisSweep:
         return spans
 
     def to_dict(self) -> Record:
-        """The axis with all its judgements, and the program's messages past either end of its answers."""
+        """The axis with all its judgements, the ends of its solved range, and messages of unsolved points."""
         axis, values = self.axis, self.values
         answered = [value for value, each in zip(values, self.judgements, strict=True) if each.answered]
         beyond = (each.text for each in self.judgements if not each.answered)

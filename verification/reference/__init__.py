@@ -1,5 +1,5 @@
 """References that only verification uses: exact, manufactured and published solutions, independent solvers.
 
-An independent solution of a physical term goes here as a module of its own. Nothing outside `verification`
+An independent solution of a physical term is a new module here. Nothing outside `verification`
 and `reports` imports from here.
 """

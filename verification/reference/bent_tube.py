@@ -326,7 +326,7 @@ def _energy_flux(tube: _SweptTube, section: FlowSystem, solution: FlowSolution) 
 def bend_shift(
     *, reynolds: float, rotation_reynolds: float, angle: float, radius: float, with_rotation: bool = False
 ) -> float:
-    """Loss coefficient of a bend beyond the rotating friction of its own arc, laminar flow.
+    """Loss coefficient of a bend in laminar flow, without the rotating friction of its arc.
 
     (64/Re) phi (r/d) (F(R') - F(R)) with the rotation R' of the straight tube in which liquid is driven aside
     as strongly: R' = R + (4/3) Re kappa d/2, from 2 omega' U = 2 omega U + mean(u^2) kappa, to first order;

@@ -32,7 +32,7 @@ Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
 MAX_SAMPLES: Final = 10_000
-"""Samples of one run whose trace is kept, at the most."""
+"""Largest number of samples of a run whose trace is kept."""
 
 
 def simulate(

@@ -244,7 +244,7 @@ class Simulation(PresentedResult):
 
     @property
     def shortened(self) -> int:
-        """Injections that end with gas in the port of the driven chamber, which keeps its residual fill."""
+        """Injections ended by gas in the port of the driven chamber, which keeps its residual fill."""
         return int(self.state["shortened"])
 
     @property

@@ -58,7 +58,7 @@ def see_response(m: Query, r: int, half: int, amplitude_square: float, phase_squ
 
     Differences that noise or a coefficient still learnt can make do not count. Any other pair with a command
     above the noise gives liquid.
-    Returns: true if all opened pairs are followed as they move.
+    Returns: true if the liquid of all opened pairs is estimated as it moves.
     """
     x = m[r + SEEN_X]
     y = m[r + SEEN_Y]

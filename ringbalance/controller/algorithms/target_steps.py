@@ -189,7 +189,7 @@ def split(c: Law, w: Query, x: float, y: float, time: float) -> None:
 
 @both_ways
 def set_wanted(c: Law, w: Query, amplitude: float) -> None:
-    """Open time of the vector, s, by a PID on the amplitude; its integral is held while that is limited."""
+    """Open time of the vector, s, by a PID on the amplitude; a limited time holds the integral."""
     w[WANTED] = c[GAIN] * amplitude
     if w[HAS_BEFORE] == 0.0 or not w[SINCE] > 0.0:
         return

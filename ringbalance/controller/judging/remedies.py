@@ -32,7 +32,7 @@ Progress = Callable[[str], None]
 _FIRST_DEVICES: Final = 16
 """Devices after which a remedy that serves far too few is given up."""
 _GIVE_UP_SHARE: Final = 0.5
-"""Share of the required fraction below which a remedy is given up."""
+"""Ratio to the required fraction below which a remedy is given up."""
 _MAX_DEVICES: Final = 256
 _HALFWAY_DIGITS: Final = 2
 """Significant digits of a value between two alternatives."""

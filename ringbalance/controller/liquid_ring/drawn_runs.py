@@ -44,7 +44,7 @@ RELATIVE_ERROR: Final = 1e-4
 """Error allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's,
 and within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
-"""Samples of one run without a trace, at the most."""
+"""Largest number of samples of a run without a trace."""
 _GROUPS: Final = (0, 4, 16, 32, 64)
 """Bounds, within each 64 consecutive numbers, of the groups of devices that are made together: a device has
 the same bits whichever others are requested, and a design that fails on four devices needs no more.
@@ -52,9 +52,9 @@ the same bits whichever others are requested, and a design that fails on four de
 _CACHED_GROUPS: Final = 32
 """Size of each cache: groups of devices, and groups under a gas pressure."""
 _OUT_OF_REACH: Final = 2.0
-"""Vibration that remains with chambers emptied to their residual fills, over the limit, above which runs need
-not be carried out: none settles, and each would take its whole time limit.  Beyond the fill where the gas
-stalls a long injection still moves some liquid."""
+"""Ratio of the vibration that remains with chambers emptied to their residual fills to the limit, above which
+a run need not be carried out: it does not settle, and would take its whole time limit.  Beyond the fill where
+the gas stalls a long injection still moves some liquid."""
 
 
 _ENDS: Final = (
@@ -91,7 +91,7 @@ class DrawnRuns:
 
     @cached_property
     def terms(self) -> tuple[str, ...]:
-        """Names of the terms that runs model, of all devices alike."""
+        """Names of the terms that the runs of all devices model."""
         return run_terms(scene=self.scene, model=self.model)
 
     def outcomes(
@@ -170,7 +170,7 @@ class DrawnRuns:
 
     @cached_property
     def _groups(self) -> Callable[[range, bool, float], _Group]:
-        """Function of numbers, true for drawn devices, and gas pressure that gives a group; cached."""
+        """Cached function (numbers, true if drawn, gas pressure in Pa) that gives a group of devices."""
 
         def group(block: range, varied: bool, pressure: float) -> _Group:
             exact = RingDevice(
@@ -186,7 +186,7 @@ class DrawnRuns:
 
     @cached_property
     def _under(self) -> Callable[[range, bool, float], _Under]:
-        """Function of numbers, true for drawn devices, and settings' gas pressure that gives an `_Under`."""
+        """Cached function (numbers, true if drawn, settings' gas pressure in Pa) that gives an `_Under`."""
 
         def under(block: range, varied: bool, pressure: float) -> _Under:
             stated = self.scene.gas.pressure
@@ -311,7 +311,7 @@ class _Under:
     beyond_disc: FloatArray
     """Vibration that remains if the gas can empty each chamber to its residual fill, m."""
     usable_moment: FloatArray
-    """Usable moment towards its own unbalance, kg m."""
+    """Usable moment in the direction of the device's own unbalance, kg m."""
     unbalance: FloatArray
     """Unbalance of the rotor, kg m."""
     work: FloatArray

@@ -95,7 +95,7 @@ def _kept_code() -> MachineCheck:
 
 
 def _processes() -> MachineCheck:
-    """Check that processes can share work, which takes semaphores; some containers lack them."""
+    """Check that processes can share work; this requires semaphores, which some containers lack."""
     count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     try:
         get_context("spawn").Semaphore()

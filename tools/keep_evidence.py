@@ -2,7 +2,7 @@
 
     python tools/keep_evidence.py out/evidence.json [heavy.json ...]
 
-Takes the evidence of heavy reports, and what `ringbalance verify CASE --level heavy --json` prints.  Only
+Input: evidence of heavy reports, and output of `ringbalance verify CASE --level heavy --json`.  Only
 heavy cases are stored, each with its date and the hash of its scene, and replace earlier results; a light
 report takes those with its own scene.
 """

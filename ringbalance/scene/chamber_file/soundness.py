@@ -55,7 +55,7 @@ class Facets:
     outer: IntArray
     """Sides that belong to one cell only."""
     shared: BoolArray
-    """True for keys, in rising order, that more than two cells share."""
+    """True for each side whose corners more than two cells share."""
 
     @classmethod
     def of(cls, body: Body) -> Facets:

@@ -29,7 +29,7 @@ _NEARLY_ALL: Final = 0.99
 
 @dataclass(frozen=True, kw_only=True)
 class _Subject:
-    """A quantity or a part of the model, with its standing beyond all cases."""
+    """A quantity or a part of the model, with its assumptions and calibration, which no case gives."""
 
     title: str
     assumed: str

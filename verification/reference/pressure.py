@@ -207,7 +207,7 @@ def _listed(cells: Sequence[Sequence[int]]) -> str:
 def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft) -> RotatingLiquid:
     """Liquid that turns slowly enough for gravity to tilt its surface far, yet with a closed ring.
 
-    Gravity has two components across a horizontal shaft, at no angle of symmetry, three along a vertical one.
+    Gravity has two components across a horizontal shaft, in a direction without symmetry, else three.
     """
     inner, outer = disc.inner_radius, disc.outer_radius
     middle = float(surface_radius(disc=disc, fill_ratio=fill_ratio))

@@ -172,9 +172,9 @@ class CaseResult(Result):
     def numbers(self) -> Mapping[str, float]:
         """All numbers that placeholders of the case's text may name.
 
-        For each quantity q: q, q_low and q_high (its range over the assumed inputs), q_corrected, q_reference,
-        q_reference_uncertainty (95 %), q_error, q_relative (error over reference), q_uncertainty (95 % half-width
-        of the deviation), q_limit; and the numbers of the evidence.
+        For each quantity q: q, q_low and q_high (its range over the assumed inputs), q_corrected,
+        q_reference, q_reference_uncertainty (95 %), q_error, q_relative (error over reference),
+        q_uncertainty (95 % half-width of the deviation), q_limit; and the numbers of the evidence.
         """
         numbers: dict[str, float] = {}
         for result in self.quantities:

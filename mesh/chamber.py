@@ -42,7 +42,7 @@ _ORDER = MappingProxyType({2: (1, 0), 3: (0, 1, 2)})
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChamberMesh:
-    """A structured mesh of the liquid in one chamber, quadratic in pressure and geometry."""
+    """Structured mesh of the liquid in one chamber, quadratic in pressure and geometry."""
 
     mesh: Any
     """`skfem.MeshQuad2` or `MeshHex2` in units of `length_scale`, its boundaries named as in `SIDES`."""
@@ -84,7 +84,7 @@ def default_cells(*, disc: Disc, dimension: int = 2) -> tuple[int, ...]:
 
     Args: `disc`: the disc; only its central angle counts. `dimension`: 2 or 3.
     Returns: Cells along the radius, the angle and, in three dimensions, the axis; all divisible by four.
-    Source: an arc of angle h drawn by one quadratic cell leaves its circle by R (h/2)^4 / 32.
+    Source: one quadratic cell over an arc of angle h deviates from its circle by R (h/2)^4 / 32.
     """
     angular = 4 * max(2, int(np.ceil(disc.central_angle / (np.pi / 12) - 1e-9)))
     return (8, angular, 4)[:dimension]

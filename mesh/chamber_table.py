@@ -55,7 +55,7 @@ class ChamberTable:
 
     geometry: ChamberGeometry
     nodes: FloatArray
-    """L, m^2, rising from the innermost to the outermost place of the chamber."""
+    """L, m^2, rising from the innermost to the outermost point of the chamber."""
     columns: FloatArray
     """V, m^3, its moments along x and y, m^4, and the mean of max(r^2 - L, 0) over the outer wall, m^2; then
     their derivatives by L."""
@@ -143,7 +143,7 @@ def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:
 
 @lru_cache(maxsize=32)
 def chamber_table(geometry: ChamberGeometry) -> ChamberTable:
-    """Table of a chamber, computed on first use; that of a stretched one is transformed from its mesh's."""
+    """Table of a chamber, computed on first use; that of a stretched mesh follows from its base's table."""
     if geometry.stretch is not None:
         return _stretched(geometry, geometry.stretch)
     patches, outer = split_patches(*wall_patches(geometry), longest=LONGEST_SIDE_RATIO)

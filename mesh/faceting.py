@@ -26,7 +26,7 @@ SMOOTH: Final = np.pi / 6
 COARSE: Final = np.radians(65)
 """Angle in place of `SMOOTH` in a mesh without curved edges, where a hexagon may be a round pillar."""
 SAFETY: Final = 1.5
-"""Factor on the estimate: an arc drawn by few facets has one edge less than facets."""
+"""Factor on the estimate: an arc of few facets has one edge less than facets."""
 _FLAT: Final = 1 / 12
 _QUADRATIC: Final = 1 / 60
 _STRAIGHT: Final = 1e-6
@@ -78,7 +78,7 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     """Estimate the volume errors by the facets of a mesh's walls."""
     facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
     patches, outer = wall_patches(geometry)
-    # Each edge of two facets: its place among the edges of both, facet by facet, and its ends.
+    # Each edge of two facets: its number among the edges of both, facet by facet, and its ends.
     edges = np.sort(edges_of(facets[:, :corners]).reshape(-1, 2), axis=1)
     order = np.lexsort(edges.T)
     pair = np.flatnonzero(np.all(edges[order][1:] == edges[order][:-1], axis=1))

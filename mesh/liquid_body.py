@@ -43,7 +43,7 @@ _HALVINGS: Final = 6
 def _level(places: FloatArray, radius: float) -> FloatArray:
     """Centrifugal potential over omega^2 above that of the surface, m^2: liquid is where it is positive.
 
-    Args: `places`: m, shape (..., 3). `radius`: a of the concentric surface, m.
+    Args: `places`: coordinates, m, shape (..., 3). `radius`: a of the concentric surface, m.
     """
     return np.asarray((places[..., 0] ** 2 + places[..., 1] ** 2 - radius**2) / 2)
 
@@ -146,7 +146,7 @@ class _Cuts:
     number: IntArray
     """Number of the new node, shape (cells, 6); -1 where the edge does not cross."""
     share: FloatArray
-    """Place along the edge from its first corner, 0 to 1."""
+    """Position along the edge from its first corner, 0 to 1."""
     places: FloatArray
     """Points of the new nodes, m, shape (new, 3)."""
 

@@ -2,7 +2,7 @@
 
 The walls of an imported chamber are polynomial patches, X(u, v) = sum c_ij u^i v^j, i and j up to 2. Facets
 of all kinds are of that form: bilinear and serendipity quadrilaterals as they are, triangles with their
-corner 2 drawn out to the side v = 1, xi = u (1 - v), eta = v.
+corner 2 stretched to the side v = 1, xi = u (1 - v), eta = v.
 
 The liquid is where q = |r - c|^2 - s z exceeds L: outside a circle about c (s = 0) or a paraboloid. With h =
 q - L, w = (r - c).n/|r - c|^2 dA, e the direction of r - c across the shaft and a^2 = |r - c|^2 - h, the
@@ -42,7 +42,7 @@ _SHAPES: Final[dict[int, tuple[Powers, Powers]]] = {
         ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)),
     ),
 }
-"""Monomials, and places of the nodes in halves, by the number of nodes."""
+"""Monomials, and positions of the nodes in halves, by the number of nodes."""
 
 
 @cache
@@ -162,7 +162,7 @@ class Walls:
     """Bounds of q on each patch, m^2."""
     centre: FloatArray
     slope: float
-    """s, m."""
+    """Coefficient s of z in q, m."""
     samples: FloatArray
     """Result of `_samples` at the Gauss points, shape (6, n, points); weights included."""
 

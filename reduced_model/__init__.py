@@ -1,4 +1,4 @@
-"""From physics to what a user calibrates with: lambda, k(u), the flow law and its uncertainty."""
+"""Calibration models from the physics: lambda, k(u), the flow law and its uncertainty."""
 
 if not __name__.startswith("ringbalance."):
     raise ImportError(

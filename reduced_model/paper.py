@@ -1,8 +1,8 @@
 """Every closed formula of the liquid-ring paper, one function each, with the paper's equation number.
 
 Pan, Wu, Gao and Mu, "Performance Analysis and Control Simulation of Pneumatic Liquid Online Automatic
-Balancing System for Rotating Machinery".  The formulas stand here as printed, flat plate strips and all, so
-that they can be compared with the exact geometry and the finite elements; nothing is corrected silently.
+Balancing System for Rotating Machinery".  The formulas are as printed, flat plate strips included, for
+comparison with the exact geometry and the finite elements; nothing is corrected silently.
 Where the paper writes 0.5 for the liquid of a pair as a share of one chamber, these functions read the disc's
 `max_fill_ratio`.
 
@@ -61,7 +61,7 @@ def surface_radius_paper(*, disc: Disc, liquid_volume: npt.ArrayLike) -> FloatAr
 
     Returns: R1', m, the shape of `liquid_volume`; at V'_max the paper prints 34.9 mm.
     Raises: ValueError: a volume below zero or above the chamber's.
-    Source: Eq. 3 read backwards, as the text after Eq. 6 does.
+    Source: Eq. 3 solved for a, as in the text after Eq. 6.
     """
     volume = np.asarray(liquid_volume, dtype=np.float64)
     if np.any(~((volume >= 0) & (volume <= chamber_volume_paper(disc=disc) * (1 + 1e-12)))):
@@ -147,8 +147,7 @@ def departure(
     """Total departure of the velocity while a full chamber empties, 1 - u(x_a = 0)/u(x_a = x_max).
 
     (k + 1) u^2/2 = p0/rho + omega^2 (2 V'_A - V'_AC)/(B theta)
-    Returns: Departure, the shape of `gas_pressure`; independent of k; one where the chamber stalls on the
-        way.
+    Returns: Departure, the shape of `gas_pressure`; independent of k; one where the flow stalls on the way.
     Source: Eqs. 15 to 18 and the text under Fig. 4, which prints 45.6 % at 0.7 MPa and 22.9 % at 1.5 MPa. The
         unrounded volume gives 45.7 % and 22.9 %; the printed pair follows from R1'_min rounded to 34.9 mm.
     """

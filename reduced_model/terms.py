@@ -1,7 +1,7 @@
 """Physical terms of a scene: the change by neglecting each, and its model.
 
 Every term that has a model is modelled, whatever the tolerance: none adds a noticeable run time. A new term
-is one `Term` of its part below; its model stands with the part that it changes.  Every command takes
+is one `Term` of its part below; its model belongs to the part that it changes.  Every command takes
 `models_used` from here, so that all of them report the same list for the same scene.
 """
 

@@ -85,13 +85,13 @@ class _InputEffect:
     """Expanded uncertainties (95 %) by one input at a fixed fill ratio; arrays along the fill ratio."""
 
     wall_pressure: FloatArray
-    """Pa."""
+    """Uncertainty of the wall pressure, Pa."""
     hydrostatic_pressure: FloatArray
-    """Pa."""
+    """Uncertainty of the hydrostatic pressure, Pa."""
     moment: FloatArray
-    """kg m."""
+    """Uncertainty of the moment, kg m."""
     moment_per_mass: float
-    """lambda at equal fills, m."""
+    """Uncertainty of lambda at equal fills, m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -191,7 +191,7 @@ _FILL_SHARES: Final = (0.2, 0.5, 1.0)
 def chamber_fills(scene: Scene) -> FloatArray:
     """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
 
-    Returns: x, shape (n,); empty where there is none.
+    Returns: x, shape (n,); empty without such a fill.
     """
     fills = range_fills(scene)
     return fills[closed_ring(scene, fills)]

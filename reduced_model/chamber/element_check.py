@@ -36,7 +36,7 @@ _RADIAL_CELLS: Final = 4
 """Cells along the radius. The pressure is quadratic and so are the cells: only the arcs need more."""
 _SMALLEST_CELL_RAD: Final = math.pi / 48
 _CUT_ERROR: Final = 1e-6
-"""Relative error of totals: walls that the surface cuts are drawn again by the parts of their cells."""
+"""Relative error of totals by cut walls, which are remeshed by the parts of their cells."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,13 +52,12 @@ class ElementCheck:
     allowed: Mapping[str, FloatArray]
     """Allowed difference: sum of both half-widths (95 %), by `CHECKED`, SI, shape (n,)."""
     excesses: Mapping[str, float]
-    """Largest difference beyond what is allowed, relative to the value, by `CHECKED`; zero where they
-    agree."""
+    """Largest excess over the allowed difference, relative to the value, by `CHECKED`; zero without one."""
     status: Status
 
     @property
     def excess(self) -> float:
-        """Largest relative difference of all quantities beyond what is allowed."""
+        """Largest relative excess over the allowed difference, of all quantities."""
         return max(self.excesses.values())
 
     def excess_of(self, quantity: str) -> float:
@@ -77,7 +76,7 @@ class ElementCheck:
 
         Args: `values`: results of the closed forms. `gravity`: true if these include gravity.
         Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or
-            where the finite elements found no tilted surface.
+            where the finite elements have no solution for the tilted surface.
         Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
         """
         # The thinnest ring and the largest fill.
@@ -141,7 +140,7 @@ def _compared(
 
 
 def _meshes(disc: Disc, tolerance: float, thinnest: float, *, dimension: int) -> tuple[tuple[int, ...], ...]:
-    """Cells of three meshes, finest first: an arc drawn by cells of angle h is off by (h/2)^4/32 R2/depth."""
+    """Cells of three meshes, finest first: cells of angle h along an arc err by (h/2)^4/32 R2/depth."""
     depth = disc.outer_radius - float(surface_radius(disc=disc, fill_ratio=thinnest))
     angle = 2 * (32 * _MESH_SHARE * tolerance * depth / disc.outer_radius) ** 0.25
     angular = 4 * math.ceil(disc.central_angle / max(angle, _SMALLEST_CELL_RAD) / 4)
@@ -216,7 +215,7 @@ class ImportedElements:
 
     @classmethod
     def of(cls, scene: Scene, geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> ImportedElements:
-        """Solve the pressure at a few fills; the errors are those of the elements and of the drawn volume."""
+        """Solve the pressure at a few fills, with the errors of the elements and of the meshed volume."""
         disc, density = scene.disc, scene.liquid.density
         rings = [
             solved_ring(

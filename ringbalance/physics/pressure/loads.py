@@ -3,8 +3,7 @@
 In an imported chamber the pressure is solved here: laplace(p) = 2 rho omega^2 in the liquid, p = 0 on the
 free surface and n . grad p = rho omega^2 r e_r . n on walls, by quadratic tetrahedra on a mesh that follows
 the surface. The exact pressure is known, rho omega^2 (r^2 - a^2)/2; the deviation from it is the
-discretisation error. The
-error of facets in place of a smooth wall is estimated separately.
+discretisation error. The error of facets in place of a smooth wall is estimated separately.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ class _LiquidIntegrals:
     """Totals of the liquid in one chamber."""
 
     volume: float
-    """m^3."""
+    """Volume of the liquid, m^3."""
     first_moment: FloatArray
     """rho times the integral of (x, y, z), kg m, shape (3,)."""
     wall_pressure: float
@@ -114,7 +113,7 @@ class ImportedRing:
     loads: Mapping[str, _BoundaryLoad]
     """Load on each boundary except the free surface."""
     volume: float
-    """m^3."""
+    """Volume of the liquid, m^3."""
     first_moment: FloatArray
     """rho times the integral of (x, y, z), kg m, shape (3,)."""
     status: Status

@@ -83,7 +83,7 @@ _LEAST_SHARE: Final = 0.1
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of the loss by developing flow, over rotation's extra friction on one developing length.
 
-One stands for an inlet that the secondary flow reaches only after that length.  Three-dimensional solutions
+The value 1 stands for a secondary flow that begins only after that length.  Three-dimensional solutions
 of the inlet, a parabola or a blunt profile, at (Re, R) = (100, 100), (200, 50) and (20, 200), gave from -0.70
 to +0.20, beyond the loss of the same inlet at rest: a blunt one loses less where rotation keeps flow blunt.
 """
@@ -95,7 +95,7 @@ def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -
     Args: `state`: the terms of k of the scene's tube at these velocities.
     Returns: Half-width of k by cause, each the shape of `velocity`; "input: fitted" of all inputs that were
         fitted together. Parts that vanish everywhere are kept.
-    Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
+    Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads are given with the correlations.
     """
 
     def k_of(designs: Designs) -> FloatArray:
@@ -114,7 +114,7 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
     """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
 
     Returns: Half-width of k by cause, each the shape of the state's arrays; none of a prescribed k.
-    Source: the spreads stand with the correlations.
+    Source: the spreads are given with the correlations.
     """
     if tube.drag_coefficient is not None:
         return {}
@@ -253,7 +253,7 @@ def _development_uncertainty(
     Args: `length`: L of the tube, m. `bore`: d, m. `developing`: l/d, any shape. `rotation_loss`: k_rot,
         rotation's extra friction on the whole tube, broadcasts.
     Returns: expanded uncertainty (95 %), of the broadcast shape.
-    Source: the share stands with `DEVELOPMENT_SHARE`; the exponential is that of the slowest disturbance.
+    Source: the share is `DEVELOPMENT_SHARE`; the exponential is that of the slowest disturbance.
     """
     share = np.asarray(developing, dtype=np.float64) * bore / length
     way = -share * np.expm1(-1 / share)
@@ -313,7 +313,7 @@ def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
     Args: `velocity`: u, mean over the bore, m/s, any shape, positive.
     Raises: ValueError: a velocity that is not positive and finite, or arcs longer than the tube.
     Range: calibrated from 0.1 to 20 m/s; `in_range` and `range_notes` say where a correlation is stretched.
-    Source: definition of k from Eq. 14 of the liquid-ring paper; the sources of the terms stand with them.
+    Source: definition of k from Eq. 14 of the liquid-ring paper; those of the terms are given with each.
     """
     u = np.asarray(velocity, dtype=np.float64)
     if not np.all(np.isfinite(u) & (u > 0)):

@@ -182,7 +182,7 @@ def rotation_table_covers(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.Arr
 
 @dataclass(frozen=True, kw_only=True)
 class _TablePoint:
-    """Point at which the two rectangles are looked up: two coordinates in each, and the fast one's weight."""
+    """Point of a table look-up: two coordinates in each rectangle, and the weight of the fast one."""
 
     slow: tuple[FloatArray, FloatArray]
     fast: tuple[FloatArray, FloatArray]

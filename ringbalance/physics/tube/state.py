@@ -58,12 +58,12 @@ class TubeState:
 
     @property
     def spread_loss(self) -> FloatArray:
-        """The part of k that is spread evenly along the path."""
+        """Part of k that is spread evenly along the path."""
         spread = (self.terms[name] for name in _SPREAD_TERMS if name in self.terms)
         return np.asarray(sum(spread), dtype=np.float64)
 
     def upstream_loss(self, share: float) -> FloatArray:
-        """The part of k between the driven chamber and a place on the crest, a fraction of the path.
+        """Part of k between the driven chamber and a point of the crest, given as a fraction of the path.
 
         Entrance, that share of what is spread along the path, and the bends of the first leg.  A bend belongs
         to a leg, wherever the crest is, so that the loss is continuous as the crest moves.  Both legs have
@@ -79,7 +79,7 @@ class TubeState:
 
 
 def tube_state(scene: Scene, velocity: npt.ArrayLike, *, tube: Tube | None = None) -> TubeState:
-    """Every term of k at velocities above zero, m/s, any shape, of the scene's tube or another in its place.
+    """Every term of k at velocities above zero, m/s, any shape, for the scene's tube or another one.
 
     Raises: ValueError: as `straight_length`.
     """
@@ -99,7 +99,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     Args: `rotation_reynolds`: R_Om, any shape that broadcasts to that of `reynolds`.
     Returns: TubeState, arrays of the shape of `reynolds`.
     Raises: ValueError: arcs longer than the tube.
-    Source: the sources of the terms stand with them.
+    Source: given with each term.
     """
     re, rotation = (np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
     rough = tube.roughness / tube.bore

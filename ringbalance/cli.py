@@ -177,7 +177,7 @@ def _run_guarded(arguments: Sequence[str] | None) -> int:
     except (BrokenPipeError, KeyboardInterrupt):
         raise
     except SystemExit as stop:
-        # A rich console, such as that of `--help`, exits when nobody reads it.
+        # A rich console, such as that of `--help`, exits when its reader is gone.
         if isinstance(stop.__context__, BrokenPipeError):
             raise stop.__context__ from None
         raise

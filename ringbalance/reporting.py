@@ -100,7 +100,7 @@ def report(options: SimpleNamespace) -> int:
 
 
 def _load() -> bool:
-    """Load in a worker what a report needs."""
+    """Load, in a worker, the modules that a report needs."""
     return callable(write_scene_report)
 
 

@@ -195,7 +195,7 @@ def drop_unusable_size(environment: MutableMapping[str, str]) -> None:
 
 
 def discard_unwritten() -> None:
-    """Discard what a stream could not take: the interpreter would flush it again at its end, and complain."""
+    """Discard unwritten output of a stream: the interpreter would flush it again at its end and fail."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

@@ -5,8 +5,8 @@
 Supported are the versions that pyproject.toml's classifiers name.  Python is looked for as `python3.X` on
 the search path and among the versions of pyenv; one that does not start, or has no venv, does not count.
 The Python that runs this program is left out, since `make test` has used it.  The oldest and the newest of
-the others on this machine run `make test-numbers`, types included; those between, which have the packages of the
-newest (requirements/lock.txt), run `make test-short`.  Each has an environment, `.venv-3.X`.  Before a
+the others on this machine run `make test-numbers`, types included; those between, which have the packages of
+the newest (requirements/lock.txt), run `make test-short`.  Each has an environment, `.venv-3.X`.  Before a
 release, `make test pages VENV=.venv-3.13` runs everything under another Python.
 """
 

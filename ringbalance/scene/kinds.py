@@ -100,7 +100,7 @@ def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[
 def reader_of(
     schema: Schema, checks: tuple[Check, ...]
 ) -> Callable[..., tuple[SceneReading, tuple[Fault, ...]]]:
-    """Reader of a kind of scene that consists of its keys and rules alone; see `SceneKind.read`."""
+    """Reader of a kind of scene that has only keys and rules; see `SceneKind.read`."""
 
     def read(
         document: Mapping[str, Any], *, file: str, before: Mapping[str, TableRead], **_: object

@@ -2,7 +2,7 @@
 
 `ringbalance.scene.load_scene` makes them; it converts units to SI and refuses impossible values.  Angles are
 radians, positive with the rotation; amplitudes are zero-to-peak; gas pressures are gauge, vapour pressures
-absolute.  What a field's key takes and means, and its default, stand in its annotation, see `scene.keys`.
+absolute.  A field's annotation declares its key: accepted values, meaning and default, see `scene.keys`.
 """
 
 import math

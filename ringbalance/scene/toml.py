@@ -78,7 +78,7 @@ def _line(key: str, value: Any) -> str:
 
 
 def _value_text(value: Any, *, indent: str = "") -> str:
-    """One value; a list of tables that stands by itself has a line for each."""
+    """One value; a list of tables that is not nested has a line for each table."""
     if isinstance(value, dict):
         inside = ", ".join(f"{toml_key(key)} = {_value_text(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"

@@ -1,7 +1,7 @@
 """Quantities written with units, read into SI and written back: no guessing, one rounding.
 
 The written decimal times the unit's exact factor is rounded once, so "44.5 mm" and "4.45 cm" are the same
-double.  A number that another package wraps is recognised by its methods alone: with a unit, as pint has it,
+double.  A number that another package wraps is recognised only by its methods: with a unit, as pint has it,
 with a standard deviation, as uncertainties has it, or with both.
 """
 
@@ -211,7 +211,7 @@ def _unit_of(text: str, dimension: str) -> str:
 
 
 def parse_number(text: str) -> float:
-    """Read a number that stands without a unit, such as a cell of a table.
+    """Read a number without a unit, such as a cell of a table.
 
     Returns: Finite. Raises: FieldError: anything else; the error says what to write instead.
     """
@@ -229,7 +229,7 @@ def parse_number(text: str) -> float:
 
 
 def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6) -> str:
-    """An SI value in a unit of its dimension, for people, such as "44.5 mm"."""
+    """Text of an SI value in a unit of its dimension, such as "44.5 mm"."""
     entry = DIMENSIONS[dimension].units[unit]
     number = value / float(entry.factor) / (math.pi if entry.pi else 1.0) - float(entry.offset)
     return f"{number:.{digits}g} {unit}"

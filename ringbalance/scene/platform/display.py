@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 LOG: Final = logging.getLogger("ringbalance")
-"""Progress and messages as information, what a user must know as warnings, errors as errors; nothing is
+"""Log of progress and messages (info), of warnings and of errors; nothing is
 written unless a handler is added."""
 LOG.addHandler(logging.NullHandler())
 _FORMAT: Final = "%(asctime)s %(levelname)s %(message)s"

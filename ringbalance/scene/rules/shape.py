@@ -132,7 +132,7 @@ def _port_in_chamber(port: float, inner: float, outer: float) -> Contradiction |
 def _port_under_liquid(
     port: float, initial: float, inner: float, outer: float, angle: float, thickness: float
 ) -> Contradiction | None:
-    """At the start the ports lie under the liquid: what lies outside r_p holds less than the fill.
+    """At the start the ports lie under the liquid: the fraction of the chamber outside r_p is below the fill.
 
     A port inside the outer wall is allowed: liquid outside it stays in its chamber.
     """

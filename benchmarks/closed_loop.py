@@ -51,7 +51,7 @@ JUDGED = 20
 """Injections of a run by which the rival's method is chosen."""
 RIVAL_RUNS = 2
 END_ERROR = 1e-9
-"""Largest error of a run's last amplitude, m: its fills are within 1e-6."""
+"""Largest error of a run's last amplitude, m: some of its fills are within 1e-6."""
 
 
 FIRST_CALL = """

@@ -130,7 +130,7 @@ MODEL_KINDS: Final[Mapping[str, ModelKind]] = MappingProxyType(
 parts, see `physics.tube.loss.with_errors`; "as built" frees the shape of k(u).  The flow that clears the
 crest and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`, the end
 of the crest's arc within that of `reduced_model.tube.path`.  The start of the flow has no measurements to
-compare with: it depends on the column's inertia, on a valve that opens slower or faster than it closes, and
+compare with: it depends on the column's inertia, on a valve that does not open as fast as it closes, and
 on the side to which liquid on the crest runs when the gas is shut, up to half of the tube.  Its expanded
 uncertainty (95 %) is taken as the time L/2u in which the flow passes that half."""
 MODEL_ERRORS: Final[Mapping[str, str]] = MappingProxyType(

@@ -17,7 +17,8 @@ from ringbalance.scene.origins import SceneFile
 _FIRST_LOOK_DEVICES: Final = 4
 """Number of devices after which a design is dropped if none of them meets the requirements.
 
-If 7 of 10 devices meet them, that happens once in a hundred times.  Runs that do not settle take longest."""
+If 7 of 10 devices meet them, that happens once in a hundred times.  Runs that do not settle take longest.
+"""
 _FIRST_LOOK_TIME: Final = 2.0
 """Length of the runs of the first look over the required settling time; later settling is too late anyway."""
 _SECOND_LOOK_DEVICES: Final = 16

@@ -1,5 +1,5 @@
-"""Calibration from measurements: parameters of a built disc, fitted to what a test rig recorded.
+"""Calibration from measurements: parameters of a built balancer, fitted to records of a test rig.
 
-`data/` reads the files of measurements; `predict/` predicts each kind of them through the
-program's own laws; likelihood, intervals, verdicts and criticism of the model stand beside them.
+`reading.py` reads the files of measurements; `kinds/` predicts each kind of measurement by the program's
+models; the other modules are likelihood, optimum, intervals, verdicts, and criticism of the fit.
 """

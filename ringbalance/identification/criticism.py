@@ -1,20 +1,20 @@
-"""Tests of a fit: lack of fit by its residuals, and the share of each file that it explains.
+"""Tests of a fit: lack of fit by its residuals, and the share of variance explained in each file.
 
-Lack of fit: the sum of squares of residuals whose noise was stated is chi-square distributed, with the
-degrees of freedom that the parameters leave the block.  Order: signs in the order of measurement change as
-often as in random order (runs of Wald and Wolfowitz).  The p-values are corrected for the number of tests
+Size: with stated noise, the sum of squares of the residuals is chi-square distributed, with the degrees of
+freedom that the parameters leave to the block.  Order: the signs in the order of measurement change as often
+as in random order (runs test of Wald and Wolfowitz).  The p-values are corrected for the number of tests
 (Sidak).
 
-An estimated noise takes whatever the prediction leaves over, so that one which has nothing to do with the
-data leaves residuals without any pattern.  The share explained of a file is
+An estimated noise absorbs whatever the prediction does not explain, so that even a prediction unrelated to
+the data leaves residuals without pattern.  The explained share of a file is
 
     1 - (|e|^2/(n - h))/(|P y|^2/(n - m)),
 
-y what was measured, e the residuals, h what parameters and held inputs take up of the n numbers, P the
-projection off the m columns of the null hypothesis "no effect": a mean, and unknowns that are no parameters.
-Below a half the noise is larger than the effect.  The file fails then, unless the noise is stated (the size
-of the residuals is tested against it) or twice as large as the effect that the scene predicts: of repetitions
-of one measurement, or of too weak ones, no share is to be expected.
+y the n measured numbers, e the residuals, h the sum of the leverages of parameters and held inputs, P the
+projection orthogonal to the m columns of the null hypothesis "no effect": a mean, and unknowns that are no
+parameters.  Below one half the noise is larger than the effect.  The file then fails, unless the noise is
+stated (then the size of the residuals is tested) or at least twice as large as the effect that the scene
+predicts: repetitions of one measurement, or too weak ones, cannot be expected to show an effect.
 Source: adjusted coefficient of determination.
 """
 
@@ -37,34 +37,34 @@ from ringbalance.results.rows import text_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 
 LEVEL: Final = 0.05
-"""Chance that a model that is right is said to fail."""
+"""Significance level: probability that a true model fails."""
 MIN_TESTED_ROWS: Final = 5
-"""Rows of a block that is tested."""
+"""Smallest number of rows of a block that is tested."""
 _MOST_NAMED_FINDINGS: Final = 3
-"""Findings that the sentence names."""
+"""Largest number of findings that the sentence names."""
 _LEAST_SHARE: Final = 0.5
 _HIDDEN: Final = 4.0
-"""Variance of the noise over that of the effect which the scene predicts, from which none is to be seen."""
+"""Ratio of noise variance to variance of the predicted effect, from which on the effect is hidden."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _LinearFit:
-    """Residuals and derivatives at the solution, each row in units of its own standard deviation."""
+    """Residuals and derivatives at the optimum, each row in units of its standard deviation."""
 
     residuals: FloatArray
-    """(measured - predicted)/sigma, and of priors (value before - fitted)/sigma, shape (n,)."""
+    """(measured - predicted)/sigma, and for priors (value before - fitted)/sigma, shape (n,)."""
     derivatives: FloatArray
     """Derivatives of the predictions by the parameters, over sigma, shape (n, p)."""
     block: StringArray
-    """File of each row, such as "run.csv", shape (n,), empty for a prior; in the order of measurement."""
+    """File of each row, such as "run.csv", shape (n,), in the order of measurement; empty for a prior."""
     known_noise: BoolArray
-    """Rows whose sigma was given; that of the others was estimated from the residuals of their block."""
+    """True for rows with a stated sigma; False for one estimated from the residuals of the block."""
 
     @classmethod
     def of(cls, best: Optimum) -> _LinearFit:
-        """Linearise a fit at its optimum; what is no parameter but was fitted too counts as one.
+        """Linearise a fit at its optimum; every other fitted unknown counts as a parameter.
 
-        Real and imaginary parts of a vibration are turned into those along its predicted change and across.
+        Real and imaginary parts of a vibration become the parts along and across its predicted change.
         """
         problem, residuals = best.residuals.problem, best.residuals
         size = problem.measured.size
@@ -99,31 +99,31 @@ class _ResidualTest:
     test: Literal["size", "runs"]
     block: str
     p_value: float
-    """Alone."""
+    """p-value of this test alone."""
     text: str
     corrected: float = 1.0
-    """Chance that a right model has any test as clear as this one."""
+    """p-value corrected for the number of tests."""
 
     @property
     def fails(self) -> bool:
-        """True where the model is rejected for it."""
+        """True if this test rejects the model."""
         return self.corrected < LEVEL
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Criticism:
-    """All tests of a fit's residuals, clearest first."""
+    """All tests of a fit's residuals, the most significant first."""
 
     findings: tuple[_ResidualTest, ...]
 
     @property
     def describes(self) -> bool:
-        """True where the fit describes the data, as far as these can tell."""
+        """True if no test rejects the fit."""
         return not any(each.fails for each in self.findings)
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """Result of all tests, as one sentence."""
         failed = [each.text for each in self.findings if each.fails]
         if failed:
             more = len(failed) - _MOST_NAMED_FINDINGS
@@ -167,7 +167,7 @@ class _Criticism:
 def _runs_probability(plus: int, minus: int, runs: int) -> float:
     """Probability of at most so many runs among signs in random order.
 
-    Source: Wald and Wolfowitz, Ann. Math. Statist. 11 (1940) 147, recalled; the counting is elementary.
+    Source: Wald and Wolfowitz, Ann. Math. Statist. 11 (1940) 147, from memory; the counting is elementary.
     """
     ways = 0
     for count in range(2, runs + 1):
@@ -182,13 +182,13 @@ def _runs_probability(plus: int, minus: int, runs: int) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class _Explained:
-    """One file."""
+    """Explained share of one file."""
 
     file: str
     share: float
-    """Fraction of the variance that the fit explains; below zero where no effect at all explains more."""
+    """Fraction of the variance that the fit explains; below zero if "no effect" explains more."""
     fails: bool
-    """True where the fit takes most of the data for noise, though the scene predicts an effect."""
+    """True if the fit attributes most of the variance to noise, although the scene predicts an effect."""
 
     @property
     def text(self) -> str:
@@ -197,13 +197,13 @@ class _Explained:
 
 
 def _shares_explained(best: Optimum) -> Iterator[_Explained]:
-    """The share of each file whose rows leave one."""
+    """Yield the explained share of each file with enough rows."""
     problem, residuals = best.residuals.problem, best.residuals
     scale, left_over, expected = residuals.scale, best.at, problem.at(problem.start)
     taken = residuals.leverage(best.slopes)
     for block, rows in problem.rows:
         count, size = len(block.observations), block.measured.size
-        # Without any effect: a mean of each part, and free unknowns.
+        # Null hypothesis "no effect": a mean of each part, and free unknowns.
         mean = np.kron(np.eye(size // count), np.ones((count, 1)))
         null_columns = block.whiten @ np.concatenate([mean, block.free], axis=1)
         null = basis_of(scale[rows, None] * null_columns)
@@ -229,11 +229,11 @@ class Review:
 
     criticism: _Criticism
     explained: tuple[_Explained, ...] = ()
-    """Fraction of the variance of each file that the fit explains."""
+    """Explained share of each file."""
     readings: tuple[Reading, ...] = ()
-    """Other readings of the files, the likeliest first."""
+    """Alternative readings of the files, the most likely first."""
     ranges: tuple[ComparedColumn, ...] = ()
-    """Columns against what the scene has."""
+    """Columns compared with the ranges of the scene."""
 
     @property
     def _read_wrongly(self) -> tuple[str, ...]:
@@ -244,18 +244,18 @@ class Review:
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Senses of angles that the data do not tell, those of most files first, each in one sentence."""
+        """Senses of angles that the data leave undecided, those of most files first, one sentence each."""
         senses = sorted((each for each in self.readings if each.undecided), key=lambda r: -len(r.files))
         return tuple({each.code: each.text for each in reversed(senses) if not each.named}.values())
 
     @property
     def describes(self) -> bool:
-        """True where the fit describes the data, as they are read."""
+        """True if the fit describes the data and no evidence speaks against their reading."""
         return self.criticism.describes and not self._read_wrongly
 
     @property
     def text(self) -> str:
-        """The verdict on the fit; sound residuals say nothing of data that are read wrongly."""
+        """Verdict on the fit; with evidence of a misreading, inconspicuous residuals are not mentioned."""
         if not self._read_wrongly:
             return self.criticism.text
         residuals = [] if self.criticism.describes else [self.criticism.text]
@@ -263,7 +263,7 @@ class Review:
 
     @classmethod
     def of(cls, result: FitResult) -> Review:
-        """Test the residuals of a fit, and read its data otherwise."""
+        """Test the residuals of a fit and compare alternative readings of its data."""
         best = result.optimum
         ranges = tuple(compared_columns(best.residuals.problem))
         return cls(

@@ -1,10 +1,10 @@
-"""The device of a scene as predictions take it: its law, and the fills that injections leave behind.
+"""Device of a scene for predictions: its flow law, and the fills after injections.
 
-The law is the calibrated one without finite elements and uncertainties; injections run through the closed
-loop's own equations of motion, with the liquid's mass and its way up to the crest always, and the gas line
-and the lag of the valve where the scene gives them.  Which models serve the scene is decided once, so that a
-prediction is smooth in values.  Laws of scenes that are to be compared are made together: most of the work
-is the same for one and for many.
+The law is the calibrated one without finite elements and uncertainties.  Injections are integrated by the
+closed loop's equations of motion, always with the inertia of the liquid and its rise to the crest, and with
+gas line and valve lag if the scene gives them.  The models are selected once for a scene, so that predictions
+are smooth in the parameters.  Laws of scenes to be compared are computed together, since most of the
+work is common to them.
 """
 
 from __future__ import annotations
@@ -35,18 +35,21 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 
 RELATIVE_ERROR: Final = 1e-5
-"""Allowed to one step of an injection: the derivatives by differences are then within 1e-5 of those at a
-thousandth of it, below what counts as dependent."""
+"""Relative error allowed to one step of an injection.
+
+Derivatives by differences then change by less than 1e-5 with a thousandth of it, which is less than
+`identifiability.DEPENDENT`.
+"""
 _SETTLING_TIME_S: Final = 10.0
-"""Time after a valve has closed: the gas has vented and the liquid rests, or has run back."""
+"""Time after the valve closes within which the gas has vented and the liquid rests or has run back."""
 _KEPT_DEVICES: Final = 128
-"""Devices whose laws and predictions are kept."""
+"""Number of devices whose laws and predictions are cached."""
 _LEAST_LEFT: Final = 0.1
-"""Fraction of a valve-open time that is left, at least, when the start of the flow is supposed late."""
+"""Smallest fraction of the valve-open time that remains after a delayed start of the flow."""
 
 
 class _Kept(dict[Any, Any]):
-    """Values that are made again where they are lacking: a copy and a file have none."""
+    """Cache that is empty in copies and pickles."""
 
     def __reduce__(self) -> tuple[type[_Kept], tuple[()]]:
         return _Kept, ()
@@ -54,20 +57,20 @@ class _Kept(dict[Any, Any]):
 
 @dataclass(frozen=True, kw_only=True)
 class Models:
-    """Models that predictions of a scene and its neighbours take, by the scene's own tolerance."""
+    """Models for predictions of a scene and of scenes near it, selected by the scene's tolerance."""
 
     velocity: float
     """Velocity in a primed tube at equal fills, m/s."""
     gas_pressure: float
-    """Gauge pressure of the fitted scene's gas, Pa; that of another one is off by the error of the gauge."""
+    """Gauge pressure of the fitted scene's gas, Pa; the difference to another scene's is the gauge error."""
     devices: dict[Scene, ModelledDevice] = field(default_factory=_Kept, init=False, repr=False, compare=False)
-    """The last `_KEPT_DEVICES` that were asked for."""
+    """The last `_KEPT_DEVICES` devices in use."""
     rings: Rings = field(default_factory=_Kept, init=False, repr=False, compare=False)
-    """Values of chambers under gravity, which few of the fitted quantities change."""
+    """Cached values of chambers under gravity, which few of the fitted quantities change."""
 
     @classmethod
     def of(cls, scene: Scene) -> Models:
-        """The models that `calibrate` takes."""
+        """Models that `calibrate` selects for the scene."""
         law = nominal_law(scene, gravity=scene.environment.gravity > 0)
         return cls(
             velocity=_primed_velocity(law, scene),
@@ -75,7 +78,7 @@ class Models:
         )
 
     def expect(self, scenes: Sequence[Scene]) -> None:
-        """Make the laws of these scenes together, once any of them is asked for."""
+        """Group devices of scenes, so that the first use of one law computes the laws of its group."""
         devices = {id(device): device for device in (ModelledDevice.of(scene, self) for scene in scenes)}
         lacking = [device for device in devices.values() if "law" not in vars(device)]
         for places in alike([device.scene for device in lacking]):
@@ -85,13 +88,13 @@ class Models:
 
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
-    """Velocity in a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
+    """Velocity in a primed tube at equal fills under the scene's gas, m/s; zero if it is blocked."""
     fill = scene.disc.initial_fill
     return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
 
 
 def runs_back(scene: Scene, _: Observations) -> str:
-    """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
+    """Reason why no injection has a lasting effect; empty if the tube holds the liquid at equal fills."""
     held = Holding.of(scene, fill_ratio=scene.disc.initial_fill)
     if held.finding is None or held.likely_speed is not None:
         return ""
@@ -105,14 +108,14 @@ class ModelledDevice:
     scene: Scene
     models: Models
     together: list[ModelledDevice] = field(default_factory=list)
-    """Devices whose laws are made with this one's."""
+    """Devices with laws that are computed together with this one's."""
 
     @cached_property
     def law(self) -> CalibratedLaw:
         """Flow law and moments.
 
-        Which flows carry the gas out of the crest is decided by the scene that is fitted: what a faster one
-        would tell of k by that rests on a Froude number that is not known so well.
+        The fitted scene alone decides which flows clear the gas from the crest.  Otherwise that limit would
+        give information on k, although its Froude number is not known accurately enough.
         """
         devices = [each for each in self.together if "law" not in vars(each)] or [self]
         scenes = [each.scene for each in devices]
@@ -150,8 +153,8 @@ class ModelledDevice:
     def once(
         self, observations: Observations, find: Callable[[ModelledDevice, Observations], FloatArray]
     ) -> FloatArray:
-        """Part of a prediction that the device alone decides, which other rotors share."""
-        # The entry keeps its data set alive, so that no other one can have the same identity.
+        """Part of a prediction that depends on the device only, cached for all its rotors."""
+        # The entry refers to its data set, so that no other object can get the same id.
         if id(observations) not in self._kept:
             self._kept[id(observations)] = observations, find(self, observations)
         return self._kept[id(observations)][1]
@@ -167,14 +170,14 @@ class ModelledDevice:
     ) -> FloatArray:
         """Fill of chamber 0 of a pair at rest before and after each of n injections, shape (2, n).
 
-        Args: `fill`: x of chamber 0 before. `follows`: number of the injection whose end each begins with, or
-            its own to begin with `fill`; None: all of them. `chamber`: 0 or 1, that the gas enters.
-            `pressure`: of the supply, as the gauge shows it, Pa. `gas_time`: from the command to open to the
+        Args: `fill`: x of chamber 0 before. `follows`: for each injection, index of the one at whose end it
+            begins; its own index: it begins at `fill`; None: all begin at `fill`. `chamber`: driven chamber,
+            0 or 1. `pressure`: gauge reading of the supply, Pa. `gas_time`: from the command to open to the
             command to close, s.
         """
         scene, velocity, times = self.scene, self.models.velocity, np.atleast_1d(gas_time)
         supply = np.asarray(pressure, dtype=np.float64) + scene.gas.pressure - self.models.gas_pressure
-        # The flow starts late: the error (95 %) is L/2u at equal fills.
+        # Delayed start of the flow: the model error (95 %) is L/2u at equal fills.
         late = scene.tube.model_error(START_ERROR) / NORMAL_95 * scene.tube.length / 2
         delay = late / velocity if velocity else 0.0
         count, plant = times.size, self._plant
@@ -187,7 +190,7 @@ class ModelledDevice:
             np.arange(count) if follows is None else np.array(follows, dtype=np.int64),
             np.broadcast_to(np.asarray(chamber, dtype=np.int64), count).copy(),
             np.broadcast_to(supply, count).copy(),
-            # Of a shorter time the model would have nothing left to start.
+            # In a shorter time no flow would start.
             np.maximum(times - delay, _LEAST_LEFT * times),
             _SETTLING_TIME_S,
             fills,
@@ -197,9 +200,9 @@ class ModelledDevice:
 
     @classmethod
     def of(cls, scene: Scene, models: Models) -> ModelledDevice:
-        """The device of a scene, with the geometry's lambda.
+        """Device of a scene, with the geometry's lambda.
 
-        Scenes that differ in rotor, sensor, controller or the factor on lambda alone share theirs.
+        Scenes that differ only in rotor, sensor, controller or lambda factor share one device.
         """
         rotor = replace(
             scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0

@@ -1,4 +1,4 @@
-"""A fit as JSON (SI, intervals of 95 %), and as a person reads it: what was found, how sure it is."""
+"""Fit as JSON document (SI, intervals of 95 %) and as printed rows."""
 
 from __future__ import annotations
 
@@ -85,12 +85,12 @@ def fit_document(
 
 
 def _chosen(record: Any, names: str) -> dict[str, Any]:
-    """Fields and properties of a record that stand in the document under their own names."""
+    """Fields and properties of a record that enter the document under the same names."""
     return {name: getattr(record, name) for name in names.split()}
 
 
 _STRONG: Final = 0.9
-"""Correlation from which two parameters are named together."""
+"""Correlation beyond which two parameters are reported as correlated."""
 _MOST_LINES: Final = 10
 _WORDS: Final = {
     Identified.IDENTIFIED: "yes",
@@ -98,13 +98,13 @@ _WORDS: Final = {
     Identified.STRUCTURALLY: "no",
 }
 _NOTABLE_RESIDUAL: Final = 3.0
-"""Normalised residual of a row that is named."""
+"""Normalised residual beyond which a row is reported."""
 
 
 def fit_rows(
     result: FitResult, *, data: Sequence[Observations], review: Review, next_measurement: NextMeasurement
 ) -> Rows:
-    """Parameters with their intervals, whether the fit holds, and what else the data say."""
+    """Parameters with their intervals, the verdict on the fit, and further findings."""
     scene, count = result.optimum.residuals.problem.scene, sum(len(each) for each in data)
     held = [name for name in result.held if name not in MODEL_ERRORS]
     causes = dict.fromkeys(MODEL_ERRORS[name] for name in result.held if name in MODEL_ERRORS)
@@ -154,7 +154,8 @@ def fit_rows(
 
 
 def _findings(result: FitResult, review: Review) -> Iterator[Finding]:
-    """Verdict on the fit; parameters and their products; noise, errors that go together, and rows far off."""
+    """Verdict on the fit; parameters and their products; noise; correlated errors; rows with large
+    residuals."""
     code = "fit_describes" if review.describes else "fit_contradicted"
     yield Finding(code=code, values={"text": review.text})
     yield from (Finding(code="sense_undecided", values={"text": text}) for text in review.undecided)
@@ -163,7 +164,7 @@ def _findings(result: FitResult, review: Review) -> Iterator[Finding]:
         if each.verdict is not Identified.IDENTIFIED:
             yield Finding(code="not_identified", values=name | {"text": each.text})
         for end, bound, side in zip(each.interval, each.at_bound, ("lower", "upper"), strict=True):
-            # The data did not set this end.
+            # This end is a bound of the scene, not of the data.
             if bound and math.isfinite(end):
                 yield Finding(code="interval_open", values=name | {"side": side})
         yield from (Finding(code="parameter_doubted", values=name | {"text": text}) for text in each.doubts)
@@ -204,7 +205,8 @@ def _listed(lines: Sequence[int]) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AgainstFit:
-    """Numbers of one column of one kind of data, SI; of a vibration its real and imaginary parts."""
+    """Measured and fitted numbers of one column of one kind of data, SI; a vibration as real and imaginary
+    part."""
 
     kind: str
     column: str
@@ -214,14 +216,16 @@ class AgainstFit:
     component: IntArray
     """Component of every number: 0, or 1 for the imaginary part of a vibration."""
     measured: FloatArray
-    """Less what is no quantity of the device, such as the vibration without trial weight."""
+    """Measured numbers less the fitted unknowns that are no parameters, such as the vibration without trial
+    weight."""
     measured_uncertainty: FloatArray
-    """Expanded (95 %), by the noise that is stated or estimated."""
+    """Expanded uncertainty (95 %) by stated or estimated noise."""
     fitted: FloatArray
     fitted_uncertainty: FloatArray
-    """Expanded (95 %), of all that was fitted together."""
+    """Expanded uncertainty (95 %) of the prediction by all fitted unknowns together."""
     slope: float | None
-    """Measured over fitted values, a line through zero weighted by noise; None for fitted zeros."""
+    """Slope of measured over fitted values, by a line through zero weighted by noise; None if all fitted are
+    zero."""
     slope_uncertainty: float | None
     """Expanded uncertainty (95 %) of the slope by the noise."""
 
@@ -236,7 +240,7 @@ def against_fit(result: FitResult) -> list[AgainstFit]:
     predicted = problem.at(best.t) + residuals.held @ (n - residuals.pulled)
     of_unknowns = np.r_[: best.t.size, best.t.size + free.shape[1] : effects.shape[1]]
     of_device, spread = effects[:, of_unknowns], spread[np.ix_(of_unknowns, of_unknowns)]
-    # Of each group: the number's part, measured, its uncertainty, fitted, its uncertainty.
+    # By group: component, measured, its uncertainty, fitted, its uncertainty.
     numbers: dict[str, list[FloatArray]] = {}
     first = {block.group: block for block in reversed(problem.blocks)}
     for block, mine in problem.rows:

@@ -1,4 +1,4 @@
-"""The fit of a scene to measurements: maximum likelihood, profiles, verdicts, and what it finds."""
+"""Fit of a scene to measurements: maximum likelihood, profiles, verdicts, and the result."""
 
 from __future__ import annotations
 
@@ -33,50 +33,51 @@ from ringbalance.scene.origins import Origin
 from ringbalance.scene.uncertain import NORMAL_95
 
 _LAMBDA_FAR: Final = 2**0.25
-"""Factor on lambda, or its inverse, from which it is doubted: halfway, in logarithms, from 1 to the square
-root of two that rms amplitudes are wrong by where zero to peak is stated."""
+"""Factor on lambda, or its inverse, from which on it is doubted: geometric mean of 1 and the square root of
+two, the error of rms amplitudes stated as zero to peak."""
 
 
 _MAX_PULL_SIGMAS: Final = 3.0
-"""Standard deviations by which data may disagree with what is known beforehand."""
+"""Standard deviations by which the data may disagree with the prior."""
 _MOVABLE_FRACTION: Final = 0.1
-"""Fraction of the prior standard deviation by which data must be able to move a value to disagree."""
+"""Smallest shift of a value by the data, over the prior standard deviation, for which disagreement is
+tested."""
 _LITTLE: Final = 1e-4
-"""Change of a quantity, relative, or in SI units where it is zero."""
+"""Change of a quantity in a test for its effect: relative, or in SI units if it is zero."""
 Source = Literal["[uncertainty]", "geometry"]
 _INTERVAL_FROM: Final[Mapping[Source | None, str]] = {
     "[uncertainty]": "interval_stated",
     "geometry": "interval_of_geometry",
     None: "interval_unknown",
 }
-"""Code of the sentence that says where the interval before comes from."""
+"""Code of the sentence on the source of the interval before the fit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FittedParameter:
-    """One parameter before and after; SI, intervals of 95 %."""
+    """One parameter before and after the fit; SI, intervals of 95 %."""
 
     name: str
     value: float
     interval: tuple[float, float]
     at_bound: tuple[bool, bool]
-    """True for an end of the interval that a rule of the scene sets and not the data."""
+    """True for each end of the interval that is a bound of the scene and not set by the data."""
     before: float
     """Value of the scene."""
     before_interval: tuple[float, float] | None
-    """None where nothing is known beforehand."""
+    """Prior interval (95 %), SI; None without prior knowledge."""
     before_source: Source | None
     """Source of that interval."""
     verdict: Identified
     text: str
-    """The verdict with its reason, in one sentence."""
+    """Verdict with its reason, in one sentence."""
     profile: Profile
     curve: tuple[tuple[float, float], ...] = ()
-    """Values, SI, and the rise of minus two log likelihood there, over that at the ends of the interval."""
+    """Values, SI, and the rise of -2 ln L there, over the rise at the ends of the interval."""
 
     @property
     def half_width(self) -> float | None:
-        """The larger distance from the value to an end of its interval; None: it has no end."""
+        """Larger distance from the value to an end of its interval, SI; None: an end is infinite."""
         width = max(self.interval[1] - self.value, self.value - self.interval[0])
         return width if math.isfinite(width) else None
 
@@ -88,23 +89,23 @@ class FittedParameter:
 
     @property
     def contradicts(self) -> bool:
-        """True where the value lies outside the interval before: that or the data are wrong."""
+        """True if the value lies outside the prior interval: either that interval or the data are wrong."""
         low, high = self.before_interval or (-math.inf, math.inf)
         return not low <= self.value <= high
 
     @property
     def _impossible(self) -> bool:
-        """True for a lag that no passive rotor has, and that the scene does not have either."""
+        """True for a lag that no passive rotor has, unless that of the scene is of this kind too."""
         is_lag = self.path.rpartition(".")[2] == "lag_angle" and passive(self.before)
         return is_lag and not any(map(passive, (self.value, *self.interval)))
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Doubts of the value, one sentence each."""
+        """Reasons to doubt the value, one sentence each."""
         disagrees, doubts = self.contradicts, []
         if self.before_interval is not None:
-            # Of data that agree with a prior of standard deviation p, of which the fit leaves q, the value is
-            # off its middle by (p^2 - q^2)^(1/2).
+            # If the data agree with the prior of standard deviation p, and q remains after the fit, the shift
+            # of the value has the standard deviation (p^2 - q^2)^(1/2).
             prior = (self.before_interval[1] - self.before) / NORMAL_95
             left = (self.interval[1] - self.interval[0]) / (2 * self.profile.factor)
             moved = math.sqrt(max(prior**2 - left**2, 0.0))
@@ -122,7 +123,7 @@ class FittedParameter:
 
     @property
     def path(self) -> str:
-        """Place in the scene, such as "tube.bore"."""
+        """Path in the scene, such as "tube.bore"."""
         return path_of(self.name)
 
 
@@ -133,24 +134,24 @@ class Noise:
     group: str
     """Kind and column."""
     standard_deviation: float | None
-    """SI; None where the data give it row by row."""
+    """Standard deviation, SI; None if the data state it row by row."""
     estimated: bool
     degrees_of_freedom: float | None
-    """Behind an estimate."""
+    """Degrees of freedom of an estimated noise."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _FileResiduals:
-    """Residuals of one file over their standard deviation, one row a row of the file."""
+    """Normalised residuals of one file, one row for each row of the file."""
 
     file: str
     kind: str
     lines: IntArray
-    """Shape (n,)."""
+    """Line of each row in the file, shape (n,)."""
     normalised: FloatArray
-    """Measured less fitted; shape (n, 1), or (n, 2) of a vibration: real and imaginary part."""
+    """(measured - fitted)/sigma, shape (n, 1); for a vibration (n, 2), real and imaginary part."""
     down_weighted: BoolArray
-    """Rows that a robust loss counts less than half, shape (n,)."""
+    """True for rows with a weight below one half in a robust loss, shape (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,34 +160,34 @@ class FitResult:
 
     parameters: tuple[FittedParameter, ...]
     correlations: FloatArray
-    """Correlations of the parameters in their own scales, in that order."""
+    """Correlation matrix of the parameters in their fitted scales t."""
     combinations: tuple[Combination, ...]
-    """Products of powers of parameters that are not identified by themselves."""
+    """Identified products of powers of parameters that are not identified alone."""
     noise: tuple[Noise, ...]
     residuals: tuple[_FileResiduals, ...]
     held: Mapping[str, float]
-    """Uncertain inputs of the scene that were not fitted, with their standard deviations, SI; their effect is
-    in all intervals."""
+    """Standard deviations, SI, of uncertain inputs of the scene that were not fitted, by name; all intervals
+    include their effect."""
     pulls: Mapping[str, float]
-    """The likeliest error of each of them, over its expanded uncertainty (95 %)."""
+    """Most likely error of each held input, over its expanded uncertainty (95 %)."""
     loss: str
     starts: int
     evaluations: int
-    """Predictions of all data."""
+    """Number of predictions of all data."""
     log_likelihood: float
-    """Log likelihood of the data at the optimum, with priors and held inputs, but for constants."""
+    """Log likelihood at the optimum, with priors and held inputs, without constants."""
     scene: Any
-    """Scene with the fitted values, the values to which held inputs are pulled, and corrected models."""
+    """Scene with fitted values, most likely values of held inputs, and corrected models."""
     stated: Any
-    """The scene that was fitted."""
+    """Scene as stated before the fit."""
     joint: Joint
-    """Parameters and held inputs together."""
+    """Joint distribution of parameters and held inputs."""
     optimum: Optimum
-    """For criticism and for the choice of the next measurement."""
+    """Optimum of the likelihood."""
 
     @property
     def pulled(self) -> tuple[Finding, ...]:
-        """Held inputs that the data pull out of what is stated of them."""
+        """Findings on held inputs that the data pull out of their stated interval."""
         return tuple(
             Finding(code="pulled", values={"name": name, "pull": abs(pull)})
             for name, pull in self.pulls.items()
@@ -195,7 +196,7 @@ class FitResult:
 
     @cached_property
     def exact(self) -> tuple[str, ...]:
-        """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
+        """Names of quantities that the predictions depend on, neither fitted nor stated as uncertain."""
         problem, t = self.optimum.residuals.problem, self.optimum.t
         inputs = inputs_of(problem.scene)
         uncertain = {*inputs.held(()), *(parameter.name for parameter in self.parameters)}
@@ -207,7 +208,7 @@ class FitResult:
         return tuple(exact)
 
     def parameter(self, name: str) -> FittedParameter:
-        """One parameter by name. Raises: KeyError: it was not fitted."""
+        """Fitted parameter by name. Raises: KeyError: it was not fitted."""
         return {each.name: each for each in self.parameters}[name]
 
 
@@ -227,7 +228,8 @@ def fit(
     """Fit parameters of a scene to measurements.
 
     Args: `parameters`: names; None: those that the kinds of data inform. `loss`: "linear" (normal noise) or
-        "soft_l1" (outliers count less). `starts`: searches from the scene and from around it.
+        "soft_l1" (outliers count less). `starts`: number of searches, from the scene and from points around
+        it.
     Raises: FitError: data or parameters that cannot be fitted. ValueError: data that do not fit the scene.
     Source: `likelihood`, `optimisation`, `intervals`, `identifiability`.
     """
@@ -246,7 +248,7 @@ def fit(
     noise += [
         Noise(group=g, standard_deviation=None, estimated=False, degrees_of_freedom=None) for g in stated
     ]
-    # Normalised after what is no parameter has taken up its part.
+    # Normalised residuals, with the other unknowns eliminated.
     normalised, files = best.at[: problem.measured.size] / np.sqrt(residuals.weights), []
     for block, mine in problem.rows:
         data_set, weights = block.observations, block.observations.rows_of(residuals.weights[mine])
@@ -283,7 +285,7 @@ def fit(
 def problem_of(
     scene: AnyScene, data: Sequence[Observations], parameters: Sequence[str] | None = None
 ) -> Problem:
-    """The problem that `fit` solves. Raises: FitError: as `fit`."""
+    """Problem that `fit` solves. Raises: FitError: see `fit`."""
     if not data:
         raise FitError("give at least one file of measurements")
     for each in data:

@@ -1,15 +1,15 @@
 """Identifiability of parameters by the data alone, without priors, from their Fisher information.
 
-In the parameters' own scales t, ln x or ln(k + 1), F = J'J with J = d(residuals)/dt.
+In the fitted scales t of the parameters, ln x or ln(k + 1), F = J'J with J = d(residuals)/dt.
 
 - **Structurally not identified**: J has no column for the parameter, or its columns are linearly dependent.
 - **Practically not identified**: the interval that the data alone give, by F, is wider than the scene's
-  prior, or than a factor of two where there is none; or the profile is that wide in spite of F.
+  prior, or than a factor of two without a prior; or the profile is that wide in spite of F.
 - **Identified**: otherwise.
 
-Where a parameter is not identified, products of powers may be: the directions in which F is strong, measured
-by those widths.  They are reduced to as few parameters as possible, and their exponents to whole numbers
-where those serve as well.
+If a parameter is not identified, products of powers may be: the directions in which F is strong, relative to
+those widths.  They are reduced to as few parameters as possible, with whole exponents if these are about as
+well identified.
 Source: Raue et al., Bioinformatics 25 (2009) 1923 (both kinds of non-identifiability); Rothenberg,
 Econometrica 39 (1971) 577 (rank of the information).
 """
@@ -30,27 +30,30 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 
 DEPENDENT: Final = 3e-5
-"""Singular value of the normalised columns of J below which they count as dependent: above the error of
-differences, and below what thousands of measurements could make up for."""
+"""Singular value of the normalised columns of J below which they count as dependent.
+
+It is above the error of the differences, and so small that even thousands of measurements could not
+compensate.
+"""
 FACTOR: Final = math.log(2)
 """Half-width of t up to which a parameter without a prior is identified."""
 _ALIKE: Final = 2.0
-"""Ratio of standard deviations up to which whole exponents serve as well as the best ones."""
+"""Ratio of standard deviations up to which whole exponents count as equal to the best ones."""
 _ROUNDED: Final = 0.12
 """Part of the largest exponent by which whole ones may differ: that of a velocity changes as the fills do,
 and as liquid has to be lifted first, by a fifth of a short injection."""
 _BENT: Final = 1.5
-"""Ratio of what J has at an end of a profile to what the profile has there, from which J is not believed."""
+"""Ratio of the residuals' rise by J to that of the profile, at an end of it, beyond which J is not used."""
 _SIGN: Final = 0.05
-"""Part of the largest exponent from which one decides the sign of all."""
+"""Smallest exponent, as a fraction of the largest, that decides the sign of all."""
 _UNSEEN: Final = 1e-9
-"""In place of a singular value or a norm of zero."""
+"""Replacement of a singular value or a norm of zero."""
 _WHOLE: Final = 3
-"""Largest whole exponent looked for."""
+"""Largest whole exponent that is tried."""
 
 
 class Identified(StrEnum):
-    """Verdict on how well data identify a parameter."""
+    """Verdict on the identifiability of a parameter."""
 
     IDENTIFIED = "identified"
     PRACTICALLY = "practically not identified"
@@ -59,7 +62,7 @@ class Identified(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Combination:
-    """A product of powers of parameters that the data identify."""
+    """Product of powers of parameters that the data identify."""
 
     names: tuple[str, ...]
     exponents: tuple[float, ...]
@@ -68,7 +71,7 @@ class Combination:
     value: float
     """Value with the parameters in SI, k + 1 for a loss coefficient."""
     relative_uncertainty: float
-    """Expanded (95 %), by the data alone: of its logarithm."""
+    """Expanded uncertainty (95 %) of its logarithm, by the data alone."""
 
 
 def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -82,8 +85,8 @@ def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
 
 
 def _allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArray:
-    """Half-width (95 %) of each t above which data say less than is known beforehand, or than a factor of
-    two."""
+    """Largest half-width (95 %) of each t with which a parameter counts as identified: that of the prior, or
+    a factor of two."""
     return np.array(
         [
             NORMAL_95 * p.prior / p.slope(x) if p.prior else FACTOR
@@ -95,7 +98,7 @@ def _allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArra
 def verdicts(
     parameters: Sequence[Parameter], t: FloatArray, slopes: FloatArray, profiles: Sequence[Profile]
 ) -> tuple[Identified, ...]:
-    """Identified of each parameter. Args: `slopes`: d(residuals of the data)/dt, without priors."""
+    """Verdict on each parameter. Args: `slopes`: d(residuals of the data)/dt, without priors."""
     _, s, vt = _normalised(slopes)
     null = vt[s <= DEPENDENT]
     lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
@@ -104,7 +107,7 @@ def verdicts(
     identified = []
     for i, (parameter, profile) in enumerate(zip(parameters, profiles, strict=True)):
         reach = max(profile.high - float(t[i]), float(t[i]) - profile.low)
-        # Prior and data of equal weight leave the prior's width over the root of two.
+        # With equal weights of prior and data the interval is the prior's over sqrt(2).
         wide = reach > allowed[i] / (math.sqrt(2) if parameter.prior else 1.0)
         weak = wide or profile.factor * alone[i] > allowed[i]
         identified.append(
@@ -114,9 +117,9 @@ def verdicts(
 
 
 def _data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
-    """H of the covariance H H' of t by the data alone.
+    """Factor H of the covariance H H' of t by the data alone.
 
-    Args: `unseen`: singular value along what they do not see: small, or infinite to leave that out.
+    Args: `unseen`: singular value along directions without information: small, or infinite to omit these.
     """
     norms, s, vt = _normalised(slopes)
     seen = np.where(s > DEPENDENT, s, unseen)
@@ -131,18 +134,18 @@ def combinations(
     identified: Sequence[Identified],
     profiles: Sequence[Profile],
 ) -> tuple[Combination, ...]:
-    """Products of powers that the data identify, where they do not identify each parameter.
+    """Products of powers that the data identify; none if every parameter is identified.
 
-    Args: `slopes`: as of `verdicts`.
+    Args: `slopes`: see `verdicts`.
     """
     if all(verdict is Identified.IDENTIFIED for verdict in identified):
         return ()
-    # A product is what the data alone tell: the geometry bounds its part, and makes it no better known.
+    # Products follow from the data alone: a prior by the geometry does not narrow the allowed widths.
     data = [replace(p, prior=None) if p.by_geometry else p for p in parameters]
     factor, allowed, flat = max(p.factor for p in profiles), _allowed_widths(data, t), slopes
     weak = np.array([verdict is not Identified.IDENTIFIED for verdict in identified])
-    # J with no more information along the way to the ends of wide profiles than these show, unless that is
-    # its own but for little, or less because a prior ends the profile.
+    # Towards the ends of wide profiles J gets no more information than these show, unless both nearly agree
+    # or a prior ends the profile.
     for profile in [p for p, is_weak in zip(profiles, weak, strict=True) if is_weak]:
         for end in profile.ends:
             way, scaled = (np.array(end) - t) / allowed, flat * allowed
@@ -152,12 +155,12 @@ def combinations(
                 without = scaled - np.outer(scaled @ direction, direction)
                 flat = np.concatenate([without, (profile.factor / length) * direction[None, :]]) / allowed
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
-    # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
+    # Each row is the gradient of a product's logarithm; a row with one parameter is left to its verdict.
     root = _data_root(flat)
-    # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
+    # A profile is never wider than its prior: a direction counts from sqrt(2) on, see `verdicts`.
     strong = vt[s > math.sqrt(2) * factor]
     rows = [_simple(row, root) for row in _echelon(strong / allowed)]
-    # What rounding of the exponents lets in of directions that are not seen at all is no width.
+    # Components along unseen directions are due to rounded exponents and do not widen the interval.
     seen, products = _data_root(slopes, unseen=math.inf), []
     for row in rows:
         used: BoolArray = row != 0
@@ -176,7 +179,7 @@ def combinations(
 
 
 def _echelon(rows: FloatArray) -> FloatArray:
-    """Basis of the space of some directions with as many zeros as possible, by Gauss and Jordan."""
+    """Basis of the space of some directions with as many zeros as possible, by Gauss-Jordan elimination."""
     rows = rows.copy()
     pivots: list[int] = []
     for i in range(rows.shape[0]):
@@ -193,7 +196,7 @@ def _echelon(rows: FloatArray) -> FloatArray:
 
 
 def _simple(row: FloatArray, root: FloatArray) -> FloatArray:
-    """Whole exponents where they are near or the data identify them as well, else two decimals."""
+    """Whole exponents if these are near or about as well identified, else two decimals."""
 
     def width(direction: FloatArray) -> float:
         """Standard deviation along a direction, per unit of length."""

@@ -1,8 +1,8 @@
-"""Influence coefficients over speed from a file, such as a rotordynamics program or a run-up gives them.
+"""Influence coefficients over speed from a file of a rotordynamics program or a run-up.
 
-The file says what its numbers mean, for programs differ in sign and in what an amplitude is; nothing is
-guessed.  Between its speeds W the dynamic stiffness W^2/H is interpolated, which is a parabola for a Jeffcott
-rotor, through its critical speed too, where H itself turns over within a few percent of the speed.
+The file must state its conventions, since programs differ in sign and in the definition of an amplitude;
+nothing is guessed.  Between its speeds W the dynamic stiffness W^2/H is interpolated.  For a Jeffcott rotor
+it is a parabola, also through the critical speed, where H itself reverses within a few percent of the speed.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.faults import SceneError
 
 _AMPLITUDES: Final = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": math.sqrt(2.0)}
-"""Factor to zero-to-peak."""
+"""Factor to a zero-to-peak amplitude, by convention."""
 _SIGNS: Final = {"lag": -1.0, "lead": 1.0, "exp(+jwt)": 1.0, "exp(-jwt)": -1.0}
-"""Factor on an angle or an imaginary part to one that grows with the rotation ahead of the unbalance."""
+"""Factor on an angle or an imaginary part, by convention; the result is positive ahead of the unbalance."""
 _POLAR: Final = ("amplitude", "angle")
 _CARTESIAN: Final = ("real", "imaginary")
 _DIMENSIONS: Final = {
@@ -40,7 +40,7 @@ _DIMENSIONS: Final = {
     "imaginary": "influence_coefficient",
 }
 _NEAREST: Final = 4
-"""Points of a polynomial."""
+"""Number of points of the interpolating polynomial."""
 _EXAMPLE: Final = '# vibration = "zero-to-peak"'
 
 
@@ -60,14 +60,14 @@ class InfluenceTable:
 
     source: str
     speed: FloatArray
-    """rad/s, ascending, shape (n,), n at least 2."""
+    """Speeds, rad/s, ascending, shape (n,), n at least 2."""
     coefficient: ComplexArray
-    """H, m/(kg m), zero-to-peak; its argument is positive where the vibration leads the unbalance."""
+    """H, m/(kg m), zero-to-peak; its argument is positive if the vibration leads the unbalance."""
 
     def at(self, speed: float) -> complex:
         """H at a speed, rad/s.
 
-        By the polynomial of W^2/H through the four nearest speeds; its error shows where a speed is left out.
+        Polynomial of W^2/H through the four nearest speeds; its error shows if one speed is left out.
         Raises: ValueError: a speed outside the table.
         """
         if not self.speed[0] <= speed <= self.speed[-1]:
@@ -82,9 +82,9 @@ class InfluenceTable:
         return complex(speed**2 / np.dot(weights, stiffness))
 
     def rotor(self, speed: float) -> dict[str, object]:
-        """For `scene.with_values`: influence coefficient, m/(kg m), and lag angle, rad, at a speed, rad/s.
+        """Influence coefficient, m/(kg m), and lag angle, rad, at a speed, rad/s, for `scene.with_values`.
 
-        Raises: ValueError: as `at`.
+        Raises: ValueError: a speed outside the table.
         """
         value = self.at(speed)
         return {"rotor.influence_coefficient": abs(value), "rotor.lag_angle": -cmath.phase(value)}

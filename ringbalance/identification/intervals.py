@@ -2,18 +2,18 @@
 
 A value x_i belongs to the interval while the sum of squares S, minimised over all other parameters with x_i
 held, is within q = t^2 of its least value; t is Student's for the degrees of freedom behind the noise,
-normal where the noise is given. Several noises count as Welch and Satterthwaite have it, nu = (sum
-c_g)^2/sum(c_g^2/nu_g), c_g the part of group g in the parameter's variance. Weights that follow from
-estimated noises favour whichever data look quieter by chance: the true variance is larger by about 2 L with
+normal where the noise is given. For several noises, by Welch and Satterthwaite, nu = (sum
+c_g)^2/sum(c_g^2/nu_g), c_g the part of group g in the parameter's variance. Weights from
+estimated noises favour data that look quieter by chance: the true variance is larger by about 2 L with
 
     L = C sum (2/nu_g) (W_g - W_g C W_g) C,
 
 W_g the information of group g and C the covariance, both of all unknowns; q grows by as much.
-An end that the threshold does not reach within the scene's rules is the bound.
+If the threshold is not reached within the rules of the scene, the end is the bound.
 Source: Bates and Watts, "Nonlinear Regression Analysis" (1988), section 6.1; Satterthwaite, Biometrics
 Bull. 2 (1946) 110; Kenward and Roger, Biometrics 53 (1997) 983.
 
-What a fit leaves of parameters and held inputs together is at the end, with their covariance: at the
+`Joint` is the distribution of parameters and held inputs together, with their covariance: at the
 optimum the residuals r are linear in the parameters t, the eliminated unknowns b and the held inputs n, so
 that all of them are jointly normal with (A'A)^-1, A = dr/d(t, b, n), priors and n's own rows among them. A
 group whose noise is estimated with nu degrees of freedom has its rows divided by t_nu(0.975)/1.96, which
@@ -39,38 +39,39 @@ from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.uncertain import NORMAL_95
 
 _END_TOLERANCE: Final = 0.01
-"""Relative, of the root of S at an end of the interval."""
+"""Relative tolerance of the root of the rise of S at an end of the interval."""
 _GAIN: Final = 1e-3
-"""Gain of S below which the other parameters are not moved further."""
+"""Reduction of S below which the search over the other parameters ends."""
 _TRIALS: Final = 16
 _MAX_STEP: Final = 0.7
-"""In t, of a step beyond what is known."""
+"""Largest step, in t, beyond the last trial inside the interval."""
 _LARGEST_STEP: Final = 3.0
-"""Factor by which a trial may go beyond what the curvature at the optimum says."""
+"""Largest ratio of a trial's distance to the last one inside or to that by the curvature at the optimum."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
-    """Profile of one parameter."""
+    """Profile likelihood of one parameter."""
 
     low: float
     """t at the lower end."""
     high: float
     low_bound: bool
-    """True where the lower end is a bound and not a threshold."""
+    """True if the lower end is a bound, not the threshold."""
     high_bound: bool
     factor: float
-    """Student's t."""
+    """Threshold of the root of the rise of S: Student's t, with the effect of estimated weights."""
     ends: tuple[tuple[float, ...], tuple[float, ...]]
-    """All parameters' t at both ends."""
+    """Values t of all parameters at both ends."""
     points: tuple[tuple[float, float], ...]
-    """t and the rise of S above its least, ascending in t."""
+    """Pairs of t and rise of S above its minimum, ascending in t."""
 
 
 def covariance(slopes: FloatArray) -> FloatArray:
-    """(A'A)^-1 of d(residuals)/dt, with infinite variance along directions that A does not see."""
+    """Covariance (A'A)^-1 with A = d(residuals)/dt; variance very large along directions not determined by
+    A."""
     _, s, vt = np.linalg.svd(slopes, full_matrices=False)
-    # The floor: data that tell nothing at all of any parameter leave a variance that still is a number.
+    # Lower bound: the variance is finite even for data without any information.
     largest = np.max(s, initial=1e-100)
     scaled = vt.T / np.where(s <= 1e-10 * largest, 1e-10 * largest, s)
     return np.asarray(scaled @ scaled.T)
@@ -78,7 +79,7 @@ def covariance(slopes: FloatArray) -> FloatArray:
 
 def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
     """Interval of each parameter. Args: `spread`: `covariance` at the optimum."""
-    # t(0.975) of each parameter, with what the estimated weights add.
+    # t(0.975) of each parameter, increased for estimated weights.
     (data, priors), count, group = best.of_all, best.t.size, best.residuals.problem.group
     inverse, parts = covariance(np.concatenate([data, priors])), np.linalg.pinv(best.slopes, rcond=1e-10) ** 2
     total, below, added = np.sum(parts, axis=1), np.zeros(count), np.zeros(count)
@@ -86,7 +87,7 @@ def profiles(best: Optimum, spread: FloatArray) -> list[Profile]:
         below += np.sum(parts[:, : group.size][:, group == g], axis=1) ** 2 / nu
         mine = data[group == g]
         rows = mine @ inverse
-        # Diagonal of C (W - W C W) C by the rows' own covariance.
+        # Diagonal of C (W - W C W) C, from the covariance of the rows.
         left = (rows.T @ rows) @ (np.eye(len(inverse)) - mine.T @ rows)
         added += 2 / nu * np.diag(left)[:count]
     freedom = np.divide(total**2, below, out=np.full(count, np.inf), where=below > 1e-9 * total**2)
@@ -116,8 +117,8 @@ def _end(
 ) -> tuple[float, bool, FloatArray, list[tuple[float, float]]]:
     """Find the end of an interval, at which the root of S - S0, nearly linear in t, is `factor`.
 
-    By the secant, in steps. Returns: t of the parameter there; True where it is a bound; all parameters' t of
-    the last trial; t and rise of S of all trials.
+    Secant method with limited steps. Returns: t of the parameter there; True if it is a bound; t of all
+    parameters in the last trial; t and rise of S of all trials.
     """
     bounds = best.residuals.problem.bounds
     bound, best_t = float(bounds[0 if sign < 0 else 1][which]), float(best.t[which])
@@ -159,9 +160,9 @@ def _end(
 
 _ROUNDS: Final = 4
 _LINEAR: Final = 0.1
-"""Standard deviations of a measured number by which a prediction with all pulls may miss the linear one."""
+"""Largest error of the linearised prediction with all pulls, in standard deviations of a measured number."""
 _UNKNOWN: Final = 0.5
-"""Standard deviation, in t, at most of what nothing is known of: a scene states no interval beyond zero."""
+"""Largest standard deviation, in t, without a prior: the interval in a scene must not reach beyond zero."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -169,23 +170,24 @@ class Joint:
     """Normal distribution of fitted parameters and held inputs."""
 
     names: tuple[str, ...]
-    """Names of the parameters, then of the held inputs, as in the fit."""
+    """Names of the parameters, then of the held inputs, in the order of the fit."""
     values: FloatArray
-    """SI; of an error of a model in its standard deviations."""
+    """Values, SI; errors of models in standard deviations."""
     covariance: FloatArray
     """Covariance of the values, shape (n, n)."""
 
     @property
     def deviations(self) -> FloatArray:
-        """Standard deviations."""
+        """Standard deviations of the values, shape (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
 def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, loss: str) -> Optimum:
-    """The optimum with the effects of held inputs taken at the values to which the data pull them.
+    """Optimum with the effects of held inputs linearised at the values to which the data pull them.
 
-    Until a prediction with all pulls is the linear one; models are those of the device so found.
-    Args: `held`: standard deviations, SI, in the order of the problem's. `scene`: that is fitted.
+    Repeated until a prediction with all pulls agrees with the linear one; models are those of the resulting
+    device.
+    Args: `held`: standard deviations, SI, in the order of the problem. `scene`: before the fit.
     """
     for _ in range(_ROUNDS):
         residuals, t = best.residuals, best.t
@@ -196,7 +198,7 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
         moved_problem = replace(problem, scene=pulled)
         models = inputs_of(moved_problem.scene_at(t)).models
         if models is not None:
-            # What the gauge of the data is off by stays that against the scene that is fitted.
+            # The gauge error of the data remains relative to the scene before the fit.
             moved_problem = replace(
                 moved_problem, models=replace(models, gas_pressure=problem.models.gas_pressure)
             )
@@ -214,18 +216,18 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
 
 
 def _allowed(held: Mapping[str, float], pulls: FloatArray) -> FloatArray:
-    """Pulls as far as models can err."""
+    """Pulls, those of model errors limited to `LARGEST_ERROR`."""
     limits = [LARGEST_ERROR if name in MODEL_ERRORS else np.inf for name in held]
     return np.clip(pulls, -np.array(limits), limits)
 
 
 def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
-    """Distribution of parameters and held inputs at the optimum."""
+    """Joint distribution of parameters and held inputs at the optimum."""
     problem, t, parameters = best.residuals.problem, best.t, best.residuals.problem.parameters
     data, priors = best.of_all
     count, free = t.size, problem.free.shape[1]
     student = np.append(stdtrit(np.clip(best.freedom, 1.0, 1e9), 0.975) / NORMAL_95, 1.0)
-    # Parameters of which nothing is known beforehand.
+    # Weak priors of parameters without a prior.
     weak = np.zeros((count, data.shape[1]))
     weak[np.arange(count), np.arange(count)] = [0.0 if p.prior else 1 / _UNKNOWN for p in parameters]
     inverse = covariance(np.concatenate([data / student[problem.group][:, None], priors, weak]))
@@ -241,7 +243,7 @@ def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
 
 
 def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
-    """The scene with the fitted values, the values to which held inputs are pulled, and corrected models."""
+    """Scene with fitted values, most likely values of held inputs, and corrected models."""
     residuals, scene = best.residuals, best.residuals.problem.scene
     steps = _allowed(held, residuals.linear_values(best.t)[1]) - residuals.pulled
     for (name, sd), step in zip(held.items(), steps.tolist(), strict=True):
@@ -250,7 +252,7 @@ def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
     models = residuals.problem.models
     if models is None:
         return as_fitted
-    # The fitted scene says by how much the gauge of the data is off.
+    # The difference in gas pressure is the error of the gauge of the data.
     ring = liquid_ring_scene(as_fitted)
     off = ring.gas.pressure - models.gas_pressure
     return replace(ring, gas=replace(ring.gas, gauge_correction=off))

@@ -1,13 +1,13 @@
-"""Residuals of a fit in units of their standard deviation, and what makes them: data, priors, held inputs.
+"""Residuals of a fit in units of their standard deviation, from data, priors and held inputs.
 
 With y the measured numbers, f(t) their prediction, L L' the covariance that the data state (up to a factor
 s^2 for each group whose noise is estimated), the model is
 
     y = f(t) + B b + J (n - n0) + s L e,   e, n independent standard normal,
 
-b unknowns that are no parameters (the vibration without trial weight), n the uncertain inputs of the scene
-that are held, each in units of its standard deviation, with effect J at n0, zero at first.  b and n are
-linear and eliminated by projection, so minus two log likelihood is, but for constants,
+b unknowns that are no parameters (the vibration without trial weight), n the held uncertain inputs of the
+scene, in units of their standard deviations, with effect J at n0, initially zero.  b and n are
+linear and eliminated by projection, so that -2 ln L is, apart from constants,
 
     |(1 - Q Q') [L^-1 (y - f(t))/s; -n0]|^2 + sum ((x - x0)/sigma_x)^2 + 2 sum ln s,
 
@@ -32,59 +32,59 @@ from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3
-"""In t, of central differences; their error is STEP^2/6 times a third derivative of order one."""
+"""Step of central differences in t; their error is STEP^2/6 times a third derivative of order one."""
 _RANK: Final = 1e-10
 """Smallest singular value that counts, relative to the largest."""
 _MIN_STEP_FRACTION: Final = 1e-2
-"""Fraction of `STEP` below which there is no difference to that side."""
+"""Smallest step next to a bound, as a fraction of `STEP`; below it no difference to that side is formed."""
 _JUMP: Final = 0.1
-"""Part of the differences on both sides by which they may differ: beyond it there is a jump between them."""
+"""Largest difference of the slopes on both sides over the sum of their magnitudes; beyond it lies a jump."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DataBlock:
-    """One file of measurements, its errors made independent."""
+    """One file of measurements, whitened to independent errors."""
 
     observations: Observations
 
     @property
     def kind(self) -> Kind:
-        """Looked up, for its functions cannot be pickled."""
+        """Kind of the file, looked up since its functions cannot be pickled."""
         return KINDS[self.observations.kind]
 
     @cached_property
     def measured(self) -> FloatArray:
-        """y, shape (n,)."""
+        """Measured numbers y, SI, shape (n,)."""
         return self.kind.numbers(self.observations)
 
     @cached_property
     def whiten(self) -> FloatArray:
-        """L^-1, shape (n, n)."""
+        """Whitening matrix L^-1, shape (n, n)."""
         return np.asarray(np.linalg.inv(np.linalg.cholesky(self.kind.covariance(self.observations))))
 
     @cached_property
     def free(self) -> FloatArray:
-        """B, shape (n, m)."""
+        """Effects B of the unknowns b, shape (n, m)."""
         effects = self.kind.free(self.observations)
         return effects if effects.size else np.zeros((self.measured.size, 0))
 
     @property
     def column(self) -> str:
-        """The measured column whose noise is stated or estimated."""
+        """Name of the measured column whose noise is stated or estimated."""
         return self.kind.noisy_column(self.observations)
 
     @property
     def group(self) -> str:
-        """Kind and column whose noise is one number."""
+        """Kind and column that share one noise."""
         return f"{self.observations.kind} {self.column}"
 
     @property
     def estimated(self) -> bool:
-        """True where its noise is estimated from the residuals."""
+        """True if the noise is estimated from the residuals."""
         return not self.kind.noise_given(self.observations)
 
     def predicted(self, scene: Any, models: Any) -> FloatArray:
-        """f of a scene."""
+        """Predicted numbers f of a scene, SI, shape (n,)."""
         return self.kind.predict(scene, self.observations, models)
 
 
@@ -94,12 +94,12 @@ class Problem:
 
     scene: Any
     models: Any
-    """Models that predictions of this scene take, fixed during the fit."""
+    """Models for predictions of this scene, fixed during the fit."""
     parameters: tuple[Parameter, ...]
     blocks: tuple[DataBlock, ...]
 
     def scene_at(self, t: FloatArray) -> Any:
-        """The scene with the parameters' values."""
+        """Scene with the parameters at t."""
         scene = self.scene
         for parameter, inner in zip(self.parameters, t.tolist(), strict=True):
             scene = parameter.change(scene, parameter.value(inner))
@@ -107,7 +107,7 @@ class Problem:
 
     @cached_property
     def rows(self) -> tuple[tuple[DataBlock, slice], ...]:
-        """Every block with the place of its numbers among those of all."""
+        """Every block with the slice of its numbers among all numbers."""
         ends = np.cumsum([0, *(b.measured.size for b in self.blocks)]).tolist()
         return tuple(zip(self.blocks, (slice(*each) for each in pairwise(ends)), strict=True))
 
@@ -117,11 +117,11 @@ class Problem:
 
     @property
     def evaluations(self) -> int:
-        """Predictions of all data that were made."""
+        """Number of predictions of all data so far."""
         return len(self._known)
 
     def at(self, t: FloatArray) -> FloatArray:
-        """L^-1 f at t; a point that was asked for before is not predicted again."""
+        """Whitened prediction L^-1 f at t, cached."""
         key = t.tobytes()
         if key not in self._known:
             scene = self.scene_at(t)
@@ -130,13 +130,13 @@ class Problem:
         return self._known[key]
 
     def slopes(self, t: FloatArray) -> FloatArray:
-        """d(L^-1 f)/dt by central differences, one-sided where a bound is nearer, shape (n, parameters).
+        """d(L^-1 f)/dt by central differences, one-sided next to a bound, shape (n, parameters).
 
-        Where a prediction jumps, as when liquid just reaches the crest, the smaller of both one-sided
-        differences: a jump over the step is no slope.
+        If a prediction jumps, as when liquid just reaches the crest, the smaller of both one-sided
+        differences counts, without the jump.
         """
         ends = [np.clip(t + step, *self.bounds) for step in (-STEP, STEP)]
-        # Next to a bound a difference would be round-off over next to nothing.
+        # Next to a bound a difference would consist of round-off.
         below, above = (np.where(np.abs(end - t) < _MIN_STEP_FRACTION * STEP, t, end) for end in ends)
         down, up = np.split(self._differences(t, np.concatenate([below, above])), 2, axis=1)
         part = (t - below) / (above - below)
@@ -145,15 +145,15 @@ class Problem:
         return np.where(apart & (part > 0) & (part < 1), smaller, part * down + (1 - part) * up)
 
     def quick_slopes(self, t: FloatArray) -> FloatArray:
-        """d(L^-1 f)/dt by differences to one side, for a search."""
+        """d(L^-1 f)/dt by one-sided differences, for a search."""
         return self._differences(t, np.where(t + STEP < self.bounds[1], t + STEP, t - STEP))
 
     def _differences(self, t: FloatArray, ends: FloatArray) -> FloatArray:
-        """Slopes of L^-1 f from t to ends of each parameter in turn; zero over a step of zero."""
+        """Slopes of L^-1 f from t to the given ends of each parameter in turn; zero for a step of zero."""
         which = np.arange(ends.size) % t.size
         points = [np.where(np.arange(t.size) == i, end, t) for i, end in zip(which, ends, strict=True)]
         if self.models is not None:
-            # Their laws are made together.
+            # Their laws are computed together.
             unknown = [each for each in (t, *points) if each.tobytes() not in self._known]
             self.models.expect([self.scene_at(each) for each in unknown])
         center, *values = map(self.at, (t, *points))
@@ -162,17 +162,17 @@ class Problem:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """L^-1 y."""
+        """Whitened measured numbers L^-1 y."""
         return np.concatenate([b.whiten @ b.measured for b in self.blocks])
 
     @cached_property
     def free(self) -> FloatArray:
-        """L^-1 B."""
+        """Whitened effects L^-1 B."""
         return np.asarray(block_diag(*(b.whiten @ b.free for b in self.blocks)))
 
     @cached_property
     def group(self) -> IntArray:
-        """Index into `estimated_groups` of every number; -1 where its noise is given."""
+        """Index into `estimated_groups` of every number; -1 for a stated noise."""
         names = self.estimated_groups
         return np.concatenate(
             [np.full(b.measured.size, names.index(b.group) if b.estimated else -1) for b in self.blocks]
@@ -180,7 +180,7 @@ class Problem:
 
     @cached_property
     def estimated_groups(self) -> tuple[str, ...]:
-        """Groups whose noise is estimated."""
+        """Groups with an estimated noise."""
         return tuple(dict.fromkeys(b.group for b in self.blocks if b.estimated))
 
     @cached_property
@@ -212,13 +212,13 @@ class Problem:
 
     @cached_property
     def with_prior(self) -> BoolArray:
-        """Which parameters have a prior."""
+        """True for each parameter with a prior."""
         return np.array([bool(p.prior) for p in self.parameters])
 
     def held_effects(self, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:
         """L^-1 J: change of the prediction per standard deviation of each held input, shape (n, inputs).
 
-        Args: `changes`: the problem's scene with each input one standard deviation lower, or as it is, and
+        Args: `changes`: for each input, the scene with it one standard deviation lower, or unchanged, and one
             higher.
         """
         moved = [
@@ -233,7 +233,7 @@ class Problem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Residuals:
-    """Residuals of a problem under one noise, held inputs and weights."""
+    """Residuals of a problem for given noise, held inputs and weights."""
 
     problem: Problem
     noise: FloatArray
@@ -241,9 +241,9 @@ class Residuals:
     held: FloatArray
     """L^-1 J, shape (n, held inputs)."""
     weights: FloatArray
-    """Weights of a robust loss, on squares, shape (n,); ones without."""
+    """Weights of squares in a robust loss, shape (n,); ones for a linear loss."""
     pulled: FloatArray
-    """n at which the problem's scene and J stand, shape (held inputs,); zero where it is as stated."""
+    """n0 of the problem's scene and of J, shape (held inputs,); zero for inputs as stated."""
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -254,7 +254,7 @@ class Residuals:
 
     @cached_property
     def linear(self) -> FloatArray:
-        """[[L^-1 B/s, L^-1 J/s], [0, 1]]."""
+        """Matrix [[L^-1 B/s, L^-1 J/s], [0, 1]]."""
         free, held = self.problem.free, self.held
         top = self.scale[:, None] * np.concatenate([free, held], axis=1)
         count = held.shape[1]
@@ -263,23 +263,23 @@ class Residuals:
 
     @cached_property
     def base(self) -> FloatArray:
-        """Q; directions that the data do not hold are left out."""
+        """Orthonormal base Q, without directions of negligible singular value."""
         return basis_of(self.linear)
 
     def at(self, t: FloatArray, *, predicted: FloatArray | None = None) -> FloatArray:
-        """Residuals and priors."""
+        """Residuals of the data and held inputs, with b and n eliminated, then of the priors."""
         prediction = self.problem.at(t) if predicted is None else predicted
         full = np.concatenate([self.scale * (self.problem.measured - prediction), -self.pulled])
         return np.concatenate([full - self.base @ (self.base.T @ full), self.problem.priors(t)])
 
     def slopes(self, t: FloatArray, of_prediction: FloatArray) -> FloatArray:
-        """d(residuals)/dt, without what b and n can take up. Args: `of_prediction`: d(L^-1 f)/dt."""
+        """d(residuals)/dt, with b and n eliminated. Args: `of_prediction`: d(L^-1 f)/dt."""
         below = np.zeros((self.held.shape[1], of_prediction.shape[1]))
         full = np.concatenate([self.scale[:, None] * of_prediction, below])
         return np.concatenate([-(full - self.base @ (self.base.T @ full)), self.problem.prior_slopes(t)])
 
     def leverage(self, slopes: FloatArray) -> FloatArray:
-        """Fraction of every number of the data that parameters, b and n take up.
+        """Leverage of parameters, b and n on each number of the data.
 
         Args: `slopes`: d(residuals)/dt.
         """
@@ -287,7 +287,7 @@ class Residuals:
         return np.asarray(np.sum(both**2, axis=1))
 
     def linear_values(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Likeliest b and n at t."""
+        """Most likely b and n at t."""
         left = self.scale * (self.problem.measured - self.problem.at(t))
         full = np.concatenate([left, -self.pulled])
         values = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]

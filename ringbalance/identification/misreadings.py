@@ -1,4 +1,4 @@
-"""Ways to misread a file of measurements: one after another, and senses of angles and amplitudes together."""
+"""Possible misreadings of a file of measurements: single ones, and senses of angles with amplitudes."""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.scene.arrays import FloatArray
 
 _LONGEST_INJECTION_S: Final = 10.0
-"""Longest injection: seconds are looked for where milliseconds stand, and not hours."""
+"""Longest plausible injection: longer times cannot be seconds stated as milliseconds."""
 Change = Callable[[Observations, Any], Observations | None]
-"""Takes the scene, too, which kinds of one balancer alone ask for a value of that balancer."""
+"""Function from observations and scene to the observations in another reading; None if that does not
+apply."""
 Conversion = Callable[[FloatArray, Any], FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Misreading:
-    """One way to misread a file."""
+    """Possible misreading of a file."""
 
     code: str
     words: str
     change: Change
     settings: bool
-    """True where it changes settings, and so predictions."""
+    """True if the settings change, hence the predictions."""
     scale: float = 1.0
-    """dy'/dy."""
+    """Scale dy'/dy of the measured numbers."""
     column: str = ""
-    """Name of the changed column, where the scene has a range of it."""
+    """Name of the changed column, if the scene has a range for it."""
     together: bool = True
-    """True where all files may have been misread alike."""
+    """True if all files may have been misread in this way together."""
 
 
 def _exchanged(observations: Observations, _: Any) -> Observations | None:
-    """Columns of before and after, with their uncertainties."""
+    """Exchange the columns of before and after, with their uncertainties."""
     if observations.kind != "injection":
         return None
     other = {"before": "after", "after": "before"}
@@ -56,14 +57,14 @@ def _exchanged(observations: Observations, _: Any) -> Observations | None:
 
 
 def _turned(name: str, observations: Observations, _: Any) -> Observations | None:
-    """Angles whose names begin so with the other sign."""
+    """Reverse the sign of the angles whose names begin with `name`."""
     chosen = {n: -v for n, v in observations.columns.items() if n.startswith(name)}
     vibration = any(n.startswith("phase") for n in observations.columns)
     return observations.with_columns(**chosen) if chosen and vibration else None
 
 
 def _lettered(observations: Observations, scene: Any) -> Observations | None:
-    """Chambers counted against the rotation from A."""
+    """Count the letters of the chambers against the rotation, from A."""
     if observations.kind != "injection" or scene.disc.chambers < 4:
         return None
     letters = chamber_letters(scene.disc.chambers)
@@ -72,7 +73,7 @@ def _lettered(observations: Observations, scene: Any) -> Observations | None:
 
 
 def _amplitudes(factor: float, observations: Observations, _: Any) -> Observations | None:
-    """Amplitudes, with their uncertainties, times a factor."""
+    """Multiply the amplitudes and their uncertainties by a factor."""
     columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
     widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
     return replace(observations.with_columns(**columns), uncertainty=widths) if columns else None
@@ -81,7 +82,7 @@ def _amplitudes(factor: float, observations: Observations, _: Any) -> Observatio
 def _gas(
     name: str, above: float, below: float, convert: Conversion, observations: Observations, scene: Any
 ) -> Observations | None:
-    """A column of what the gas does, in another unit, within the limits of an injection."""
+    """Convert the gas pressure or the valve-open time; None outside the limits of an injection."""
     if observations.kind not in ("injection", "transfer"):
         return None
     values = convert(observations.columns[name], scene)
@@ -104,7 +105,7 @@ SENSES: Final = (
     ),
     Misreading(code="chambers_turned", words="letters of the chambers", change=_lettered, settings=True),
 )
-"""Senses of angles against the rotation, alone and together."""
+"""Angles counted against the rotation, singly and combined."""
 AMPLITUDES: Final = tuple(
     Misreading(
         code=f"amplitudes_{code}",
@@ -120,7 +121,7 @@ AMPLITUDES: Final = tuple(
         ("times_root_two", math.sqrt(2.0), "1.41 times as large, such as rms stated as zero to peak"),
     )
 )
-"""Alone and with every sense of the angles."""
+"""Wrong amplitudes, singly and with every sense of the angles."""
 _OTHERS: Final = (
     Misreading(
         code="before_and_after_exchanged",
@@ -152,12 +153,12 @@ _OTHERS: Final = (
         column="gas_time",
     ),
 )
-"""Alone."""
+"""Misreadings that are tried singly."""
 Joint = tuple[Misreading, ...]
 
 
 def joint_misreadings() -> Iterator[Joint]:
-    """Misreadings that may have been made together, the simplest first."""
+    """Yield combinations of misreadings, the simplest first."""
     yield from ((each,) for each in _OTHERS)
     senses = [chosen for n in range(len(SENSES) + 1) for chosen in combinations(SENSES, n)]
     yield from senses[1:]
@@ -165,7 +166,7 @@ def joint_misreadings() -> Iterator[Joint]:
 
 
 def words_of(joint: Joint) -> str:
-    """Phrase that names misreadings that were made together, for the advice of a fit."""
+    """Phrase that names combined misreadings, for the messages of a fit."""
     turned = [each.words for each in joint if each in SENSES]
     others = [each.words for each in joint if each not in SENSES]
     listed = " and ".join(filter(None, (", ".join(turned[:-1]), *turned[-1:])))

@@ -1,7 +1,7 @@
-"""Which measurement would narrow a parameter's interval most.
+"""Choice of the next measurement: the one that narrows a parameter's interval most.
 
-Candidates are rows of every kind of data that the balancer allows, over the ranges of the scene or of the
-data.  Their noise is that of the fit; a kind that was not measured has an assumed one, which is said.
+Candidates are rows of every kind of data for the balancer, over the ranges of the scene or of the data.
+Their noise is that of the fit; for kinds that were not measured it is assumed, and the text says so.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene
 
 _ASSUMED_NOISE: Final = 0.01
-"""Standard deviation of a kind that was not measured, relative to the largest that is predicted."""
+"""Assumed standard deviation of a kind without measurements, relative to the largest prediction."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
 """Ratios to the median of the data, or to the unbalance that makes the vibration at the start."""
 _WORTHWHILE: Final = 0.9
-"""Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
+"""Ratio of interval widths, after over before, up to which one measurement is recommended."""
 _AT_ALL: Final = 0.99
 _RANK: Final = 1e-12
 _WORDS: Final = {"gas_time": "valve-open time"}
-"""Names of columns that a sentence has another word for."""
+"""Word in sentences by column, if it differs from the column's name."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NextMeasurement:
-    """Ranking of the measurements that would narrow one parameter."""
+    """Ranking of measurements by their effect on one parameter."""
 
     parameter: str
     gains: tuple[_Gain, ...]
-    """Best first."""
+    """Gains of the candidates, the best first."""
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """Recommendation in one sentence."""
         best = self.gains[0]
         if best.ratio > _AT_ALL:
             return text_of("no_measurement_narrows", parameter=self.parameter)
@@ -55,12 +55,12 @@ class NextMeasurement:
 
 
 def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement:
-    """Rank candidates for a parameter; None: the one that the data identify least.
+    """Rank candidates for a parameter; None: the parameter that the data identify least.
 
     Raises: KeyError: the parameter was not fitted.
     """
     order = list(Identified)
-    # Not identified before identified, and the widest interval in the parameters' own scales.
+    # Least identified by verdict, then the widest interval in the scale t.
     least = max(result.parameters, key=lambda p: (order.index(p.verdict), p.profile.high - p.profile.low))
     chosen = result.parameter(parameter or least.name)
     slopes = np.concatenate(result.optimum.of_all)
@@ -71,7 +71,7 @@ def next_measurement(result: FitResult, parameter: str | None = None) -> NextMea
 
 
 def _candidates(result: FitResult) -> Iterator[MeasurementCandidate]:
-    """Rows of every kind with derivatives in the columns of `Optimum.of_all`."""
+    """Yield rows of every kind, with derivatives in the columns of `Optimum.of_all`."""
     best = result.optimum
     problem, residuals, t = best.residuals.problem, best.residuals, best.t
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
@@ -108,18 +108,18 @@ def _candidates(result: FitResult) -> Iterator[MeasurementCandidate]:
 
 
 def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
-    """All rows of a kind's grid, each a series of its own."""
+    """All rows of a kind's grid, each a separate series."""
     grid = dict(KINDS[kind].offers(scene))
     if measured is not None:
         for name in ("gas_time", "pressure_difference", "unbalance", "voltage"):
             values = measured.columns[name] if name in grid else np.empty(0)
-            # Of runs without trial weight alone the middle says nothing.
+            # Runs without trial weight do not count in the median.
             if np.any(values > 0):
                 grid[name] = [x * float(np.median(values[values > 0])) for x in _BEYOND]
     rows = list(product(*grid.values()))
     count = len(rows)
     columns = {name: np.array([row[i] for row in rows]) for i, name in enumerate(grid)}
-    # What is not set is that of the data's middle, or one where nothing was measured.
+    # Values that are not set: median of the data, or one without data.
     named = {c.name for c in KINDS[kind].columns if c.measured or c.amplitude}
     middles, widths = dict.fromkeys(named - {"mass"}, 1.0), {}
     if measured is not None:
@@ -152,11 +152,11 @@ def _words_of(offered: Observations, row: int) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasurementCandidate:
-    """A measurement that could be made."""
+    """Possible next measurement."""
 
     text: str
     derivatives: FloatArray
-    """Derivatives of its predictions by the parameters, over the standard deviation, shape (m, p)."""
+    """Derivatives of its m predictions by the p unknowns, over the standard deviation, shape (m, p)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,12 +165,12 @@ class _Gain:
 
     candidate: str
     before: float
-    """Standard deviation; infinite where nothing is known."""
+    """Standard deviation before; infinite if not determined."""
     after: float
 
     @property
     def ratio(self) -> float:
-        """Width of the interval after over before; zero where it was infinite and is no longer."""
+        """Ratio of interval widths, after over before; zero if only the one before is infinite."""
         return 1.0 if self.after == self.before else self.after / self.before
 
 
@@ -196,7 +196,7 @@ def _expected_gains(
 
 
 def _deviation(information: FloatArray, parameter: int) -> float:
-    """Standard deviation of one parameter; infinite where a direction with it in is not determined."""
+    """Standard deviation of one parameter; infinite if an undetermined direction contains it."""
     scale = np.sqrt(np.diag(information))
     if not scale[parameter] > 0:
         return float("inf")

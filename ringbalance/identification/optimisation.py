@@ -1,4 +1,4 @@
-"""The parameters of the largest likelihood, with the noise of each group, from several starts."""
+"""Maximum-likelihood parameters, with the noise of each group, from several starts."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ from ringbalance.identification.parameters import FitError, inputs_of
 from ringbalance.scene.arrays import FloatArray
 
 _FIRST_NOISE: Final = 0.02
-"""Ratio to the root mean square of a group's data at which the search for its noise begins."""
+"""Initial noise over the root mean square of a group's data."""
 _LEAST_NOISE: Final = 1e-9
-"""Ratio to the root mean square of a group's data below which the data agree to round-off."""
+"""Smallest noise over the root mean square of a group's data; below it the data agree to round-off."""
 _ROUNDS: Final = 25
-"""Iterations of noise, or of robust weights."""
+"""Largest number of iterations of noise or robust weights."""
 _AGREES: Final = 1e-3
-"""Relative change of the noise at which it is found."""
+"""Relative change of the noise at which its iteration ends."""
 _EVALUATIONS: Final = 40
 _NO_EFFECT: Final = 1e-3
-"""Effect in standard deviations of the data, in all, below which a held input is left out."""
+"""Norm of the effect of a held input, in standard deviations of the data, below which it is left out."""
 _NEARBY: Final = 1e-2
-"""Change of the sum of squares, relative or of few standard deviations, that tells one start's minimum from
-another's."""
+"""Difference of the sums of squares, relative or in few standard deviations, beyond which the minima of two
+starts count as different."""
 _START_DISTANCE: Final = 1.0
-"""Distance in t of a further start, in prior standard deviations or, without a prior, in half of ln 2."""
+"""Distance of a further start in t, in prior standard deviations or, without a prior, in units of (ln
+2)/2."""
 _MAX_START_REACH: Final = 0.35
 _LEAST_GAIN: Final = 1e-8
-"""Gain of the sum of squares below which a step to the optimum is not taken: a ten-thousandth of a standard
-deviation of a parameter."""
+"""Reduction of the sum of squares below which the search ends: a ten-thousandth of a standard deviation of a
+parameter."""
 _ROBUST: Final = 1.345
-"""Residual over its standard deviation from which soft_l1 bends, for 95 % efficiency."""
+"""Residual in standard deviations beyond which soft_l1 becomes linear, for 95 % efficiency."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,7 +45,7 @@ class Optimum:
 
     t: FloatArray
     residuals: Residuals
-    """Residuals with the noise that they have there."""
+    """Residuals with the noise at the optimum."""
     freedom: FloatArray
     """Degrees of freedom of each estimated group."""
     starts: int
@@ -66,7 +67,7 @@ class Optimum:
 
     @cached_property
     def of_all(self) -> tuple[FloatArray, FloatArray]:
-        """Slopes by parameters, b and n: of the data, and of what is known beforehand, priors and n."""
+        """Slopes by parameters, b and n: of the data, and of the priors and n."""
         residuals, priors = self.residuals, self.residuals.problem.prior_slopes(self.t)
         count, held = self.residuals.problem.measured.size, self.residuals.held.shape[1]
         data = np.hstack([residuals.scale[:, None] * self.of_prediction, residuals.linear[:count]])
@@ -82,7 +83,7 @@ def optimum(
     """Maximise the likelihood over parameters and noise.
 
     The noise follows the residuals by s_g^2 = |e_g|^2/(n_g - sum h), h the leverages: restricted maximum
-    likelihood, which counts what parameters, priors and held inputs take up.  A robust loss weighs each
+    likelihood, which accounts for parameters, priors and held inputs.  A robust loss weighs each
     number by 1/sqrt(1 + (e/c s)^2) with its residual e, and takes s from the median of |e|.
     Args: `held`: effects of held inputs. `loss`: "linear" or "soft_l1". `starts`: searches from the scene and
         from around it. `before`: an optimum to begin at instead.
@@ -96,7 +97,7 @@ def optimum(
     pulled = before.residuals.pulled if before is not None and same else np.zeros(held.shape[1])
     residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights, pulled=pulled)
     if before is None:
-        # Points around the scene's, within the bounds, by a quasi-random sequence.
+        # Quasi-random points around that of the scene, within the bounds.
         low, high = problem.bounds
         ratio, size = 2.0, problem.start.size
         for _ in range(30):
@@ -126,9 +127,9 @@ def optimum(
 
 
 def optimum_as_stated(problem: Problem, *, loss: str, starts: int) -> tuple[Optimum, dict[str, float]]:
-    """The optimum with held inputs as stated, and the standard deviations of those that count.
+    """Optimum with held inputs as stated, and the standard deviations, SI, of inputs with an effect.
 
-    Raises: FitError: as `optimum`.
+    Raises: FitError: see `optimum`.
     """
     inputs = inputs_of(problem.scene)
     held = inputs.held([each.name for each in problem.parameters])
@@ -153,7 +154,7 @@ def _first_noise(problem: Problem) -> FloatArray:
 def _settled_noise(
     residuals: Residuals, t: FloatArray, of_prediction: FloatArray, loss: str
 ) -> tuple[Residuals, FloatArray]:
-    """The noise, and the weights of a robust loss, that go with the residuals at t."""
+    """Residuals with converged noise and robust weights at t, and degrees of freedom by group."""
     problem, predicted = residuals.problem, residuals.problem.at(t)
     freedom = np.zeros(len(problem.estimated_groups))
     for _ in range(_ROUNDS):
@@ -171,7 +172,7 @@ def _settled_noise(
             if loss == "linear":
                 noise[g] *= math.sqrt(float(np.sum(errors[mine] ** 2)) / float(freedom[g]))
             else:
-                # The median of a normal quantity's size is 0.6745 of its standard deviation.
+                # The median magnitude of a normal quantity is 0.6745 standard deviations.
                 size = float(np.median(np.abs(errors[mine]))) / 0.6745
                 noise[g] *= size * math.sqrt(np.count_nonzero(mine) / float(freedom[g]))
         floor = _LEAST_NOISE / _FIRST_NOISE * _first_noise(problem)
@@ -187,14 +188,14 @@ def _settled_noise(
 def searched(
     residuals: Residuals, t: FloatArray, *, gain: float, fixed: int | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Least sum of squares nearby, by trust regions.
+    """Local minimum of the sum of squares, by a trust-region method.
 
-    Args: `t`: where to begin, with the value of a parameter that is held `fixed`. `gain`: of the sum of
-        squares, below which a step is not taken.
-    Returns: t, and the residuals and priors there.
+    Args: `t`: start, with the value of a `fixed` parameter. `gain`: reduction of the sum of squares below
+        which the search ends. `fixed`: index of a parameter that is not varied.
+    Returns: t, and residuals and priors at t.
     """
     problem, free = residuals.problem, np.arange(t.size) != fixed
-    # What is reported needs the slopes that central differences give; a profile's other parameters do not.
+    # Reported optima need central differences; profiles do not.
     differences = problem.slopes if fixed is None else problem.quick_slopes
 
     def full(part: FloatArray) -> FloatArray:

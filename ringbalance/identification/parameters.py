@@ -1,10 +1,10 @@
-"""Parameters of a fit: quantities of a scene, each on a scale on which its effect is nearly linear.
+"""Parameters of a fit: quantities of a scene, each on a scale with a nearly linear effect.
 
 Positive quantities are fitted by their logarithm, ln x.  A loss coefficient acts through k + 1, so it is
 fitted by ln g (x + c): c = 1 for a prescribed k; for an extra loss such that it is ln(k + 1) to first order.
 Angles, positions and the pressure of the cavity are linear.  The prior of a parameter is the scene's
 [uncertainty]: a normal distribution of the quantity itself, of standard deviation U/1.96, which enters each
-fit once.  Where the scene states none of the factor on lambda, it is what the geometry tells: moments are
+fit once.  Without a stated uncertainty of the lambda factor its prior follows from the geometry: moments are
 hydrostatics of a known chamber.
 """
 
@@ -41,11 +41,11 @@ from ringbalance.scene.uncertain import (
 
 
 class FitError(ValueError):
-    """A fit that cannot be made; the text says why, and what to change."""
+    """Fit that is not possible; the text gives the reason and the remedy."""
 
     @classmethod
     def unknown(cls, name: str, allowed: Sequence[str]) -> FitError:
-        """The error for a name that cannot be fitted."""
+        """Error for a name that cannot be fitted."""
         hint = did_you_mean(name, allowed)
         return cls(f'"{name}" cannot be fitted{hint}; allowed: {", ".join(allowed)}')
 
@@ -56,24 +56,24 @@ class Parameter:
 
     name: str
     symbol: str
-    """In a combination, such as "(k + 1)"."""
+    """Symbol in a combination, such as "(k + 1)"."""
     start: float
     """Value of the scene, SI."""
     lowest: float
-    """SI."""
+    """Lower bound, SI."""
     highest: float
     prior: float | None
-    """Standard deviation, SI, of what is known beforehand; None: nothing is."""
+    """Standard deviation of the prior, SI; None: no prior."""
     by_geometry: bool = False
-    """True where that follows from the geometry, and the scene states nothing."""
+    """True if the prior follows from the geometry, without a statement in the scene."""
     offset: float = 0.0
-    """c of ln(x + c), SI."""
+    """c of ln g (x + c), SI."""
     gain: float = 1.0
     """g of ln g (x + c)."""
     scale: float | None = None
     """Scale of a linear parameter, SI; None: logarithmic."""
     change: Callable[[Any, float], Any]
-    """The scene with another value."""
+    """Function from a scene and a value, SI, to the scene with that value."""
 
     def inner(self, value: float) -> float:
         """t of a value, SI."""
@@ -89,12 +89,12 @@ class Parameter:
 
     @classmethod
     def of(cls, scene: Scene, name: str) -> Parameter:
-        """A quantity of a liquid-ring scene as a parameter.
+        """Quantity of a liquid-ring scene as a parameter.
 
-        Raises: FitError: no such quantity, or one that the scene gives no value to start from.
+        Raises: FitError: no such quantity, or no value in the scene to start from.
         """
         if name in START:
-            # Of the vibration without trial weight nothing is known beforehand.
+            # No prior for the vibration without trial weight.
             start, is_angle = float(getattr(scene.rotor, name)), name == "initial_phase"
             ends = (
                 (start - math.pi, start + math.pi)
@@ -123,7 +123,7 @@ class Parameter:
             raise FitError(f"the scene has no {path}: give a value to start from to fit it")
         width, by_geometry = half_widths(scene).get(name), False
         if width is None and name == "lambda_factor":
-            # That of a mesh has facets, too.
+            # A mesh adds the error of its facets.
             facets = drawing_shares(disc, np.array([disc.initial_fill])).moment
             width, by_geometry = value * math.hypot(_GEOMETRY, float(facets[0])), True
         (offset, gain), ambient = _loss_scale(scene, name), scene.gas.ambient_pressure
@@ -154,18 +154,21 @@ _SYMBOLS: Final = {
     "influence_coefficient": "kappa",
 }
 _REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central_angle": 1.1, "speed": 1.1}
-"""Factor up to which a logarithmic parameter is looked for."""
+"""Largest factor between a logarithmic parameter and its start."""
 _RANGE_FACTOR: Final = 30.0
 _ANGLE: Final = "rad"
 _AMPLITUDE_FACTOR: Final = 1000.0
-"""Factor up to which the amplitude of a vibration is looked for."""
+"""Largest factor between the amplitude of a vibration and its start."""
 START: Final = ("initial_amplitude", "initial_phase")
-"""Parameters that belong to the measurement and not to the device."""
+"""Parameters of the measurement, not of the device."""
 _LOSS_STEP: Final = 0.01
 _GEOMETRY: Final = 0.05
-"""Relative expanded uncertainty (95 %) of lambda by a geometry of exact dimensions: fillets, ports and plates
-that no key has, liquid in the legs of the tube, and gravity, which `calibrate` puts at 0.1 % for the bundled
-discs. Tolerances of the dimensions are inputs of their own, and in all intervals."""
+"""Relative expanded uncertainty (95 %) of lambda from exact dimensions.
+
+It covers fillets, ports and plates without a key, liquid in the legs of the tube, and gravity, 0.1 % by
+`calibrate` for the bundled discs. Tolerances of the dimensions are separate inputs, included in all
+intervals.
+"""
 
 
 def _with_quantity(name: str, scene: Scene, value: float) -> Scene:
@@ -200,7 +203,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
 
 
 def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float, float]:
-    """Smallest and largest value that the scene's rules allow, or within reach of the start."""
+    """Lower and upper bound, SI, by the rules of the scene or by a factor on the start."""
     tube, disc, ambient = scene.tube, scene.disc, scene.gas.ambient_pressure
     fixed = {
         "lag_angle": (start - math.pi, start + math.pi),
@@ -223,33 +226,33 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
 
 
 class _SceneInputs:
-    """Quantities of a scene that a fit may move, through its `Balancer`, by their paths, such as
-    "rotor.damping" and "masses.friction_arm[0]"."""
+    """Quantities of a scene that a fit may vary, from its `Balancer`, by path, such as "rotor.damping" and
+    "masses.friction_arm[0]"."""
 
     def __init__(self, scene: Any) -> None:
         self.scene = scene
 
     @cached_property
     def inputs(self) -> Mapping[str, Input]:
-        """Quantities that may be uncertain and that the scene has, by name."""
+        """Quantities of the scene that may be uncertain, by name."""
         return {each.path: each for each in balancer_of(self.scene).inputs()}
 
     @property
     def models(self) -> Models | None:
-        """Models that predictions take; None where there is but one."""
+        """Models for predictions; None if there is no choice of models."""
         return None
 
     @cached_property
     def errors(self) -> Mapping[str, Uncertainty]:
-        """Errors of the models of what was built, by name."""
+        """Model errors of the built device, by name."""
         return {}
 
     def named(self, name: str) -> Sequence[str]:
-        """Its own names of what kinds of data inform, as the liquid ring names that."""
+        """Names in this scene of a quantity that a kind of data informs, given by its liquid-ring name."""
         return [path for path in self.inputs if name in (path, path.rpartition(".")[2])]
 
     def parameter(self, name: str) -> Parameter:
-        """Raises: FitError: a name that cannot be fitted."""
+        """Parameter by name. Raises: FitError: a name that cannot be fitted."""
         if name not in self.inputs:
             raise FitError.unknown(name, tuple(self.inputs))
         quantity = self.inputs[name]
@@ -268,26 +271,25 @@ class _SceneInputs:
         )
 
     def parameters(self, names: Sequence[str]) -> tuple[Parameter, ...]:
-        """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
+        """Parameters by name. Raises: FitError: no name, a repeated one, or one that cannot be fitted."""
         if not names or len(set(names)) < len(names):
             raise FitError("name at least one parameter, and each once")
         return tuple(self.parameter(name) for name in names)
 
     def informed(self, data: Sequence[Observations]) -> list[str]:
-        """Parameters that data inform."""
+        """Names of the parameters that data inform."""
         names = (name for each in data for name in KINDS[each.kind].informs(each))
         return list(dict.fromkeys(path for name in names for path in self.named(name)))
 
     def held(self, fitted: Sequence[str]) -> dict[str, float]:
-        """Standard deviation, SI, of every uncertain quantity that is not fitted, and of what models may be
-        off by."""
+        """Standard deviation of every uncertain quantity that is not fitted, SI, and of model errors, 1."""
         widths = {n: each.half_width / NORMAL_95 for n, each in self.inputs.items() if n not in fitted}
         return {name: sd for name, sd in widths.items() if sd} | dict.fromkeys(self.errors, 1.0)
 
     def changed(self, name: str, change: float) -> SceneFile:
-        """The scene with one uncertain quantity changed, SI, as far as a device can have it.
+        """Scene with one uncertain quantity changed, within physical limits.
 
-        Of a model's error in its standard deviations.
+        Args: `change`: SI; for a model error, in its standard deviations.
         """
         quantity = self.inputs[name]
         lowest = -math.inf if quantity.unit == _ANGLE else 0.1 * quantity.value
@@ -295,19 +297,19 @@ class _SceneInputs:
         return moved
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
-        """The scene with one of these lower and higher by a change; or as it is, where one side will do."""
+        """Scene with one quantity lower, or unchanged if one side suffices, and higher by a change."""
         return self.changed(name, -change), self.changed(name, change)
 
 
 class _LiquidRingInputs(_SceneInputs):
-    """Quantities go by their keys, such as "bore"."""
+    """Quantities of a liquid-ring scene by key, such as "bore"."""
 
     scene: Scene
 
     @cached_property
     def inputs(self) -> Mapping[str, Input]:
         by_key = {key: each for path, each in super().inputs.items() if (key := path.partition(".")[2])}
-        # A mesh has no plates, and may not be stretched by all of its dimensions.
+        # A mesh has no plates, and some of its dimensions cannot be changed.
         return {
             key: by_key[key] for key in by_key if nominal_value(scene=self.scene, quantity=key) is not None
         }
@@ -321,7 +323,7 @@ class _LiquidRingInputs(_SceneInputs):
         return {each.name: each for each in model_uncertainties(self.scene, built=True)}
 
     def named(self, name: str) -> Sequence[str]:
-        """A prescribed k stands in for the loss that it leaves out."""
+        """Name in the scene: a prescribed k replaces the extra loss."""
         prescribed = self.scene.tube.drag_coefficient is not None
         return ["drag_coefficient" if prescribed and name == "extra_loss" else name]
 
@@ -335,7 +337,7 @@ class _LiquidRingInputs(_SceneInputs):
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
         error = self.errors.get(name)
-        # Errors of models are nearly linear, and there are many, but a crest's arc has two different ends.
+        # Model errors are many and nearly linear: one side suffices, except for the arc at the crest.
         if error is None or error.group == f"{MODEL}{CREST_ERROR}":
             return super().both_sides(name, change)
         # All have the places of all, so that they differ in numbers alone.
@@ -343,15 +345,15 @@ class _LiquidRingInputs(_SceneInputs):
 
 
 _INPUTS: Final[Mapping[str, type[_SceneInputs]]] = {Scene.balancer: _LiquidRingInputs}
-"""By the name of the balancer; the others have nothing but their `Balancer`."""
+"""Class by name of the balancer; `_SceneInputs` for all others."""
 
 
 def inputs_of(scene: SceneFile) -> _SceneInputs:
-    """Quantities of a scene that a fit may move."""
+    """Quantities of a scene that a fit may vary."""
     return _INPUTS.get(scene.balancer, _SceneInputs)(scene)
 
 
 def path_of(name: str) -> str:
-    """Place in the scene of what fits name "bore"; of eccentric masses the name is one."""
+    """Path in the scene of a parameter, such as "tube.bore" of "bore"; names that are paths are unchanged."""
     table = UNCERTAIN_QUANTITIES.get(name)
     return name if table is None else f"{table}.{name}"

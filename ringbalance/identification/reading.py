@@ -1,8 +1,8 @@
-"""From files of measurements to observations of a kind, or everything that is wrong with them.
+"""Files of measurements read into observations of a kind, with all errors of a file reported together.
 
-What a file states of the uncertainty of its measured columns: 95 %, absolute, SI, row by row. `KINDS` has
-every kind by its name in the data, for `fit` and `verify --data`; `template` makes an empty file of one. A
-new kind is one entry in the module of its balancer, or of test benches.
+Uncertainties of measured columns are converted to 95 %, absolute, SI, row by row. `KINDS` has every kind by
+its name in the data, for `fit` and `verify --data`; `template` makes an empty file of one. A new kind is one
+entry in the module of its balancer, or of test benches.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ _TEXTS: Final = (
 )
 """Keys of the first lines that hold text."""
 _ROUNDED: Final = 0.01
-"""Relative rounding of a full chamber's fill, as it may be written down."""
+"""Relative rounding error allowed in the fill of a full chamber."""
 
 
 def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -> tuple[Observations, ...]:
-    """The observations of each file, for a scene; for none those of test benches.
+    """Observations of each file, for a scene; without a scene, those of test benches.
 
-    Raises: SceneError: all that is wrong with any of the files, each error with line and column.
+    Raises: SceneError: all errors of all files, each with line and column.
     """
     faults: list[Fault] = []
     files: list[Observations] = []
@@ -67,7 +67,7 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -
             problem = f"it has the same content as {first[each.sha256]}; give it once"
             faults.append(data_fault(each.file, "", problem))
         first.setdefault(each.sha256, each.file)
-    # The [uncertainty] of a scene that was fitted to a file has what it says.
+    # The [uncertainty] of a scene that was fitted to a file already contains its information.
     fitted = set() if scene is None else {file.sha256 for file in scene.measured.files}
     for each in files:
         if scene is not None and each.sha256 in fitted:
@@ -82,7 +82,7 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -
 def observations_of(
     content: bytes, *, file: str, scene: AnyScene | None = None
 ) -> tuple[Observations | None, tuple[Fault, ...]]:
-    """The observations of a file's bytes, or all that is wrong with it."""
+    """Observations from the bytes of a file, or None, and all its errors."""
     text, undecoded = decoded(content, file=file)
     if undecoded:
         return None, undecoded
@@ -103,7 +103,7 @@ def observations_of(
     wrong += _repeated(table) if kind.balancer else ()
     if wrong:
         return None, tuple(wrong)
-    # Amplitudes as the file's convention has them become zero to peak.
+    # From the file's convention of amplitudes to zero to peak.
     factor = AMPLITUDES[str(table.header.get(_AMPLITUDE, "zero_to_peak")).lower()]
     letters = table.texts("chamber") if kind.has_chamber else ("",) * len(table.rows)
     used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
@@ -189,7 +189,7 @@ def _head_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
 
 
 def _columns(table: CsvTable, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
-    """Every column of numbers, SI, and the errors of its cells."""
+    """Every column of numbers, SI, and the errors of the cells."""
     columns: dict[str, FloatArray] = {}
     faults: list[Fault] = []
     for head in table.heads:
@@ -213,7 +213,7 @@ def _columns(table: CsvTable, kind: Kind) -> tuple[dict[str, FloatArray], list[F
 def _faults_of_scene(
     table: CsvTable, kind: Kind, scene: AnyScene | None, columns: Mapping[str, FloatArray]
 ) -> Iterator[Fault]:
-    """Chambers that the disc does not have, and fills of a driven one beyond the liquid of its pair."""
+    """Yield errors: chambers that the disc does not have, and fills beyond the liquid of the pair."""
     if scene is None or not (kind.has_chamber or kind.column("gas_time")):
         return
     disc = liquid_ring_scene(scene).disc
@@ -232,7 +232,7 @@ def _faults_of_scene(
 
 
 def _repeated(table: CsvTable) -> Iterator[Fault]:
-    """Rows that stand twice: as evidence they would count twice."""
+    """Yield errors for repeated rows, which would count twice."""
     first: dict[tuple[str, ...], int] = {}
     for line, row in zip(table.lines, table.rows, strict=True):
         if first.setdefault(row, line) != line:
@@ -251,10 +251,10 @@ def _zero_to_peak(columns: Mapping[str, FloatArray], kind: Kind, factor: float) 
 def _stated_uncertainty(
     table: CsvTable, kind: Kind, columns: Mapping[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], list[Fault]]:
-    """Expanded uncertainty of each measured column for which the file states one.
+    """Stated expanded uncertainty of each measured column, and errors.
 
-    A column `uncertainty_<name>` comes before a column `uncertainty`, that before the key of the first lines.
-    A relative uncertainty of a vibration is that of both its components, so that its phase has it in radians.
+    A column `uncertainty_<name>` takes precedence over a column `uncertainty`, and that over the key in the
+    first lines. A relative uncertainty of a vibration applies to both components, to its phase in radians.
     """
     measured = {column.name: column for column in kind.measured if column.name in columns}
     stated, result, faults = table.header.get(_UNCERTAINTY), {}, []
@@ -288,14 +288,14 @@ def _stated_uncertainty(
         result = {name: columns[_UNCERTAINTY] * _size(kind, columns, name) for name in measured}
     by_column = {name: columns.get(f"{_UNCERTAINTY}_{name}") for name in measured}
     result |= {name: width for name, width in by_column.items() if width is not None}
-    # A relative uncertainty of a value of zero says that the value is exact.
+    # Relative to a value of zero, the uncertainty would be zero and the value exact.
     for name, width in result.items():
         for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
             if value == 0 and each == 0:
                 problem = f"{name} is 0 there, so its uncertainty cannot be relative"
                 allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
                 faults.append(data_fault(table.file, f"line {line}", problem, allowed=allowed))
-    # The noise of vibrations is given or estimated, all amplitudes of a file alike.
+    # The noise of vibrations is stated for all amplitudes of a file or for none.
     missing = [column.name for column in kind.measured if column.amplitude and column.name not in result]
     if result and missing:
         problem = f"stated of {', '.join(result)} and not of {', '.join(missing)}"
@@ -313,18 +313,18 @@ def _size(kind: Kind, columns: Mapping[str, FloatArray], name: str) -> FloatArra
 AMPLITUDES: Final[Mapping[str, float]] = MappingProxyType(
     {"zero_to_peak": 1.0, "peak_to_peak": 0.5, "rms": 2**0.5}
 )
-"""Convention of an amplitude to the factor that makes it zero to peak; of a harmonic vibration."""
+"""Factor to zero to peak, by convention of amplitude, for a harmonic vibration."""
 KINDS: Final[Mapping[str, Kind]] = MappingProxyType({**LIQUID_RING, **ECCENTRIC_MASS, **BENCH})
 
 
 def kinds_of(balancer: str) -> tuple[str, ...]:
-    """Names of the kinds that the scenes of a balancer predict; of an empty one those of test benches."""
+    """Names of the kinds that scenes of a balancer predict; for an empty name, those of test benches."""
     names = tuple(name for name, kind in KINDS.items() if balancer == kind.balancer)
     return names or tuple(name for name, kind in KINDS.items() if kind.any_rotor)
 
 
 def template(name: str) -> str:
-    """Text of a file of one kind that lacks only its rows; lines that begin with ## explain the columns.
+    """Text of a file of one kind without rows; lines that begin with ## explain the columns.
 
     Raises: SceneError: no such kind.
     """
@@ -332,7 +332,7 @@ def template(name: str) -> str:
         problem, allowed = f"there is no such kind of data{did_you_mean(name, KINDS)}", ", ".join(KINDS)
         raise SceneError.of_option(option="--template", value=name, problem=problem, allowed=allowed)
     kind = KINDS[name]
-    # Of columns of which a file has one, the template has the first.
+    # The template has the first of alternative columns.
     others = kind.one_of[1:]
     lines = [f'# kind = "{name}"  # {kind.title}', '# source = ""  # rig, run and date']
     amplitudes = [column for column in kind.measured if column.amplitude]

@@ -1,13 +1,13 @@
-"""Likelihood of files that are read otherwise than they stand.
+"""Likelihood of files in an alternative reading.
 
     -2 ln L = sum (e/s)^2 + priors + 2 sum n_g ln s_g + ln det A'A - 2 ln det L^-1 - 2 ln |dy'/dy|,
 
-restricted to what parameters, held inputs and free unknowns leave (A their slopes), the noise of each group
-estimated again, y' what was measured as the other reading has it.  The other reading is fitted linearly from
-the scene, so that it loses a little by curvature, and exactly in the influence coefficient and the lag, which
-vibrations are in proportion to; the given one from its optimum.
-Source: restricted likelihood, Harville, J. Am. Stat. Assoc. 72 (1977) 320; slopes of held inputs in
-proportion to the prediction are ours.
+restricted for parameters, held inputs and free unknowns (A their slopes), with the noise of each group
+estimated again and y' the measured numbers in the alternative reading.  That reading is fitted linearly from
+the scene, which costs a little by curvature, but exactly in influence coefficient and lag, to which
+vibrations are proportional; the given reading has its optimum.
+Source: restricted likelihood, Harville, J. Am. Stat. Assoc. 72 (1977) 320; slopes of held inputs are scaled
+with the prediction, an assumption without source.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ from ringbalance.scene.arrays import FloatArray
 
 _ROUNDS: Final = 12
 _AGREES: Final = 1e-2
-"""Relative change of the noise at which it is settled."""
+"""Relative change of the noise at which its iteration ends."""
 _LEAST_NOISE: Final = 1e-6
-"""Ratio of the least noise to the root mean square of a group's data."""
+"""Smallest noise over the root mean square of a group's data."""
 _FREE_SIGMA: Final = 1.0
-"""Standard deviation of a parameter of which nothing is known, in its own scale."""
+"""Standard deviation, in t, of a parameter without a prior."""
 _STEPS: Final = 8
-"""Steps of Newton to the influence coefficient and the lag."""
+"""Largest number of Newton steps for influence coefficient and lag."""
 _SETTLED_CHANGE: Final = 1e-3
-"""Relative change of the influence coefficient at which it is settled."""
+"""Relative change of the influence coefficient at which its iteration ends."""
 _LEAST_CHANCE: Final = 1e-300
 _MIN_FREEDOM: Final = 0.5
-"""Degrees of freedom that a group needs."""
+"""Smallest degrees of freedom of a group."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _ReadingRows:
-    """Numbers of one file before whitening: predicted at the start, slopes, effects of held inputs."""
+    """Numbers of one file before whitening: prediction at the start, slopes, effects of held inputs."""
 
     block: DataBlock
     predicted: FloatArray
@@ -56,7 +56,7 @@ class _ReadingRows:
 
     @property
     def vibration(self) -> bool:
-        """True where its numbers are real and imaginary parts, in proportion to the influence coefficient."""
+        """True if the numbers are real and imaginary parts, proportional to the influence coefficient."""
         return self.block.measured.size == 2 * len(self.block.observations)
 
     def times(self, factor: complex) -> _ReadingRows:
@@ -79,22 +79,22 @@ class _ReadingRows:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReadingComparison:
-    """Likelihood of a fit's files as they stand, and as other readings of them would have it."""
+    """Comparison of a fit's files as given with alternative readings, by likelihood."""
 
     problem: Problem
     rows: tuple[_ReadingRows, ...]
     deviance: float
-    """-2 ln L of the files as they stand."""
+    """-2 ln L of the files as given."""
     pulled: FloatArray
-    """Held inputs at which predictions are made, in standard deviations."""
+    """Held inputs of the predictions, in standard deviations."""
     changed: dict[tuple[int, tuple[str, ...]], _ReadingRows | None]
-    """Rows of each file, by what a reading has been set to; None where nothing can be predicted of it."""
+    """Cached rows by file and changed settings; None if they cannot be predicted."""
     refits: dict[tuple[Joint, tuple[int, ...]], float]
-    """Gains by fits that were made before."""
+    """Cached gains of complete fits."""
 
     @classmethod
     def of(cls, best: Optimum) -> ReadingComparison:
-        """Predictions and slopes about the scene's values, and the fit that readings are compared with."""
+        """Comparison with a fit, from predictions and slopes at the scene's values."""
         problem, start = best.residuals.problem, best.residuals.problem.start
         values = (problem.at(start)[:, None], problem.quick_slopes(start), best.residuals.held)
         parts = zip(problem.blocks, *(_unwhitened(problem, each) for each in values), strict=True)
@@ -105,7 +105,8 @@ class ReadingComparison:
         )
 
     def gain(self, joint: Joint, chosen: Sequence[int]) -> float | None:
-        """Gain of the log likelihood by reading some files otherwise; None where nothing can be predicted."""
+        """Gain of the log likelihood by an alternative reading of some files; None if it cannot be
+        predicted."""
         rows = list(self.rows)
         for i in chosen:
             changed = self._changed(joint, i)
@@ -118,14 +119,14 @@ class ReadingComparison:
         return gain if math.isfinite(gain) else None
 
     def jacobian(self, joint: Joint, chosen: Sequence[int]) -> float:
-        """ln |dy'/dy|."""
+        """ln |dy'/dy| of an alternative reading of some files."""
         size = sum(self.rows[i].block.measured.size for i in chosen)
         return size * sum(math.log(each.scale) for each in joint)
 
     def refitted(self, joint: Joint, chosen: tuple[int, ...], scene: Any) -> float:
-        """Gain by a fit from the scene as stated; minus infinity where there is none.
+        """Gain by a complete fit from the scene as stated; minus infinity if there is none.
 
-        The scene to which wrong readings pull held inputs is far from where another reading has them.
+        A wrong reading pulls held inputs far from their values in another reading.
         """
         if (joint, chosen) in self.refits:
             return self.refits[joint, chosen]
@@ -143,14 +144,14 @@ class ReadingComparison:
 
     @cached_property
     def _response(self) -> list[int]:
-        """Columns of influence coefficient and lag; empty where predictions are not in proportion to them."""
+        """Columns of influence coefficient and lag; empty if any prediction is not proportional to them."""
         wanted = [_column_of(self.problem, name) for name in ("influence_coefficient", "lag_angle")]
         columns = [column for column in wanted if column is not None]
         others = (rows.slopes[:, columns] for rows in self.rows if not rows.vibration)
         return [] if len(columns) < len(wanted) or any(map(np.any, others)) else columns
 
     def _starts(self, problem: Problem, rows: Sequence[_ReadingRows]) -> Iterator[FloatArray]:
-        """t of the scene, and with the influence coefficient that explains the vibrations best."""
+        """Yield t of the scene, and t with the influence coefficient that explains the vibrations best."""
         yield problem.start
         if not self._response:
             return
@@ -167,14 +168,14 @@ class ReadingComparison:
             yield self._moved(problem.start, complex(real, imaginary))
 
     def _moved(self, t: FloatArray, factor: complex) -> FloatArray:
-        """t at another influence coefficient."""
+        """t with the influence coefficient multiplied by a factor."""
         moved = t.copy()
         if factor != 0:
             moved[self._response] += math.log(abs(factor)), -cmath.phase(factor)
         return moved
 
     def _deviance(self, problem: Problem, rows: Sequence[_ReadingRows], t: FloatArray) -> float:
-        """-2 ln L, linear in all but the response of the rotor."""
+        """-2 ln L, linearised except in influence coefficient and lag."""
         deviance = math.inf
         for _ in range(_STEPS):
             factor = 1.0 + 0j
@@ -196,7 +197,8 @@ class ReadingComparison:
         return deviance
 
     def _changed(self, joint: Joint, i: int) -> _ReadingRows | None:
-        """Rows of a file that is read otherwise, as far as it can be; None where nothing can be predicted."""
+        """Rows of a file in an alternative reading, as far as that applies; None if they cannot be
+        predicted."""
         rows, problem = self.rows[i], self.problem
         observations = rows.block.observations
         settings: tuple[str, ...] = ()
@@ -214,7 +216,7 @@ class ReadingComparison:
             except ValueError:
                 self.changed[i, settings] = None
             else:
-                # Effects of held inputs are turned and stretched with the prediction of each row.
+                # Effects of held inputs are rotated and scaled with the prediction of each row.
                 before, after, held = (
                     values[: len(values) // 2] + 1j * values[len(values) // 2 :] if rows.vibration else values
                     for values in (rows.predicted, predicted, rows.held)
@@ -247,7 +249,7 @@ def _column_of(problem: Problem, name: str) -> int | None:
 
 
 def passive(lag: float) -> bool:
-    """True for a lag, rad, that a passive rotor can have: from 0 to 180 degrees."""
+    """Return True for a lag, rad, of a passive rotor: from 0 to 180 degrees."""
     return lag % (2 * math.pi) <= math.pi
 
 
@@ -259,13 +261,13 @@ def _settled(
     held: FloatArray,
     pulled: FloatArray,
 ) -> tuple[float, FloatArray]:
-    """-2 ln L of the problem linearised at t, and the step to its optimum, with the noise settled.
+    """-2 ln L of the problem linearised at t, with converged noise, and the step to its optimum.
 
-    Infinite where a group has no freedom left.
+    Infinite if a group has no degrees of freedom left.
     """
     group, groups = problem.group, range(len(problem.estimated_groups))
     design, count = np.hstack([slopes, problem.free, held]), problem.measured.size
-    # What is known beforehand of each unknown, one standard deviation a row, and how far t is off it.
+    # Priors of the unknowns, each row over its standard deviation, and their residuals at t.
     priors = np.zeros((t.size + held.shape[1], design.shape[1]))
     priors[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
     off = np.concatenate([(problem.start - t) / _FREE_SIGMA, -pulled])
@@ -295,7 +297,7 @@ def _settled(
     sizes = np.maximum(np.abs(np.diag(triangle)), 1e-12)
     whitening = sum(float(np.sum(np.log(np.diag(b.whiten)))) for b in problem.blocks)
     chance, lag_column = 1.0, _column_of(problem, "lag_angle")
-    # Probability that the lag lies between 0 and 180 degrees, unless the scene has it outside.
+    # Probability of a lag between 0 and 180 degrees, unless that of the scene lies outside.
     if lag_column is not None and passive(problem.parameters[lag_column].start):
         lag = (float(t[lag_column] + step[lag_column]) + math.pi / 2) % (2 * math.pi) - math.pi / 2
         vibrations = {b.group for b in problem.blocks if b.measured.size == 2 * len(b.observations)}

@@ -1,16 +1,16 @@
-"""Other readings of the data: columns exchanged, angles the other way round, units that are mixed up.
+"""Alternative readings of the data: exchanged columns, reversed angles, wrong units.
 
-A wrong reading seldom leaves a pattern in the residuals: the noise is estimated and takes what the prediction
-does not explain.  So every file is read otherwise too, and the likelihoods of both readings are compared.
+A wrong reading seldom leaves a pattern in the residuals: the estimated noise absorbs whatever the prediction
+does not explain.  Therefore the likelihoods of alternative readings of every file are compared.
 
 Angles are read in all senses together: phases p, trial weights w and chambers c, each with the rotation or
 against it, times the factor of the amplitude.  V = V0 + kappa exp(-j lag) U with all angles conjugated is V
-again, with the lag's sign changed: so p w c is the given reading with -lag, p is w c, and so on.  Only what
-is known of the lag tells such two apart: its prior, and that a passive rotor lags by 0 to 180 degrees, whose
-probability by the reading's own fit multiplies its likelihood.
+again, with the lag's sign changed: so p w c is the given reading with -lag, p is w c, and so on.  Only
+knowledge of the lag distinguishes such two: its prior, and the fact that a passive rotor lags by 0 to 180
+degrees, whose probability by the fit of the reading multiplies its likelihood.
 
-A reading is named from a gain of `_DECISIVE` on: of thirty, and one file in a hundred read wrongly, odds of
-100 to 1 are left.  Senses of angles that are not less likely by `_TELLS` are called undecided.
+A reading is named from a gain of `_DECISIVE` on: with thirty readings, and one file in a hundred misread,
+odds of 100 to 1 remain.  Senses of angles that are less likely by less than `_TELLS` count as undecided.
 """
 
 from __future__ import annotations
@@ -36,29 +36,31 @@ from ringbalance.identification.reading_likelihood import ReadingComparison
 from ringbalance.results.rows import Value, text_of
 
 _SUSPECT_RATIO: Final = 5.0
-"""Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
-a unit, and beyond what a test rig changes."""
+"""Largest plausible ratio of a column's median to the nearer end of the scene's range.
+
+It is smaller than the factor 10 of the smallest unit error, and larger than changes on a test rig.
+"""
 _FAR_VIBRATION: Final = 100.0
-"""Ratio for vibrations, which the scene seldom knows better."""
+"""Largest plausible ratio for vibrations, which scenes seldom state more accurately."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedColumn:
-    """One column of one file."""
+    """Comparison of one column of a file with the range of the scene."""
 
     file: str
     column: str
     unit: str
     """Unit in the template; empty for a number without one."""
     ratio: float
-    """Median of the column over the nearer end of the scene's range; one within it."""
+    """Median of the column over the nearer end of the scene's range; 1 within the range."""
     fails: bool
-    """True where it lies so far off that a unit is wrong, or the machine another one."""
+    """True if the ratio indicates a wrong unit or another machine."""
     text: str
 
 
 def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
-    """Columns of the files against the ranges of the scene."""
+    """Compare columns of the files with the ranges of the scene."""
     for block in problem.blocks:
         observations = block.observations
         ranges = block.kind.ranges(problem.scene)
@@ -88,9 +90,9 @@ def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
 
 
 _DECISIVE: Final = math.log(1e6)
-"""Gain of the log likelihood."""
+"""Gain of the log likelihood from which on a reading is decisively better."""
 _TELLS: Final = math.log(1e3)
-"""Loss of the log likelihood from which a sense of the angles is ruled out."""
+"""Loss of the log likelihood from which on a sense of the angles is ruled out."""
 _CODES: Final = {
     (True, False): "read_otherwise_better",
     (True, True): "read_one_of_several",
@@ -99,33 +101,33 @@ _CODES: Final = {
 }
 """Code of the sentence, by two flags of a reading: named, undecided."""
 _Choice = tuple[Joint, tuple[int, ...]]
-"""A reading, and places of the files that are read so."""
+"""Combined misreadings, and indices of the files to which they apply."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """Files read in another way."""
+    """Alternative reading of one or more files."""
 
     code: str
     """Codes of the misreadings, joined by "+"."""
     files: tuple[str, ...]
     gain: float
-    """Gain of the log likelihood over that of the files as they stand."""
+    """Gain of the log likelihood over that of the files as given."""
     named: bool
-    """True where it fits decisively better, and no other reading better than it does."""
+    """True if the reading fits decisively better, and no other reading much better still."""
     undecided: bool
-    """True where the data cannot tell its sense of the angles from the likeliest one."""
+    """True if the data cannot distinguish its sense of the angles from the most likely one."""
     text: str
 
 
 def other_readings(
     best: Optimum, ranges: Sequence[ComparedColumn] = (), *, stated: Any = None
 ) -> tuple[Reading, ...]:
-    """Every other reading of the data, the likeliest first.
+    """Alternative readings of the data, the most likely first.
 
-    Args: `ranges`: columns compared with the scene. Where those that a reading changes are far from it in all
-        of its files, it is named from the first gain on: a free loss takes up a pressure ten times too large.
-        `stated`: the scene before held inputs are pulled; None: they are not.
+    Args: `ranges`: columns compared with the scene. If the column that a reading changes is far from the
+        scene in all its files, any gain suffices: a fitted loss absorbs a pressure ten times too large.
+        `stated`: scene with held inputs as stated; None: the scene of the fit.
     """
     compare, far = ReadingComparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
     problem = compare.problem
@@ -136,7 +138,7 @@ def other_readings(
         if (gain := compare.gain(joint, chosen)) is not None
     }
     scene = problem.scene if stated is None else stated
-    # Senses that mirror each other differ by the lag alone, which tells less than what is linear may err by.
+    # Mirrored senses differ only in the lag: the difference may be smaller than the error of linearisation.
     widest = {frozenset(joint): (joint, chosen) for joint, chosen in gains if {*joint} <= {*SENSES}}
     most = max((gains[each] for each in widest.values()), default=0.0)
     near = [each for each in widest.values() if gains[each] > most / 2]
@@ -151,9 +153,9 @@ def other_readings(
     for ((joint, _), gain), where in zip(ordered, files, strict=True):
         least_gain = 0.0 if all((file, joint[0].column) in far for file in where) else _DECISIVE
         named.append(gain > likeliest - _TELLS and gain >= least_gain)
-    # A better one that is not named hides none behind it.
+    # No reading is named if a better one is not.
     named = named if any(named[:1]) else [False] * len(named)
-    # The given reading fitted as the others are, which curvature costs as much.
+    # The given reading, fitted linearly like the others for a fair comparison.
     least = min(compare.gain((), ()) or 0.0, 0.0) - _TELLS
     readings = []
     for ((joint, _), gain), where, is_named in zip(ordered, files, named, strict=True):
@@ -177,10 +179,10 @@ def other_readings(
 def _without_idle_factors(
     compare: ReadingComparison, gains: Mapping[_Choice, float], scene: Any
 ) -> dict[_Choice, float]:
-    """Gains of readings whose factor of the amplitude the parameters do not take up as well.
+    """Gains without readings whose factor on the amplitude brings no decisive gain.
 
-    It has to pay beside the sense of the angles alone, and the likeliest after a fit of both, too: where the
-    scene of the fit is pulled far off, what is linear there is wrong by more than a factor gains.
+    The factor must improve on the sense of the angles alone; for the most likely readings also after complete
+    fits of both, since linearisation about a scene that is pulled far off can err by more than the gain.
     """
     remaining = dict(gains)
 
@@ -204,7 +206,7 @@ def _without_idle_factors(
 
 
 def _choices(problem: Problem, joint: Joint) -> Iterator[tuple[int, ...]]:
-    """Places of the files that are read otherwise: each that can be, and all of them."""
+    """Yield indices of files for a reading: each applicable file alone, and all of them together."""
     blocks, scene = list(enumerate(problem.blocks)), problem.scene
     able = [{i for i, b in blocks if part.change(b.observations, scene) is not None} for part in joint]
     yield from ((i,) for i in sorted(set.intersection(*able)))

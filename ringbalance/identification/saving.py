@@ -1,7 +1,7 @@
-"""A fitted scene as a file: the scene with what was measured in the place of what was supposed.
+"""Fitted scene as a file: the scene with measured values in place of assumed ones.
 
-It holds every value as fitted: parameters, the held inputs where the data pull them, and what corrects the
-models of the tube; and, in [fitted], how uncertain all of these are together.
+It has every fitted value: parameters, held inputs as pulled by the data, and corrections of the models of the
+tube; and, in [fitted], the joint uncertainty of all of these.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ _DIGITS: Final = 9
 _PARTS: Final = ("even", "odd")
 _ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
 _LIST_ENTRIES: Final = 2
-"""Entries of a list, one for each mass."""
+"""Number of entries of a list, one for each mass."""
 _RISE_DIGITS: Final = 4
 _TOGETHER: Final = 0.5
-"""Correlation from which two errors are said to go together."""
+"""Correlation beyond which two errors are reported as correlated."""
 _FINDING_CHARACTERS: Final = 200
 _ANY_SIGN: Final = ("lag_angle", "phase")
 """Keys whose uncertainty may be larger than the value."""
@@ -55,9 +55,9 @@ def save_result(
     data: Sequence[Observations],
     said: str = "",
 ) -> Path:
-    """Write the scene that a fit found, see `_fitted_scene`: every key of the scene stays, no comment does.
+    """Write the scene of a fit, see `_fitted_scene`: keys are kept, comments are not.
 
-    Args: `scene`: that was fitted. `said`: the verdict on the fit.
+    Args: `scene`: before the fit. `said`: verdict on the fit.
     Raises: SceneError: the fitted values make no scene. OSError: the file cannot be written.
     """
     files = [
@@ -95,11 +95,11 @@ def _fitted_scene(
     findings: Sequence[MeasuredFinding] = (),
     result: FitResult | None = None,
 ) -> AnyScene:
-    """A scene with fitted values, their uncertainties and origins, checked as a file is.
+    """Scene with fitted values, their uncertainties and origins, checked like a file.
 
-    Held inputs stay as stated where their fitted values make no scene, such as a wall inside the port: those
-    that the error names, else those of the disc, else all.
-    Args: `result`: with what was fitted together, and the scene that has the values of its held inputs.
+    Held inputs remain as stated if their fitted values contradict each other, such as a wall inside the port:
+    those that the error names, else those of the disc, else all.
+    Args: `result`: fit with the joint distribution, and with the values of held inputs in its scene.
     Raises: SceneError: the fitted values make no scene, such as a crest outside the port. ValueError: a path
         that no scene file has.
     """
@@ -129,17 +129,17 @@ def _fitted_scene(
 
 @dataclass(frozen=True, kw_only=True)
 class _SceneKey:
-    """Key of a value in a scene file, and the unit that it is written in."""
+    """Key of a value in a scene file, with its unit there."""
 
     table: str
     key: str
     entry: int | None
-    """Number in a list; None for a single value."""
+    """Index in a list; None for a single value."""
     width: str
-    """Path of its uncertainty."""
+    """Path of the uncertainty of the value."""
     dimension: str | None
     unit: str
-    """Empty for a number without unit."""
+    """Unit in the file; empty for a number without unit."""
 
     @property
     def path(self) -> str:
@@ -147,11 +147,11 @@ class _SceneKey:
         return f"{self.table}.{self.key}"
 
     def written(self, value: float) -> str | float:
-        """A value, SI, as it stands in the file."""
+        """Value, SI, as written in the file."""
         return self.number(value) if self.dimension is None else f"{self.number(value)!r} {self.unit}"
 
     def number(self, value: float) -> float:
-        """A value, SI, in the unit."""
+        """Number of a value, SI, in the file's unit."""
         if self.dimension is None:
             return _rounded(value)
         return float(format_quantity(value, self.dimension, self.unit, digits=_DIGITS).split(" ")[0])
@@ -177,27 +177,27 @@ class _SceneKey:
         }
 
     def difference(self, value: float) -> float:
-        """A difference of two values, SI, in the unit."""
+        """Number of a difference of two values, SI, in the file's unit."""
         return _rounded(value / (unit_factor(self.unit) if self.unit else 1.0))
 
 
 @dataclass
 class _FileChanges:
-    """Values of a scene file that a fit gives, by path, and their origins."""
+    """Changes of a scene file by a fit: values by path, and their origins."""
 
     scene: AnyScene
     values: dict[str, Any] = field(default_factory=dict)
     origins: dict[str, dict[str, Origin]] = field(default_factory=dict)
 
     def before(self, path: str) -> Any:
-        """Value of the file at a path; None for nothing."""
+        """Value of the file at a path; None if absent."""
         value: Any = document_of(self.scene)
         for step in path.split("."):
             value = value.get(step) if isinstance(value, Mapping) else None
         return value
 
     def scene_key(self, path: str) -> _SceneKey:
-        """Place of a path such as "tube.bore" or "masses.friction_arm[0]".
+        """Key of a path such as "tube.bore" or "masses.friction_arm[0]".
 
         Raises: ValueError: a scene file has no such value.
         """
@@ -210,7 +210,7 @@ class _FileChanges:
         by_table = table in schema.tables["uncertainty"].keys
         before, unit = self.before(f"{table}.{key}"), ""
         if dimension is not None:
-            # The unit that the file has there, else the one in which such a value is described.
+            # The unit in the file, else the usual unit of the quantity.
             first = before[0] if isinstance(before, list) and before else before
             stated = unit_of(first) if isinstance(first, str) else ""
             unit = stated or usual_unit(path) or DIMENSIONS[dimension].si_unit
@@ -224,7 +224,7 @@ class _FileChanges:
         )
 
     def put(self, scene_key: _SceneKey, value: float, *, origin: Origin) -> None:
-        """Write a value, SI."""
+        """Set a value, SI, with its origin."""
         written: Any = scene_key.written(value)
         if scene_key.entry is not None:
             zeros = [scene_key.written(0.0)] * _LIST_ENTRIES
@@ -235,7 +235,7 @@ class _FileChanges:
         self.origins.setdefault(scene_key.table, {})[scene_key.key] = origin
 
     def whole(self) -> dict[str, Any]:
-        """Values and, after them, origins, by path."""
+        """Values by path, followed by origins."""
         origins = {
             f"{table}.{ORIGIN}": {**(self.before(f"{table}.{ORIGIN}") or {}), **keys}
             for table, keys in self.origins.items()
@@ -246,7 +246,7 @@ class _FileChanges:
 def _put_joint(changes: _FileChanges, result: FitResult, pulled: Collection[str]) -> None:
     """Write values of held inputs, corrections of models and the joint distribution.
 
-    Of every error of k it holds both parts: one that the data do not depend on is as uncertain as it was, and
+    Every error of k has both its parts; a part without effect on the data keeps its uncertainty and is
     independent.
     Args: `pulled`: held inputs whose values are written.
     """
@@ -267,7 +267,7 @@ def _put_joint(changes: _FileChanges, result: FitResult, pulled: Collection[str]
             path, scene_key = path_of(name), changes.scene_key(path_of(name))
             unit, deviation = scene_key.unit, scene_key.difference(sd)
             if name in pulled:
-                # The width that is left of the value is for whoever looks at it alone.
+                # The uncertainty of the value alone, without correlations.
                 value, width, before = inputs[name].value, NORMAL_95 * sd, changes.before(scene_key.path)
                 single = scene_key.entry is None or not isinstance(before, list)
                 if (before if single else before[scene_key.entry]) != scene_key.written(value):
@@ -300,7 +300,8 @@ def _put_joint(changes: _FileChanges, result: FitResult, pulled: Collection[str]
 def _put_widths(
     changes: _FileChanges, keyed: Iterable[tuple[_SceneKey, FittedParameter]]
 ) -> Iterator[MeasuredFinding]:
-    """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
+    """Write the uncertainties; entries of a list share the largest. Yields: Findings on uncertainties that a
+    scene cannot state."""
     by_path: dict[str, list[tuple[_SceneKey, FittedParameter]]] = {}
     for scene_key, parameter in keyed:
         by_path.setdefault(scene_key.path, []).append((scene_key, parameter))
@@ -314,7 +315,7 @@ def _put_widths(
             and len(each) < _LIST_ENTRIES
             and changes.before(scene_key.width) is not None
         ):
-            # The uncertainty stands for both entries, and nothing was learnt of the other one.
+            # The uncertainty applies to both entries, of which only one was fitted.
             yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].path))
             continue
         largest = min(abs(parameter.value) for parameter in each)

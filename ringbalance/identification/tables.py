@@ -1,8 +1,8 @@
-"""Files of measurements as tables of text: TOML in the first lines, marked #, then rows below named columns.
+"""Files of measurements as tables of text: TOML in the first lines, marked #, then rows below column heads.
 
-What a spreadsheet does to such a file is undone where that is unambiguous: a byte order mark, Windows line
-ends, a line "sep=;", semicolons or tabs between cells, first lines in quotation marks or with empty cells
-behind them. A decimal comma is refused: in a table it could as well part thousands.
+Changes by a spreadsheet are undone if they are unambiguous: a byte order mark, Windows line ends, a line
+"sep=;", semicolons or tabs between cells, first lines in quotation marks or followed by empty cells. A
+decimal comma is refused, since it may also separate thousands.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_
 
 LARGEST_FILE: Final = 8 * 2**20
 MOST_ROWS: Final = 2000
-"""A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
-holds the covariance of every pair of rows: more would take gigabytes."""
+"""Largest number of rows, each a measurement; a longer recording must be averaged or thinned out first.
+
+A fit stores the covariance of every pair of rows, which for more rows would take gigabytes.
+"""
 _WHAT: Final = "file of measurements"
 _SERIES: Final = "series"
 _MARK: Final = "#"
@@ -37,14 +39,14 @@ _WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx or .ods, and of .xls."""
 _HEAD: Final = re.compile(r"([A-Za-z][A-Za-z0-9_ ]*?)(?: ?\[([^][]+)\])?")
 _SIZES: Final = (1e-15, 1e15)
-"""Least and largest magnitude of a number in a cell; zero is allowed too."""
+"""Smallest and largest magnitude of a number other than zero in a cell."""
 _NO_UNIT: Final = "1"
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True, kw_only=True)
 class CsvTable:
-    """A file's header and its cells, as text; `lines` and `rows` are of one length."""
+    """Header and cells of a file as text; `lines` and `rows` have equal length."""
 
     file: str
     header: Mapping[str, object]
@@ -55,13 +57,13 @@ class CsvTable:
     rows: tuple[tuple[str, ...], ...]
 
     def fault(self, line: int, head: str, cell: str, problem: str, allowed: str = "") -> Fault:
-        """One error of a cell."""
+        """Error of a cell."""
         return data_fault(
             self.file, f'line {line}, column "{head}"', problem, value=toml_text(cell), allowed=allowed
         )
 
     def name_faults(self, suggestions: Collection[str] = ()) -> Iterator[Fault]:
-        """Heads that are no name with a unit, and names that stand twice.
+        """Yield errors for heads that are no name with a unit, and for repeated names.
 
         Args: `suggestions`: columns that the kind of data may have.
         """
@@ -75,12 +77,12 @@ class CsvTable:
             yield data_fault(self.file, f"line {self.head_line}", f'the column "{twice}" stands twice')
 
     def head_fault(self, head: str, problem: str, allowed: str = "") -> Fault:
-        """One error of the name or the unit of a column."""
+        """Error of the name or the unit of a column."""
         position = f"line {self.head_line}, column {toml_text(head)}"
         return data_fault(self.file, position, problem, allowed=allowed)
 
     def values(self, head: str, unit: str, dimension: str | None) -> tuple[FloatArray, list[Fault]]:
-        """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
+        """Numbers of a column, SI, and the errors of its cells; 0 replaces a cell with an error."""
         values, faults = np.zeros(len(self.rows)), []
         for row, (line, cell) in enumerate(zip(self.lines, self.texts(head), strict=True)):
             try:
@@ -96,35 +98,35 @@ class CsvTable:
 
     @property
     def series(self) -> StringArray:
-        """The column of series, or one series for all rows."""
+        """Series of each row; one series for all rows without such a column."""
         return np.array(self.texts(_SERIES) if _SERIES in self.heads else ("one",) * len(self.rows))
 
     def texts(self, head: str) -> tuple[str, ...]:
-        """The cells of a column of text."""
+        """Cells of a column of text."""
         at = self.heads.index(head)
         return tuple(cells[at] for cells in self.rows)
 
 
 def data_fault(file: str, position: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
-    """One error of a file of measurements. Args: `position`: such as 'line 3' or 'kind'; may be empty."""
+    """Error of a file of measurements. Args: `position`: such as 'line 3' or 'kind'; may be empty."""
     return Fault(file=file, key=position, value=value, problem=problem, allowed=allowed)
 
 
 def file_name(path: Path) -> str:
-    """A path as messages show it, printable and on one line."""
+    """Path in messages, printable and on one line."""
     name = str(path)
     return name if name.isprintable() else toml_text(name)
 
 
 def read_content(path: Path, *, what: str = _WHAT) -> tuple[bytes, tuple[Fault, ...]]:
-    """The bytes of a file, no more than are read in any case, or why there are none."""
+    """Bytes of a file, limited in number, or errors if it cannot be read."""
     content, problem = read_bounded(path, what=what, most=LARGEST_FILE)
-    # One that is too large is refused with what else is wrong with its bytes.
+    # A file that is too large is refused together with other errors of its bytes.
     return content, () if content or not problem else (data_fault(file_name(path), "", problem),)
 
 
 def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
-    """The text of a file's bytes, or why it is none."""
+    """Text of the bytes of a file, or errors if they are no text."""
     if len(content) > LARGEST_FILE:
         problem = f"the file is larger than any {_WHAT}; average or thin out a recording"
         return "", (data_fault(file, "", problem, allowed=f"up to {LARGEST_FILE // 2**20} MiB"),)
@@ -147,20 +149,20 @@ def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
 
 
 def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTable | None, tuple[Fault, ...]]:
-    """The table of a text, or all that is wrong with its form. Args: `most`: rows that it may have."""
+    """Table of a text, or None, and all errors of its form. Args: `most`: largest number of rows."""
     numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
     head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
     header: Mapping[str, object] | None = None
     faults: list[Fault] = []
     try:
-        # The mark becomes a space, so that errors have the file's places.
+        # The mark becomes a space, so that errors have the positions in the file.
         header = read_toml("\n".join(_unmarked(line) for _, line in numbered[: head_at - 1]))
     except (ValueError, csv.Error, RecursionError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
         faults.append(data_fault(file, "", problem))
     for at, line in numbered[head_at:]:
-        # As where files were joined: such a line would count for no row.
+        # As in concatenated files: such a line would apply to no row.
         if _SETS_A_KEY.match(line):
             problem = "this stands below the names of the columns; a file has one kind of data and one header"
             faults.append(data_fault(file, f"line {at}", problem))
@@ -179,11 +181,11 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTabl
         names = list(_cells(data[0][1], separator))
     except csv.Error as error:
         return None, (*faults, _cell_fault(head_at, error, file))
-    # Cells that a spreadsheet adds behind the names are empty.
+    # A spreadsheet may add empty cells after the names.
     while len(names) > 1 and not names[-1]:
         names.pop()
     rows, bad_rows = _rows(data[1:], len(names), separator, file)
-    # Spreadsheets make capitals of names; capitals of a unit have a meaning.
+    # Spreadsheets capitalise names; in units capitals have a meaning.
     parts = [name.partition("[") for name in names]
     table = CsvTable(
         file=file,
@@ -197,7 +199,7 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTabl
 
 
 def _is_data(line: str) -> bool:
-    """False for a line that is empty or marked, or a spreadsheet's that names the separator."""
+    """Return False for a line that is empty, marked #, or names the separator."""
     start = line.lstrip(f'" {_SEPARATORS}')
     return bool(start) and not start.startswith(_MARK) and not _NAMED_SEPARATOR.fullmatch(line.strip())
 
@@ -205,7 +207,7 @@ def _is_data(line: str) -> bool:
 def _rows(
     data: Sequence[tuple[int, str]], length: int, separator: str, file: str
 ) -> tuple[dict[int, tuple[str, ...]], list[Fault]]:
-    """The rows of the right length by line, and the errors of the others."""
+    """Rows of the right length by line, and errors for the others."""
     rows, faults = {}, []
     for at, line in data:
         try:
@@ -232,7 +234,7 @@ def _unmarked(line: str) -> str:
 
 
 def _separator(head: str) -> str:
-    """The first of semicolon, tab and comma that stands in the line of names, none of which has one."""
+    """Separator: the first of semicolon, tab and comma in the line of names, which contain none of these."""
     return next((each for each in _SEPARATORS if each in head), ",")
 
 
@@ -252,7 +254,7 @@ def in_order(faults: Iterable[Fault]) -> list[Fault]:
 
 
 def split_head(head: str) -> tuple[str, str] | None:
-    """Name and unit of a column, the unit empty where there is none; None for what is no such name."""
+    """Name and unit of a column head, the unit empty if there is none; None for an invalid head."""
     match = _HEAD.fullmatch(head)
     if match is None:
         return None
@@ -261,7 +263,7 @@ def split_head(head: str) -> tuple[str, str] | None:
 
 
 def dimension_of(unit: str) -> str | None:
-    """The first dimension that has a unit; None where none has it."""
+    """First dimension with this unit; None if there is none."""
     for dimension in DIMENSIONS:
         try:
             parse_quantity(f"1 {unit}", dimension)

@@ -1,4 +1,4 @@
-"""Kinds of measurement on test benches without a balancer, and their predictions, which take no scene."""
+"""Kinds of measurement on test benches without a balancer, and their predictions, without a scene."""
 
 from __future__ import annotations
 
@@ -24,29 +24,31 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Tube
 
 _WIDEST: Final = 20.0
-"""Long over short side of a duct that is accepted."""
+"""Largest accepted ratio of long to short side of a duct."""
 _TERMS: Final = 100
-"""Up to which odd terms of a series are summed that fall like 1/n^5."""
+"""Upper limit of the odd terms n of a series that decrease with 1/n^5."""
 _LAMINAR: Final = 100.0
-"""Critical Re over the usual one, for flow that is known to be laminar."""
+"""Ratio of critical Re to the usual one for flow known to be laminar."""
 _CONDUCTANCE_UNCERTAINTY: Final = 0.1
-"""U (95 %), relative, of a conductance computed from an opening's area: its discharge coefficient."""
+"""Relative expanded uncertainty (95 %) of a conductance from an opening's area, by its discharge
+coefficient."""
 _CRITICAL_RATIO: Final = 0.5
-"""b of a sharp opening, where the data do not give one."""
+"""Default critical pressure ratio b: that of a sharp opening."""
 _STEPS: Final = 2000
 _RADIUS: Final = 1e4
-"""Radius of the chamber, in widths of the tank."""
+"""Ratio of the chamber's radius to the width of the tank."""
 _CELLS: Final = (8, 16)
 
 
 Stated = tuple[FloatArray, FloatArray]
-"""Prediction of each row, SI, and the expanded uncertainty (95 %) that the program states of it."""
+"""Prediction of each row, SI, and its expanded uncertainty (95 %) as stated by the program."""
 
 
 def laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
-    """Laminar friction of rectangular ducts over that of a tube of their hydraulic diameter; 0 for tubes.
+    """Ratio of laminar friction of rectangular ducts to that of a tube of equal hydraulic diameter.
 
     f Re = 96/[(1 + 1/a)^2 (1 - 192/(pi^5 a) sum tanh(n pi a/2)/n^5)] over odd n, against 64.
+    Args: `aspect_ratio`: long over short side; 0 for tubes.
     Source: Fourier series of the velocity across the short side.
     """
     a, n = np.maximum(aspect_ratio, 1.0), np.arange(1, _TERMS, 2)
@@ -70,7 +72,7 @@ def _friction(data: Observations) -> Stated:
 
 
 def _pressure(data: Observations) -> Stated:
-    """(rho u^2/2) (k + 1) with k of friction, entrance and exit; no bend, no rotation."""
+    """Pressure difference (rho u^2/2) (k + 1), Pa, k by friction, entrance and exit; no bend, no rotation."""
     columns = {"laminar": np.zeros(len(data)), **data.columns}
     reynolds, slenderness = tube_numbers(data)
     critical = np.where(columns["laminar"] > 0, _LAMINAR, 1.0)
@@ -82,16 +84,16 @@ def _pressure(data: Observations) -> Stated:
 
 
 def tube_numbers(data: Observations) -> tuple[FloatArray, FloatArray]:
-    """Re and L/d of each point."""
+    """Reynolds number and slenderness L/d of each row."""
     columns = data.columns
     velocity = columns["flow"] / (np.pi / 4 * columns["bore"] ** 2)
     return velocity * columns["bore"] / columns["kinematic_viscosity"], columns["length"] / columns["bore"]
 
 
 def tube_loss(slenderness: float, reynolds: float, critical: float) -> tuple[float, float]:
-    """k of a smooth tube with a rounded entrance, and its expanded uncertainty (95 %).
+    """Loss coefficient k of a smooth tube with rounded entrance, and its expanded uncertainty (95 %).
 
-    Args: `slenderness`: L/d. `critical`: critical Re over the usual one.
+    Args: `slenderness`: L/d. `critical`: ratio of critical Re to the usual one.
     """
     tube = Tube(
         bore=1.0,
@@ -120,11 +122,11 @@ def tube_loss(slenderness: float, reynolds: float, critical: float) -> tuple[flo
 
 
 def _vessel_time(data: Observations) -> Stated:
-    """Times of a gas vessel: middle of both limits, stated as wide as these and the conductance leave it.
+    """Filling or venting times of a gas vessel, s: mean of the isothermal and the adiabatic limit.
 
-    Gas that exchanges heat with the walls lies between isothermal and adiabatic. With tau of `GasLine`,
-    filling takes 1/gamma of the isothermal time when adiabatic; venting has dp/dt = -gamma (p/tau)
-    sqrt(T/T_0) phi with T/T_0 = (p/p_start)^((gamma - 1)/gamma), integrated here.
+    The stated uncertainty covers both limits, since gas exchanges heat with the walls, and the conductance.
+    With tau of `GasLine`, filling takes 1/gamma of the isothermal time when adiabatic; venting has dp/dt =
+    -gamma (p/tau) sqrt(T/T_0) phi with T/T_0 = (p/p_start)^((gamma - 1)/gamma), integrated here.
     """
     columns = {"critical_ratio": np.full(len(data), _CRITICAL_RATIO), **data.columns}
     names = ("pressure", "start_pressure", "far_pressure", "temperature", "volume", "conductance")
@@ -175,10 +177,10 @@ def _frequency(data: Observations) -> Stated:
 
 
 def _tank_frequency(depth: float) -> float:
-    """Lowest natural frequency of a rectangular tank, sigma sqrt(L/g). Args: `depth`: in widths L.
+    """Lowest natural frequency of a rectangular tank, sigma sqrt(L/g). Args: `depth`: over width L.
 
-    A chamber whose radius is large against its width is such a tank under gravity: its Coriolis force
-    vanishes beside waves that are many times faster than its rotation.
+    A chamber of a radius much larger than its width is equivalent to such a tank under gravity: its waves are
+    so much faster than its rotation that the Coriolis force is negligible.
     """
     disc = Disc(
         outer_radius=_RADIUS,
@@ -192,7 +194,7 @@ def _tank_frequency(depth: float) -> float:
     )
     surface = _RADIUS - depth
     lowest = sloshing_system(disc=disc, surface_radius=surface, cells=_CELLS).natural_frequencies()[0]
-    # Gravity of the rotation is omega^2 a, so sigma = s omega = s sqrt(g/a).
+    # Centrifugal acceleration is omega^2 a, so sigma = s omega = s sqrt(g/a).
     return float(lowest) / math.sqrt(surface)
 
 

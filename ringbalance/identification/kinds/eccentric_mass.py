@@ -26,20 +26,20 @@ from ringbalance.identification.kinds.kind import (
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 MOST_STEPS: Final = 300_000
-"""Steps of all motions of a file, some 0.2 s a prediction: a fit takes a minute or two."""
+"""Largest number of steps of all motions of a file, some 0.2 s for a prediction: a fit takes 1 to 2 min."""
 _MOST_SUBSTEPS: Final = 20_000
-"""Steps of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
+"""Largest number of steps in one call of the plant, some 0.02 s: Ctrl-C acts only between calls."""
 _VOLTAGES: Final = (0.25, 0.5, 1.0)
-"""Fractions of the largest voltage; where the scene gives none, those of the data alone."""
+"""Candidate voltages over the voltage limit; without a limit, only voltages of the data are candidates."""
 _POSITIONING_TIMES_S: Final = (0.1, 0.4, 1.0)
 _SPEEDS: Final = 9
-"""From half of the lowest speed of the scene to the highest one."""
+"""Number of candidate speeds, from half of the lowest speed of the scene to the highest."""
 
 
 def _steady_whirls(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
-    """Vibration over the speed in the rotor's frame, m, both masses clamped where they stand at the start.
+    """Vibration over the speed in the rotor's frame, m, both masses clamped at their initial angles.
 
-    At constant speed, as in a run-up that is slow against the decay of the rotor's motion.
+    Steady state, as in a run-up that is slow compared with the decay of the rotor's motion.
     """
     plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
     speeds = observations.columns["speed"].tolist()
@@ -47,10 +47,10 @@ def _steady_whirls(scene: EccentricScene, observations: Observations, _: object)
 
 
 def _positions(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
-    """Angles by which one mass has moved under a constant voltage, rad, the other one clamped.
+    """Angular travel of one mass under a constant voltage, rad, with the other mass clamped.
 
-    It starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed. Rows of
-    one series, mass, voltage and speed are one motion.
+    The mass starts at rest from its initial angle, on a rotor in steady whirl at constant speed. Rows of
+    equal series, mass, voltage and speed are one motion.
     """
     plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
     moved, times = np.empty(len(observations)), observations.columns["time"]
@@ -70,18 +70,19 @@ def _positions(scene: EccentricScene, observations: Observations, _: object) -> 
 
 
 def _moved_masses(observations: Observations) -> IntArray:
-    """Index, 0 or 1, of the mass that each row moves."""
+    """Index, 0 or 1, of the moved mass of each row."""
     return np.asarray(observations.columns.get("moved_mass", np.ones(len(observations))) - 1, dtype=np.int64)
 
 
 def _informs(observations: Observations) -> tuple[str, ...]:
-    """Friction of every mass that moves, and the motor."""
+    """Names of parameters: friction arm of every moved mass, and constants of the motor."""
     arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(_moved_masses(observations).tolist())))
     return (*arms, "motor.torque_constant", "motor.back_emf_constant")
 
 
 def _too_long(scene: EccentricScene, observations: Observations) -> str:
-    """Why these motions would take too long to integrate, as a fit does some hundred times; else empty."""
+    """Reason why the motions take too long to integrate, some hundred times in a fit; empty if they do
+    not."""
     plant, times = PlantParameters.of(scene), observations.columns["time"]
     motions = _motions(observations)
     steps = sum(substeps(plant, motion.speed, 0.0, times[rows[-1]]) for motion, rows in motions)
@@ -96,13 +97,13 @@ def _too_long(scene: EccentricScene, observations: Observations) -> str:
 class _MassMotion(NamedTuple):
     series: str
     mass: int
-    """Index."""
+    """Index of the moved mass."""
     voltage: float
     speed: float
 
 
 def _motions(observations: Observations) -> Iterator[tuple[_MassMotion, IntArray]]:
-    """Every motion, and its rows in the order of their times."""
+    """Yield every motion with its rows in order of time."""
     columns, series = observations.columns, observations.series.tolist()
     set_to = zip(series, _moved_masses(observations), columns["voltage"], columns["speed"], strict=True)
     rows_of: dict[_MassMotion, list[int]] = {}

@@ -1,4 +1,4 @@
-"""A kind of measurement: what each column means, its unit, and how a model predicts what is measured."""
+"""Kind of measurement: meaning and unit of each column, and prediction of the measured ones."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _LARGEST: Final[Mapping[str, float]] = {
     "speed": 1e5,
     "voltage": 1e4,
 }
-"""By dimension, SI: what no rig has, with room to spare; beyond it the unit is wrong."""
+"""Largest plausible value by dimension, SI, far above any rig; beyond it the unit is wrong."""
 _LARGEST_ANGLE_RAD: Final = 4 * math.pi
-"""Largest phase or angle of a measurement; beyond it degrees stand in a column of radians."""
+"""Largest phase or angle of a measurement; larger numbers are degrees in a column of radians."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DataColumn:
-    """One column of numbers."""
+    """Column of numbers in a file of measurements."""
 
     name: str
     dimension: str | None
@@ -43,27 +43,27 @@ class DataColumn:
     meaning: str
     measured: bool = False
     amplitude: bool = False
-    """True where it follows the file's convention of amplitudes."""
+    """True if the column follows the file's convention of amplitudes."""
     optional: bool = False
     lowest: float = -math.inf
-    """SI."""
+    """Lowest allowed value, SI."""
     highest: float = math.inf
     above_zero: bool = False
     integer: bool = False
 
     @property
     def head(self) -> str:
-        """Name with unit, as it stands over the column."""
+        """Name with unit, as in the head of the column."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def written(self, value: float) -> str:
-        """A value, SI, in the template's unit."""
+        """Text of a value, SI, in the template's unit."""
         return (
             format_quantity(value, self.dimension, self.unit, digits=3) if self.dimension else f"{value:.3g}"
         )
 
     def check(self, value: float) -> None:
-        """Raises: FieldError: a value, SI, that the column cannot have."""
+        """Check a value, SI. Raises: FieldError: a value that the column cannot have."""
         largest = min(self.highest, _LARGEST.get(self.dimension or "", math.inf))
         if self.above_zero and not value > 0:
             problem = "it is not above zero"
@@ -84,24 +84,24 @@ class DataColumn:
 
 @dataclass(frozen=True, kw_only=True)
 class Observations:
-    """The rows of one file of measurements, all of one kind."""
+    """Rows of one file of measurements, all of one kind."""
 
     kind: str
     file: str
     source: str = ""
-    """Rig, run and date, as the file's first lines have them."""
+    """Rig, run and date, from the file's first lines."""
     sha256: str = ""
     """Hash of the file's bytes."""
     lines: IntArray
     """Line of each row in the file, from 1."""
     series: StringArray
-    """Tube, run, rig or day that a row belongs to: its rows share their systematic errors."""
+    """Tube, run, rig or day of each row; rows of a series share their systematic errors."""
     chamber: StringArray
-    """Letter of the driven chamber; empty where the kind has none."""
+    """Letter of the driven chamber; empty if the kind has none."""
     columns: Mapping[str, FloatArray]
-    """SI, by name; amplitudes zero to peak. An optional column that the file does not have is absent."""
+    """Values by name, SI; amplitudes zero to peak. Optional columns that the file lacks are absent."""
     uncertainty: Mapping[str, FloatArray]
-    """Expanded (95 %), absolute, SI, by measured column; where one is absent its noise is estimated."""
+    """Expanded uncertainty (95 %), absolute, SI, by measured column; noise of absent columns is estimated."""
 
     def __len__(self) -> int:
         return int(self.lines.size)
@@ -130,9 +130,9 @@ class Observations:
         return np.asarray(self.columns[f"amplitude{when}"] * np.exp(1j * self.columns[f"phase{when}"]))
 
     def vector_covariance(self, when: str) -> FloatArray:
-        """Covariance of each vector's two parts, m^2, shape (n, 2, 2).
+        """Covariance of real and imaginary part of each vector, m^2, shape (n, 2, 2).
 
-        Along the vector sigma_a, across it sigma_a or, where given, a sigma_phase.
+        Standard deviation sigma_a along the vector, and sigma_a or, if given, a sigma_phase across it.
         """
         size, angle = self.columns[f"amplitude{when}"], self.columns[f"phase{when}"]
         radial = tangential = self.uncertainty[f"amplitude{when}"] / NORMAL_95
@@ -144,9 +144,9 @@ class Observations:
 
 
 Grid = Mapping[str, Sequence[float]]
-"""Values that could be set, SI, by column."""
+"""Possible settings of a measurement, SI, by column."""
 Ranges = Mapping[str, tuple[float, float]]
-"""Lowest and highest value of a scene, SI, by column; from zero where only an upper end means anything."""
+"""Lowest and highest value of a scene, SI, by column; from zero if only the upper end is meaningful."""
 
 
 def _by_no_scene(_scene: Any, observations: Observations, _models: Any) -> FloatArray:
@@ -155,38 +155,38 @@ def _by_no_scene(_scene: Any, observations: Observations, _models: Any) -> Float
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """One kind of measurement: of a scene's machine, which `fit` takes, or of a test bench without one."""
+    """Kind of measurement: on the machine of a scene, for `fit`, or on a test bench without a scene."""
 
     title: str
     columns: tuple[DataColumn, ...]
     one_of: tuple[str, ...] = ()
-    """Columns of which a file has exactly one."""
+    """Alternative columns; a file has exactly one of them."""
     has_chamber: bool = False
-    """True where a column `chamber` has the letter of the driven chamber."""
+    """True if a column `chamber` has the letter of the driven chamber."""
     balancer: str = ""
-    """Balancer whose scenes predict it; empty: a test bench without a scene."""
+    """Balancer of the scenes that predict this kind; empty: a test bench without a scene."""
     any_rotor: bool = False
-    """True where the scenes of a balancer without kinds of its own predict it too."""
+    """True if scenes of a balancer without specific kinds predict this kind too."""
     predict: Callable[[Any, Observations, Any], FloatArray] = _by_no_scene
-    """Scene, observations and models (`device.Models`) to what was measured; a vibration counts as its real
-    and its imaginary part."""
+    """Function from scene, observations and models (`device.Models`) to predicted numbers; a vibration has
+    real and imaginary part."""
     informs: Callable[[Observations], tuple[str, ...]] = lambda _: ()
-    """Parameters that are fitted to such data where the user names none."""
+    """Function from observations to the parameters that are fitted by default."""
     free: Callable[[Observations], FloatArray] = lambda observations: np.zeros((len(observations), 0))
-    """Effect of unknowns that are no parameters, such as the vibration without trial weight, one column
-    each."""
+    """Function from observations to effects of unknowns that are no parameters, such as the vibration without
+    trial weight, one column for each."""
     obstacle: Callable[[Any, Observations], str] = lambda _, __: ""
-    """Scene and observations to why the one cannot be fitted to the other; empty where it can."""
+    """Function from scene and observations to the reason why they cannot be fitted; empty if they can."""
     offers: Callable[[Any], Grid] = lambda _: {}
-    """Scene to what could be measured next."""
+    """Function from a scene to possible further measurements."""
     ranges: Callable[[Any], Ranges] = lambda _: {}
-    """Scene to what it has of the columns."""
+    """Function from a scene to its ranges of the columns."""
     stated: Callable[[Observations], tuple[FloatArray, FloatArray]] | None = None
-    """Prediction for a test bench, and the expanded uncertainty (95 %) that the program states of it."""
+    """Function from observations of a test bench to prediction and stated expanded uncertainty (95 %)."""
 
     @property
     def has_amplitudes(self) -> bool:
-        """True where the convention of amplitudes matters."""
+        """True if any column follows the convention of amplitudes."""
         return any(column.amplitude for column in self.columns)
 
     @property
@@ -200,11 +200,11 @@ class Kind:
         return ("series", "note", *(["chamber"] if self.has_chamber else []))
 
     def column(self, name: str) -> DataColumn | None:
-        """Declaration of a column, of that of an uncertainty too; None where the kind has none."""
+        """Declaration of a column, also of an uncertainty; None if the kind has no such column."""
         return {column.name: column for column in (*self.columns, *self.uncertainties())}.get(name)
 
     def uncertainties(self) -> Iterator[DataColumn]:
-        """The columns that may state how well each row is known."""
+        """Yield the columns that may state the uncertainty of each row."""
         for column in self.measured:
             yield replace(
                 _WIDTH,
@@ -219,11 +219,11 @@ class Kind:
 
     @property
     def _vibrations(self) -> tuple[str, ...]:
-        """Ends of the names of the vibrations that a row has: "", or "_before" and "_after"."""
+        """Suffixes of the names of a row's vibrations: "", or "_before" and "_after"."""
         return tuple(c.name.removeprefix("phase") for c in self.measured if c.name.startswith("phase"))
 
     def _noisy(self, observations: Observations) -> list[str]:
-        """Measured columns of data with a noise of their own, as a phase beside its amplitude has not."""
+        """Measured columns with independent noise; a phase with its amplitude has none."""
         names = [column.name for column in self.measured if not column.name.startswith("phase")]
         return [name for name in names if name in observations.columns] or names
 
@@ -232,21 +232,22 @@ class Kind:
         return self._noisy(observations)[-1]
 
     def noise_given(self, observations: Observations) -> bool:
-        """True where the file states the noise."""
+        """True if the file states the noise."""
         return all(name in observations.uncertainty for name in self._noisy(observations))
 
     def numbers(self, observations: Observations) -> FloatArray:
-        """Measured numbers: one a row, or the parts of a vibration or of its change."""
+        """Measured numbers, SI: one for each row, or the two parts of a vibration or of its change."""
         if not self._vibrations:
             return observations.columns[self.noisy_column(observations)]
         *before, last = (observations.vectors(when) for when in self._vibrations)
         return parts(last - sum(before))
 
     def covariance(self, observations: Observations) -> FloatArray:
-        """Covariance of the errors of `numbers`; in units of one reading's where the noise is estimated.
+        """Covariance of the errors of `numbers`; if the noise is estimated, in units of the variance of one
+        reading.
 
-        A vibration that stands as that after one injection and, digit for digit, as that before the next one
-        of its series was measured once: its error enters both changes, with opposite signs.
+        Equal vibrations after one injection and before the next one of its series are one measurement: its
+        error enters both changes, with opposite signs.
         """
         count, stated = len(observations), self.noise_given(observations)
         if not self._vibrations:
@@ -275,12 +276,12 @@ def parts(vector: ComplexArray) -> FloatArray:
 
 
 def always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
-    """Parameters that all data of a kind inform."""
+    """Function that returns these parameters for any data of a kind."""
     return lambda _: names
 
 
 def column(head: str, meaning: str, **declared: Any) -> DataColumn:
-    """A column by its head in the template, such as "time [s]"."""
+    """Column by its head in the template, such as "time [s]"."""
     name, unit = split_head(head) or (head, "")
     return DataColumn(
         name=name, dimension=dimension_of(unit) if unit else None, unit=unit, meaning=meaning, **declared

@@ -1,7 +1,7 @@
 """Kinds of measurement on a rotor with a liquid ring, and their predictions by its scene.
 
-Of injections the fills of a series follow from one to the next, from the scene's initial fill, unless a row
-states that of its chamber.
+Injections of a series follow each other: each starts from the fill that the last one leaves, the first from
+the scene's initial fill, unless a row states the fill of its chamber.
 Source: Eqs. 11, 14 and 21 to 23 of the liquid-ring paper, with the program's own law and moments.
 """
 
@@ -41,21 +41,21 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 
 _DONE: Final = 1e-10
-"""In ln u."""
+"""Change of ln u at which the iteration ends."""
 _FRACTIONS: Final = (0.3, 0.5, 0.7)
-"""Fractions of the largest fill."""
+"""Candidate fills over the largest fill."""
 _PRESSURES: Final = (0.8, 1.0, 1.25)
-"""Ratios to the scene's gas pressure."""
+"""Candidate pressures over the scene's gas pressure."""
 _VALVE_OPEN_TIMES_S: Final = (0.05, 0.2, 0.8)
 _WEIGHTS: Final = (0.5, 1.0, 2.0)
-"""Ratios to the unbalance that makes the vibration at the start."""
+"""Candidate trial weights over the unbalance of the initial vibration."""
 
 
 def _trial_changes(scene: SceneFile, observations: Observations, _: object) -> FloatArray:
     """Change of the vibration by known unbalances, m.
 
-    V = V0 + K U exp(j angle), K = kappa exp(-j lag).  V0 is that of the series and not of the scene: it is
-    fitted with every parameter, and known beforehand to nobody.
+    V = V0 + K U exp(j angle), K = kappa exp(-j lag).  V0 is that of the series, not of the scene: an
+    unknown without a prior that is eliminated in every fit.
     """
     return parts(balancer_of(scene).rotor().influence * _weights(observations))
 
@@ -63,21 +63,21 @@ def _trial_changes(scene: SceneFile, observations: Observations, _: object) -> F
 def _trial_amplitudes(scene: Scene, observations: Observations, _: object) -> FloatArray:
     """|V0 + K U exp(j angle)|, m zero to peak.
 
-    Without a phase V0 cannot be eliminated: it is the scene's vibration at the start, and its amplitude and
-    its phase are parameters.  Only its phase against K U matters, so that the phase and the lag are not
-    identified by themselves.
+    Without a phase V0 cannot be eliminated: it is the scene's initial vibration, with amplitude and phase as
+    parameters.  Only its phase relative to K U has an effect, so that neither the phase nor the lag is
+    identified alone.
     """
     start = cmath.rect(scene.rotor.initial_amplitude, scene.rotor.initial_phase)
     return np.asarray(np.abs(start + scene.rotor.influence * _weights(observations)))
 
 
 def _weights(observations: Observations) -> ComplexArray:
-    """U exp(j angle), kg m."""
+    """Trial weights U exp(j angle), kg m."""
     return np.asarray(observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"]))
 
 
 def _effect_of_starts(observations: Observations) -> FloatArray:
-    """Effect of the two parts of every series' V0, shape (2 n, 2 series)."""
+    """Effect of real and imaginary part of each series' V0, shape (2 n, 2 series)."""
     names = np.unique(observations.series)
     return np.kron(np.eye(2), (observations.series[:, None] == names).astype(np.float64))
 
@@ -130,7 +130,7 @@ def _fills(device: ModelledDevice, observations: Observations) -> FloatArray:
 
 
 def _transferred(scene: Scene, observations: Observations, models: Models) -> FloatArray:
-    """V (x_before - x_after), m^3, times rho for a mass, kg, once the liquid rests again."""
+    """Transferred volume V (x_before - x_after), m^3, or mass, kg, after the liquid has come to rest."""
     device = ModelledDevice.of(scene, models)
     volume = device.law.chamber_volume * device.once(observations, _moved)
     return np.asarray(scene.liquid.density * volume if "mass" in observations.columns else volume)
@@ -150,7 +150,7 @@ def _moved(device: ModelledDevice, observations: Observations) -> FloatArray:
 def _flow_rate(device: ModelledDevice, observations: Observations) -> FloatArray:
     """Flow through the tube alone, at rest: (k + 1) rho u^2/2 = p, Q = S u, k without rotation, m^3/s.
 
-    By the secant in ln u. Source: definition of k, between two reservoirs at rest.
+    Secant method in ln u. Source: definition of k, between two reservoirs at rest.
     """
     still = replace(device.scene, rotor=replace(device.scene.rotor, speed=0.0))
     head = observations.columns["pressure_difference"] / still.liquid.density
@@ -164,7 +164,7 @@ def _flow_rate(device: ModelledDevice, observations: Observations) -> FloatArray
 
 
 def _pressures(scene: Scene, observations: Observations, _: object) -> FloatArray:
-    """Pressure of the turning liquid over that of its gas, rho omega^2 (r^2 - a^2)/2, Pa; zero above it."""
+    """Excess pressure of the rotating liquid over its gas, rho omega^2 (r^2 - a^2)/2, Pa; zero in the gas."""
     columns = observations.columns
     surface = columns.get("surface_radius")
     if surface is None:
@@ -222,7 +222,7 @@ def _some_fills(scene: Scene) -> list[float]:
 _kind: Final = partial(Kind, balancer="liquid_ring", ranges=_ranges)
 _FILL: Final = partial(column, "fill_ratio", lowest=0.0, highest=1.0)
 _GAS: Final = positive("pressure [MPa]", "gas pressure in the driven chamber, gauge")
-# At most of the order of what empties a chamber of an oil; beyond it milliseconds were meant.
+# Of the order of the time in which a chamber of oil is emptied; larger values are milliseconds.
 _GAS_TIME: Final = positive("gas_time [ms]", "valve-open time", highest=100.0)
 _WEIGHT: Final = (
     column("unbalance [g*mm]", "of the trial weight, mass times radius; 0 is the run without it", lowest=0.0),

@@ -35,8 +35,7 @@ class Choices:
     names: tuple[str, ...]
     """Names of the rows; empty without such a column."""
     rows: tuple[Mapping[str, Any], ...]
-    """Values by key: a number in SI, a word, or None for an empty cell, which removes the key from the
-    scene."""
+    """Values by key: a number in SI, a word, or None for an empty cell, which removes the key."""
 
 
 def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:

@@ -38,8 +38,7 @@ _SIGMA_FACTOR: Final = 1.5
 _MIN_GAIN: Final = 0.002
 """Smallest expected relative decrease of the size for which a design is judged."""
 _NEAR_FRACTION: Final = 0.03
-"""Margin below the required fraction within which a design of a list is still judged: error of the
-surface."""
+"""Margin below the required fraction for errors of the surface; listed designs within it are judged."""
 
 
 def judged_designs(hunt: Hunt) -> list[RacedDesign]:

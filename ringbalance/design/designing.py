@@ -91,8 +91,7 @@ class Design(PresentedResult):
     """Relative half-width (95 %) of the size by the random choice of devices; None: the fraction of devices
     does not grow with the size, or the size does not vary."""
     front: tuple[RacedDesign, ...]
-    """Alternative designs that should meet the requirements, Pareto-optimal in size, settling time and
-    gas."""
+    """Alternative designs that should meet the requirements, Pareto-optimal in size, time and gas."""
     effects: tuple[Effect, ...]
     ranking: Ranking
 

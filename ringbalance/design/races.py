@@ -26,8 +26,7 @@ ReportProgress = Callable[[str], None]
 
 _POINTS_PER_BATCH: Final = 256
 _DEVICE_BLOCKS: Final = 8
-"""Number of blocks of devices that designs use in turn, so that chance in one block does not bias the
-search."""
+"""Number of blocks of devices that designs use in turn, so that chance in one does not bias the search."""
 _MAX_PARENTS: Final = 6
 _NEIGHBOURS_PER_POINT: Final = 2
 """Number of settings that race in addition to those of the nearest design."""
@@ -206,8 +205,7 @@ class Races:
         return fields
 
     def parents(self, value: Callable[[Points], FloatArray], size: float) -> FloatArray:
-        """Coordinates in the unit cube of the best designs, each rescaled to a size, m^3, where size
-        varies."""
+        """Coordinates in the unit cube of the best designs, rescaled to a size, m^3, if size varies."""
         measured = self._well_known
         shares = np.array([each.shares for each in measured])
         if self.space.sized:

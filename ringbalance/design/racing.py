@@ -100,8 +100,7 @@ class Race:
 
     @property
     def order(self) -> tuple[float, ...]:
-        """Sort key, best first: most devices that meet every demand, most settled, shortest times, least
-        gas."""
+        """Sort key: most devices that meet every demand, most settled, shortest times, least gas first."""
         settled = float(np.mean(self.judgement.outcomes.settled))
         return (-self.fraction, -settled, self.time(0.9), self.time(0.5), self.gas)
 
@@ -164,8 +163,7 @@ def race(
 
 
 def settings_at(spaces: Sequence[Trials], grid_point: GridPoint) -> Settings | None:
-    """Settings at a point of the search spaces, interpolated between levels; None: no settings at that
-    point."""
+    """Settings at a point of the search spaces, interpolated between levels; None: no settings there."""
     kind, indices = grid_point
     point = {
         axis.name: float(np.interp(index, range(len(axis.levels)), axis.levels))

@@ -85,8 +85,7 @@ _Fit = tuple[IntArray, FloatArray, FloatArray, float]
 
 
 def _powers(rows: int, count: int) -> list[IntArray]:
-    """Degrees of each term in each input, shape (terms, count), of all polynomials that the rows can
-    determine."""
+    """Degrees of each term in each input, shape (terms, count), by polynomial that the rows can determine."""
     powers: list[IntArray] = []
     for degree in range(1, _MAX_DEGREE + 1):
         if math.comb(degree + count, count) * _ROWS_PER_TERM > rows and powers:

@@ -56,8 +56,7 @@ class Space:
 
     @cached_property
     def hasty(self) -> SceneFile:
-        """Scene with runs that end soon after the required settling time; the set of devices in time is
-        unchanged."""
+        """Scene with runs that end soon after the required settling time, with equal verdicts on devices."""
         required = self.scene.requirement.settling_time
         if required is None or _HASTY_FACTOR * required >= self.scene.run.time_limit:
             return self.scene
@@ -136,8 +135,7 @@ class Space:
         return moved
 
     def coordinates(self, shares: FloatArray) -> FloatArray:
-        """Coordinates of the surface from those in the unit cube; entries of a list are at equal
-        distances."""
+        """Coordinates of the surface from those in the unit cube; entries of a list are equidistant."""
         return np.concatenate(
             [
                 column[:, np.newaxis]

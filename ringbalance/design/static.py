@@ -145,8 +145,7 @@ def _plain(value: float) -> float | None:
 
 
 def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
-    """Regimes, values and half-widths (95 %, by the inputs) of designs, shape (1 + 2 k, n); NaN: not
-    known."""
+    """Regimes, values and half-widths (95 %, by the inputs), shape (1 + 2 k, n); NaN: not known."""
     if not intervals:
         values = _values(designs)
         return np.concatenate([values, np.full(values[1:].shape, np.nan)])

@@ -237,7 +237,7 @@ class Review:
 
     @property
     def _read_wrongly(self) -> tuple[str, ...]:
-        """Evidence against the files as they stand, one sentence each."""
+        """Evidence of misread files, one sentence each."""
         named = [each.text for each in self.readings if each.named]
         unexplained = [each.text for each in self.explained if each.fails]
         return (*named, *unexplained, *(each.text for each in self.ranges if each.fails))

@@ -154,8 +154,7 @@ def fit_rows(
 
 
 def _findings(result: FitResult, review: Review) -> Iterator[Finding]:
-    """Verdict on the fit; parameters and their products; noise; correlated errors; rows with large
-    residuals."""
+    """Verdict, parameters and their products, noise, correlated errors, and rows with large residuals."""
     code = "fit_describes" if review.describes else "fit_contradicted"
     yield Finding(code=code, values={"text": review.text})
     yield from (Finding(code="sense_undecided", values={"text": text}) for text in review.undecided)
@@ -205,8 +204,7 @@ def _listed(lines: Sequence[int]) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AgainstFit:
-    """Measured and fitted numbers of one column of one kind of data, SI; a vibration as real and imaginary
-    part."""
+    """Measured and fitted numbers of one column of one kind of data, SI; vibrations as two components."""
 
     kind: str
     column: str
@@ -216,16 +214,14 @@ class AgainstFit:
     component: IntArray
     """Component of every number: 0, or 1 for the imaginary part of a vibration."""
     measured: FloatArray
-    """Measured numbers less the fitted unknowns that are no parameters, such as the vibration without trial
-    weight."""
+    """Measured numbers less the other fitted unknowns, such as the vibration without trial weight."""
     measured_uncertainty: FloatArray
     """Expanded uncertainty (95 %) by stated or estimated noise."""
     fitted: FloatArray
     fitted_uncertainty: FloatArray
     """Expanded uncertainty (95 %) of the prediction by all fitted unknowns together."""
     slope: float | None
-    """Slope of measured over fitted values, by a line through zero weighted by noise; None if all fitted are
-    zero."""
+    """Slope of measured over fitted values, weighted line through zero; None if all fitted are zero."""
     slope_uncertainty: float | None
     """Expanded uncertainty (95 %) of the slope by the noise."""
 

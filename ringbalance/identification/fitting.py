@@ -40,8 +40,7 @@ two, the error of rms amplitudes stated as zero to peak."""
 _MAX_PULL_SIGMAS: Final = 3.0
 """Standard deviations by which the data may disagree with the prior."""
 _MOVABLE_FRACTION: Final = 0.1
-"""Smallest shift of a value by the data, over the prior standard deviation, for which disagreement is
-tested."""
+"""Smallest shift of a value by data that can disagree, over the prior standard deviation."""
 _LITTLE: Final = 1e-4
 """Change of a quantity in a test for its effect: relative, or in SI units if it is zero."""
 Source = Literal["[uncertainty]", "geometry"]
@@ -228,8 +227,7 @@ def fit(
     """Fit parameters of a scene to measurements.
 
     Args: `parameters`: names; None: those that the kinds of data inform. `loss`: "linear" (normal noise) or
-        "soft_l1" (outliers count less). `starts`: number of searches, from the scene and from points around
-        it.
+        "soft_l1" (outliers count less). `starts`: number of searches, from the scene and around it.
     Raises: FitError: data or parameters that cannot be fitted. ValueError: data that do not fit the scene.
     Source: `likelihood`, `optimisation`, `intervals`, `identifiability`.
     """

@@ -68,8 +68,7 @@ class Profile:
 
 
 def covariance(slopes: FloatArray) -> FloatArray:
-    """Covariance (A'A)^-1 with A = d(residuals)/dt; variance very large along directions not determined by
-    A."""
+    """Covariance (A'A)^-1, A = d(residuals)/dt; variance very large along directions that A leaves open."""
     _, s, vt = np.linalg.svd(slopes, full_matrices=False)
     # Lower bound: the variance is finite even for data without any information.
     largest = np.max(s, initial=1e-100)

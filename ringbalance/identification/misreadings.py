@@ -18,8 +18,7 @@ from ringbalance.scene.arrays import FloatArray
 _LONGEST_INJECTION_S: Final = 10.0
 """Longest plausible injection: longer times cannot be seconds stated as milliseconds."""
 Change = Callable[[Observations, Any], Observations | None]
-"""Function from observations and scene to the observations in another reading; None if that does not
-apply."""
+"""Function from observations and scene to the observations read differently; None if not applicable."""
 Conversion = Callable[[FloatArray, Any], FloatArray]
 
 

@@ -26,7 +26,7 @@ from ringbalance.scene.narrowing import AnyScene
 _ASSUMED_NOISE: Final = 0.01
 """Assumed standard deviation of a kind without measurements, relative to the largest prediction."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
-"""Ratios to the median of the data, or to the unbalance that makes the vibration at the start."""
+"""Candidate settings over the median of the data."""
 _WORTHWHILE: Final = 0.9
 """Ratio of interval widths, after over before, up to which one measurement is recommended."""
 _AT_ALL: Final = 0.99

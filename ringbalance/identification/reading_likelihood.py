@@ -105,8 +105,7 @@ class ReadingComparison:
         )
 
     def gain(self, joint: Joint, chosen: Sequence[int]) -> float | None:
-        """Gain of the log likelihood by an alternative reading of some files; None if it cannot be
-        predicted."""
+        """Gain of the log likelihood by an alternative reading of some files; None: no prediction."""
         rows = list(self.rows)
         for i in chosen:
             changed = self._changed(joint, i)
@@ -197,8 +196,7 @@ class ReadingComparison:
         return deviance
 
     def _changed(self, joint: Joint, i: int) -> _ReadingRows | None:
-        """Rows of a file in an alternative reading, as far as that applies; None if they cannot be
-        predicted."""
+        """Rows of a file in an alternative reading, as far as that applies; None: no prediction."""
         rows, problem = self.rows[i], self.problem
         observations = rows.block.observations
         settings: tuple[str, ...] = ()

@@ -68,8 +68,7 @@ def _assumed_noise(noise: float, expected: float) -> float:
 
 
 def _velocity_walk(noise: float, step: float, stiffness: float, rotor: float, mass: float) -> float:
-    """Random walk of the velocity within 1 s, m/s: a fraction of W_c^2 times the displacement noise of 1
-    s."""
+    """Random walk of the velocity within 1 s, m/s: a fraction of W_c^2 times displacement noise of 1 s."""
     return _VELOCITY_WALK_FRACTION * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
 
 

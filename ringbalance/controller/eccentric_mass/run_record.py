@@ -51,8 +51,7 @@ _WRONG_MODEL_INNOVATION: Final = 1.5
 """Mean normalised innovation squared beyond which the filter's model counts as wrong; for a true model it is
 1 +- 0.1 after 100 samples, by the chi-square distribution."""
 _SATURATED_FRACTION: Final = 0.5
-"""Fraction of a run with a voltage at its limit beyond which that is the reason why masses miss their
-goals."""
+"""Fraction of a run with a voltage at its limit beyond which that limit keeps masses from their goals."""
 _RUN_AWAY_TURNS: Final = 5.0
 """Turns beyond which a mass has run away: all moves of a strategy together are shorter."""
 
@@ -178,8 +177,7 @@ class EccentricRun(PresentedResult):
 
     @cached_property
     def within_since(self) -> float | None:
-        """Time of the first sample from which on the amplitude stays within the limit, s; None if it ends
-        above."""
+        """Time of the sample from which on the amplitude stays within the limit, s; None if it ends above."""
         above = np.flatnonzero(self.amplitude > self.limit)
         first = int(above[-1]) + 1 if above.size else 0
         return None if first == self.time.size else float(self.time[first])

@@ -51,8 +51,7 @@ class _SampledLoop:
     recommended: float
     """Largest value of the key that leaves a gain margin of two."""
     recommended_step: float
-    """Longest hold of the voltage that leaves this margin with the scene's gains, s; at most the scene's
-    hold."""
+    """Longest hold of the voltage that leaves this margin with the scene's gains, s; at most the scene's."""
 
     @property
     def radius(self) -> float:

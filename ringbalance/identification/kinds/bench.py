@@ -30,8 +30,7 @@ _TERMS: Final = 100
 _LAMINAR: Final = 100.0
 """Ratio of critical Re to the usual one for flow known to be laminar."""
 _CONDUCTANCE_UNCERTAINTY: Final = 0.1
-"""Relative expanded uncertainty (95 %) of a conductance from an opening's area, by its discharge
-coefficient."""
+"""Relative expanded uncertainty (95 %) of a conductance from an area, by the discharge coefficient."""
 _CRITICAL_RATIO: Final = 0.5
 """Default critical pressure ratio b: that of a sharp opening."""
 _STEPS: Final = 2000

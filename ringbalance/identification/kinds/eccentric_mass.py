@@ -81,8 +81,7 @@ def _informs(observations: Observations) -> tuple[str, ...]:
 
 
 def _too_long(scene: EccentricScene, observations: Observations) -> str:
-    """Reason why the motions take too long to integrate, some hundred times in a fit; empty if they do
-    not."""
+    """Reason why integration takes too long, some hundred times in a fit; empty if it does not."""
     plant, times = PlantParameters.of(scene), observations.columns["time"]
     motions = _motions(observations)
     steps = sum(substeps(plant, motion.speed, 0.0, times[rows[-1]]) for motion, rows in motions)

@@ -145,7 +145,7 @@ class Sweep(Result):
 
     @cached_property
     def nearest(self) -> int | None:
-        """Row of the point that serves most devices if no point is feasible by runs; None: none serves any."""
+        """Row of the point that serves most devices if runs show none feasible; None: none serves any."""
         ranked = [(run["fraction"] or 0.0, -i) for i, run in enumerate(self.driven)]
         fraction, negative_row = max(ranked, default=(0.0, 0))
         return -negative_row if self.runs and self.best is None and fraction > 0 else None

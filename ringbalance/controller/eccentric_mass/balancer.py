@@ -201,7 +201,7 @@ class EccentricMassBalancer(Balancer):
         return tuple(remedies_of(self.scene, nominal, sample, ratios))
 
     def drawn_input(self, name: str) -> DrawnInput:
-        """Kind of an input; the direction of an imbalance has no key to measure."""
+        """Kind of an input; no measurement is proposed for the direction of an imbalance."""
         if name == PHASE:
             return DrawnInput(common=False, measure="", path=PHASE)
         if name.startswith(FITTED):

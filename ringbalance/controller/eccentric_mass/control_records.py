@@ -43,7 +43,10 @@ _UNBALANCE_WALK_FRACTION = 0.01
 """Random walk of the unbalance within 1 s, as a fraction of its standard deviation after 1 s of samples far
 above the critical speed: the filter averages over 100 s, longer than an estimation takes."""
 _VELOCITY_WALK_FRACTION = 0.03
-"""Walk of the velocity likewise; its fraction is largest at the critical speed, where damping divides it."""
+"""Random walk of the velocity within 1 s, as a fraction of W_c^2 times the displacement noise of 1 s.
+
+The fraction is largest at the critical speed, where damping divides it.
+"""
 _LONGEST_WAIT_S = 30.0
 
 
@@ -78,7 +81,7 @@ def _unbalance_walk(noise: float, step: float, rotor: float, mass: float) -> flo
 
 
 def _settling(damping: float, rotor: float, mass: float) -> float:
-    """Eight time constants of the free whirl, at most half a minute, s."""
+    """Eight time constants of the free whirl, at most `_LONGEST_WAIT_S`, s."""
     twice_mass = 2 * (rotor + 2 * mass)
     return _LONGEST_WAIT_S if damping * _LONGEST_WAIT_S <= 8 * twice_mass else 8 * twice_mass / damping
 
@@ -336,7 +339,7 @@ class FineTuning:
 
 @dataclass(frozen=True, kw_only=True)
 class Supervisor:
-    """Order, gates and limits of the stages."""
+    """Gates, times and limits of the stages."""
 
     strategy: Annotated[
         Strategy, standard("whole", "all stages in turn; or none, with the masses locked where they are")

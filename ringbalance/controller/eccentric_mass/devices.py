@@ -22,8 +22,7 @@ from ringbalance.scene.origins import InputUncertainty, moved_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 ASSUMED_AMPLITUDE: Final = 0.05
-"""Relative expanded uncertainty (95 %) of an imbalance of which the scene states none, as of a liquid
-ring's."""
+"""Relative expanded uncertainty (95 %) of an imbalance without a stated one; liquid rings have the same."""
 PHASE: Final = "imbalance.phase"
 FITTED: Final = "fitted together, direction"
 _SIZE: Final = ("imbalance.mass", "imbalance.radius")

@@ -77,7 +77,7 @@ _REAL: Final = (
     "least",  # fine tuning: objective at its best goal, m
     "move_size",  # fine tuning: travel of a mass in one move, rad
     "deviation",  # largest standard deviation of the estimated imbalance in any direction, kg m
-    "surprise",  # sum of the imbalance filter's normalised innovations squared
+    "surprise",  # sum of normalised innovations squared of the imbalance filter
 )
 _WHOLE: Final = (
     "sample",  # number of the next sample

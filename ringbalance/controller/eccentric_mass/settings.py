@@ -252,6 +252,6 @@ def off_by_one(scene: EccentricScene, inputs: Collection[str]) -> Iterator[Eccen
 
 
 def _drive_ratios(plant: EccentricScene) -> FloatArray:
-    """B_add/b and C_add/b."""
+    """Ratios B_add/b and C_add/b of the drives, shape (2,)."""
     constants = PlantParameters.of(plant)
     return np.array([constants.drive_gain, constants.drive_damping]) / constants.moment

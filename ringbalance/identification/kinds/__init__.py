@@ -1,1 +1,1 @@
-"""Kinds of measurement: what a column means, its unit, and how the program predicts it; all in `reading.KINDS`."""
+"""Kinds of measurement: meaning and unit of each column, and its prediction; all in `reading.KINDS`."""

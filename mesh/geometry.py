@@ -76,7 +76,7 @@ def liquid_first_moment(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatAr
 
 
 def moment_across(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
-    """First moment along y, m^3: zero unless an imported chamber is asymmetric.
+    """First moment of the cross-section along y, m^3: zero unless an imported chamber is asymmetric.
 
     It turns the moment of every chamber by the same angle, atan(moment_across/liquid_first_moment).
     """

@@ -37,8 +37,7 @@ def rms_velocity(*, amplitude: float, speed: float) -> float:
 
 
 def critical_speed(*, mass: float, stiffness: float) -> float:
-    """Undamped critical speed of a rotor on isotropic bearings, sqrt(K/M), rad/s: its lag is a quarter
-    turn."""
+    """Undamped critical speed of a rotor on isotropic bearings, sqrt(K/M), rad/s: there the lag is 90 deg."""
     return math.sqrt(stiffness / mass)
 
 
@@ -55,9 +54,9 @@ def amplification_factor(*, mass: float, stiffness: float, damping: float) -> fl
 def peak_sensitivity(*, loop_factor: float, integral: float = 0.0, derivative: float = 0.0) -> float:
     """Largest |1/(1 + L)| on the unit circle, L = h (1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z))/(z - 1).
 
-    2/(2 - h) with P alone, up to h = 2.  i = dt/Ti (`integral`), q = Td/dt (`derivative`).  A residual that
-    changes sign at every sample, h > 1, has no integral part, and as its amplitude has no sign the loop is
-    L = -h (1 + q (1 - 1/z))/(z + 1).
+    2/(2 - h) with P alone, up to h = 2.  i = dt/Ti (`integral`), q = Td/dt (`derivative`).  With h > 1 the
+    residual changes sign at every sample, which resets the integral each time; as the amplitude that is
+    controlled has no sign, the loop is then L = -h (1 + q (1 - 1/z))/(z + 1).
     Source: ISO 14839-3:2006, which judges the loops of magnetic bearings by it; used here for comparison.
     """
     z = np.exp(1j * _ANGLES_RAD)

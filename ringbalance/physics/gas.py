@@ -41,8 +41,8 @@ LAMINAR_RATIO: Final = 0.999
 VENTED: Final = 1 - LAMINAR_RATIO
 """Gauge pressure over ambient pressure below which a chamber counts as vented."""
 _NORMAL_PRESSURE_PA: Final = 101325.0
-"""Pressure of a normal litre: DIN 1343."""
 _NORMAL_TEMPERATURE_K: Final = 273.15
+"""State of a normal litre: DIN 1343."""
 
 
 def flow_shape(ratio: float, critical_ratio: float) -> float:
@@ -118,7 +118,10 @@ class GasLine:
         return np.minimum(np.asarray(ratio) - b, 0.0) + (1 - b) * self._angle(ratio)
 
     def choked_filling_time(self, *, volume: float) -> float:
-        """Lower bound of the time from ambient to supply pressure, V p/(C p_1 p_0) sqrt(T_0/T), s."""
+        """Lower bound of the time from ambient to supply pressure, V p/(C p_1 p_0) sqrt(T_0/T), s.
+
+        p is the gauge and p_1 the absolute pressure of the supply.
+        """
         return self.time_constant(volume=volume) * (1 - self.ambient_pressure / self.supply_pressure)
 
     def venting_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:

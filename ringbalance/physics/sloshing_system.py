@@ -107,7 +107,7 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
 def imported_system(
     geometry: ChamberGeometry, *, surface_radius: float, width: float, coarse: bool
 ) -> tuple[SloshingSystem, float]:
-    """Assemble the problem in the middle section of an imported chamber; its unit of length is in m.
+    """System in the middle section of an imported chamber, and its unit of length, m.
 
     Args: `coarse`: true for a mesh on the corners of the cells alone.
     Raises: ValueError: as `middle_section`.
@@ -145,8 +145,8 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
     condensed = matrix[free] @ extension
     kinetic = np.asarray((condensed + condensed.T) / 2, dtype=np.float64)
     # The Stokes layers on the two ends cover the whole flow, so their loss is proportional to the kinetic
-    # energy. Along the sides it is the integral of the squared velocity, from the flux through them, zero at
-    # the edges.
+    # energy. Along the sides it is the integral of the squared velocity, from the flux through them; at the
+    # surface's two edges the velocity is taken as zero.
     wetted, flux = np.setdiff1d(walls, surface), matrix @ extension
     inverse = splu(mass.assemble(sides)[wetted][:, wetted].tocsc())
     wall_loss = ends * kinetic + np.asarray(flux[wetted].T @ inverse.solve(flux[wetted]))
@@ -157,7 +157,7 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
         rows[facets, :, numbers] += normal[0] * function.grad[1] - normal[1] * function.grad[0]
     means = [load / load.sum() for load in map(unit_load.assemble, (on_facets(OUTER_WALL), top))]
     difference, points = means[0] - means[1], basis.doflocs[0] + 1j * basis.doflocs[1]
-    # Difference of the means of phi, the harmonic conjugate of psi, from psi.
+    # Adjoint of the map from psi to the difference of the means of phi, its harmonic conjugate.
     adjoint = np.zeros(basis.N)
     adjoint[1:] = splu(matrix[1:][:, 1:].tocsc()).solve(difference[1:])
 
@@ -181,7 +181,8 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
 class _FilmMapping(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
     """Mapping for films, where rounding exceeds the 1e-12 at which scikit-fem's Newton method ends.
 
-    Shape functions are evaluated once for all components, and points of a facet are located once.
+    An end at 1e-6 suffices, because the method converges quadratically.  Shape functions are evaluated once
+    for all components, and points of a facet are located once.
     """
 
     def __init__(self, mesh: Any, element: Any, of_facets: Any) -> None:

@@ -291,8 +291,10 @@ class WeakProblem:
 
     @classmethod
     def of(cls, basis: Any, force: Callable[[FloatArray], FloatArray], *, unit: float = 1.0) -> WeakProblem:
-        """Assemble the weak form. Args: `force`: f, Pa/m, at points in m. `unit`: of the mesh's lengths,
-        m."""
+        """Assemble the weak form.
+
+        Args: `force`: f, Pa/m, at points in m. `unit`: unit of the mesh's lengths, m.
+        """
         field = DiscreteField(unit * force(unit * np.asarray(basis.global_coordinates())))
         return cls(basis=basis, stiffness=stiffness(basis), load=_work.assemble(basis, force=field))
 

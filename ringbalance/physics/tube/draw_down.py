@@ -31,8 +31,8 @@ def _draw_down_depth(
     Near the port h is the smaller of two depths, each of which suffices; they cross at u = 1.2 sqrt(g_c d),
     so that narrow ports follow the first and wide ones the second:
 
-    - over a point sink, h = 0.6884 (Q^2/g_c)^(1/5): Bernoulli's equation from the surface at rest to its
-      axis, h = y + [Q/(2 pi y^2)]^2/(2 g_c), has a solution y only above this h, at y^5 = Q^2/(2 pi^2 g_c);
+    - over a point sink, h = 0.6884 (Q^2/g_c)^(1/5): the least depth, at y^5 = Q^2/(2 pi^2 g_c), that
+      satisfies Bernoulli's equation from the surface at rest to its axis, h = y + [Q/(2 pi y^2)]^2/(2 g_c);
     - over the rim as over a weir, h = (3/2) [Q/(pi d sqrt(g_c))]^(2/3), critical depth 2 h/3 along pi d: from
       a deeper layer more would fall into the port than the tube takes, and the port stays submerged.
 
@@ -47,7 +47,7 @@ def _draw_down_depth(
         layer y + c deep.
     Raises: ValueError: an acceleration that is not positive and finite.
     Range: a port in the middle of its wall; a laminar layer, thin against R. A turbulent layer, possible with
-        water, has more friction, which is still below a hundredth of the depth. The sink is inviscid and
+        water, has more friction, whose part of the depth is still below a hundredth. The sink is inviscid and
         without swirl about the port's axis. A bathtub vortex draws gas from deeper; the rotation of a disc
         makes none, because its axis lies in the surface.
     Source: derived; the sink's power and factor are those of Lubin and Springer, "The formation of a dip on

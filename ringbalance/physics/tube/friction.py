@@ -149,8 +149,8 @@ def friction_uncertainty(
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio, sharpness=6.0)
     grain = re * np.sqrt(f / 8) * relative_roughness
     # The turbulent branch without its onset term; below Re = 1000 its logarithm changes sign.
-    onset = _log_power(clipped(re, 1000.0, 1e12), relative_roughness)
-    turbulent = 8 * np.asarray(turbulent_ratio) * onset**-0.125
+    log_power = _log_power(clipped(re, 1000.0, 1e12), relative_roughness)
+    turbulent = 8 * np.asarray(turbulent_ratio) * log_power**-0.125
     # Where rotation has raised the laminar branch above the turbulent one the transition has no jump: values
     # measured in rotating ducts lie at the laminar branch or above it.
     branch_gap = np.maximum(turbulent - 64 * np.asarray(laminar_ratio, dtype=np.float64) / re, 0.0)

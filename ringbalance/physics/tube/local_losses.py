@@ -248,7 +248,7 @@ def exit_uncertainty(
 _BEND_UNCERTAINTY: Final = 0.25
 """Expanded uncertainty (95 %) of a turbulent bend's loss, relative: the spread of the published methods."""
 _LAMINAR_BEND_UNCERTAINTY: Final = 0.6
-"""Expanded uncertainty (95 %) of a laminar bend's loss at rest, relative: one shape was computed."""
+"""Expanded uncertainty (95 %) of a laminar bend's excess loss at rest, relative: one shape was computed."""
 _LARGEST_EXCESS: Final = 1.25
 """Largest laminar excess K_0 of a bend, for 90 degrees and r = 2 d."""
 _HALF_WAY_DEAN: Final = 28.0

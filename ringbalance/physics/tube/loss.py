@@ -90,11 +90,11 @@ to +0.20, beyond the loss of the same inlet at rest: a blunt one loses less wher
 
 
 def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -> Mapping[str, FloatArray]:
-    """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
-    of squares.
+    """Expanded uncertainties (95 %) of k by cause; independent, so they combine as root sum of squares.
+
     Args: `state`: the terms of k of the scene's tube at these velocities.
-    Returns: Half-width of k by cause, each the shape of `velocity`; "input: fitted" of all inputs that were
-        fitted together. Parts that vanish everywhere are kept.
+    Returns: Half-width of k by cause, each the shape of `velocity`; "input: fitted" is that of all inputs
+        that were fitted together. Parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads are given with the correlations.
     """
 

@@ -67,7 +67,7 @@ class TubeState:
 
         Entrance, that share of what is spread along the path, and the bends of the first leg.  A bend belongs
         to a leg, wherever the crest is, so that the loss is continuous as the crest moves.  Both legs have
-        equally many; the crest halves the middle one of an odd number.
+        the same number of bends; the crest halves the middle one of an odd number.
         Source: energy balance from the chamber to the crest; the scene does not say where the bends lie.
         """
         spread = share * self.spread_loss

@@ -59,7 +59,7 @@ class Answers:
     crest_pressure: FloatArray
     """Gauge pressure at the end of the crest's arc at equal fills, Pa; NaN where the tube is blocked."""
     cavitation_margin: FloatArray
-    """Lowest pressure in a full siphon (at rest, if blocked) less the cavity pressure, Pa."""
+    """Lowest pressure in a full siphon less the cavity pressure, Pa; if blocked, that of a primed tube."""
     stall_pressure: FloatArray
     """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
     priming_pressure_vented: FloatArray

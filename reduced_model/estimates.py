@@ -127,7 +127,7 @@ def range_velocities(flow: RangeFlow) -> FloatArray:
 
 
 def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
-    """Largest relative change by neglecting a part of the tube's loss, or by a constant instead.
+    """Largest relative change by leaving out a part of the tube's loss, or by the paper's k for the whole.
 
     Returns: The larger change of k under the same pressure and of the head up to the siphon crest, by part of
         the loss.

@@ -48,8 +48,8 @@ class LineAnswer:
     venting_time: float
     """Time to vent a chamber at equal fills, from supply to ambient pressure, s."""
     shortest_opening: float | None
-    """Shortest valve-open time with a certain effect, s: it primes the tube; None: the gas starts no flow, or
-    the moved liquid runs back."""
+    """Shortest valve-open time that primes the tube, so that its effect is sure, s; None: the gas starts no
+    flow, or the moved liquid runs back."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
     dead_time: float | None = None

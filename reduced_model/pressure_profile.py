@@ -60,7 +60,7 @@ class HumpProfile:
     velocity: float
     """Velocity u, m/s; negative in reverse, zero when blocked."""
     hump_path: float | None
-    """Path coordinate of the lowest crest pressure, the end of its arc, m; None without a crest."""
+    """Path coordinate of the lowest crest pressure, the end of the crest's arc, m; None without a crest."""
     hump_pressure: float | None
     """Gauge pressure over the crest, Pa; None without a crest."""
     cavity_pressure: float | None

@@ -64,8 +64,8 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs:
 class Holding:
     """Stability of the fullest chamber's liquid, gas off: it stays if the column over the crest parts.
 
-    Only at the vapour pressure does a column certainly part; runs with nominal parts assume the cavity
-    pressure by `TubePath.released`.
+    It parts for certain only where its pressure would fall below that of vapour alone; runs with nominal
+    parts assume a cavity at the pressure by `TubePath.released`.
     """
 
     sure_speed: float | None

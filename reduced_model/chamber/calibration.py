@@ -287,7 +287,9 @@ def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray
 
 
 def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[Table, FloatArray]:
-    """Table of the pressure at R2, Pa, and its error; an imported chamber has the closed form at more fills.
+    """Table of the pressure at R2, Pa, and its expanded uncertainty (95 %) near each node.
+
+    That of an imported chamber has the closed form at more fills.
 
     Args: `nodes`: equally spaced from zero. `value`: with gravity, where that is modelled.
     """

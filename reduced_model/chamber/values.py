@@ -48,8 +48,7 @@ def chamber_closed_forms(
 def chamber_pressure(*, scene: Scene, fill_ratio: npt.ArrayLike) -> FloatArray:
     """Hydrostatic pressure at the outer radius R2 without gravity, rho omega^2 (R2^2 - a^2)/2.
 
-    Over rho it is the head of a chamber of any shape, from R2; the mean over the walls is a load
-    instead.
+    Over rho it is the head of a chamber of any shape, from R2; the mean over the outer wall is a load.
     Returns: Pa, the shape of `fill_ratio`.
     Source: Eq. 11 of the liquid-ring paper from the free surface outward.
     """

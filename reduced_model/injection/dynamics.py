@@ -57,7 +57,7 @@ Record = Any
 FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
 """Gas on or off and tube primed or not, in the order of the tables of a law that gives velocities alone."""
 PIECES: Final = 4096
-"""Pieces of each table in `FLOWS`."""
+"""Number of pieces of the table for each of `FLOWS`."""
 NUMBERS: Final = 4352
 """Room for the numbers of a law, fixed, so that compiled code serves every law."""
 WAYS: Final = 3
@@ -191,7 +191,7 @@ class Lift:
 
     @classmethod
     def of(cls, scene: Scene, *, law: FlowLaw) -> Lift | None:
-        """Make the tube up to the crest at equal fills; None without a crest, or under a law without one."""
+        """Tube up to the crest, by the flow at equal fills; None without a crest or the calibrated law."""
         tube = scene.tube
         if tube.hump_radius is None or not isinstance(law, CalibratedLaw):
             return None
@@ -201,7 +201,7 @@ class Lift:
 
     @classmethod
     def at(cls, scene: Scene, velocity: FloatArray) -> Lift:
-        """Make the tube up to the crest. Args: `velocity`: of each full tube at equal fills, m/s."""
+        """Tube up to the crest. Args: `velocity`: in the full tube at equal fills, m/s; or of designs."""
         tube = scene.tube
         crest = 0.0 if tube.hump_radius is None else tube.hump_radius
         straight = 0.0 if tube.hump_shape == "arc" else 2 * crest / (tube.port_radius + crest)
@@ -291,7 +291,7 @@ class Dynamics:
         lifts: bool = False,
         residual: float = 0.0,
     ) -> Dynamics:
-        """Make them by the flow law alone, or with more terms; `lifts`: an unprimed tube is filled first."""
+        """Flow law alone, or with more terms; `lifts`: an unprimed tube is first filled up to its crest."""
         return cls(
             law=model.flow,
             tube=scene.tube,
@@ -389,7 +389,7 @@ def _fill_rows(plant: npt.NDArray[np.void], ways: int, numbers: FloatArray, rows
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
-    """Write the tables of a law of velocities, one for each of `FLOWS`: powers of u|u|, primed, regime.
+    """Write the tables of a law of velocities, for each of `FLOWS`: u|u| as a cubic, primed, regime.
 
     u|u| is linear in a piece that holds a stall or a reversal.  A change of regime within a piece takes
     effect at its end.

@@ -10,7 +10,8 @@ lost at the entrance.  From s_end on the flow law's column continues at the same
 Liquid on the crest's circle is pulled to neither side.  When the column parts, this liquid is assumed to
 drain evenly: liquid short of the middle of the crest falls back, liquid beyond it has passed.  Between
 injections gas is assumed to lie over the crest; legs on both sides of a cavity would stand somewhat higher.
-While liquid is lifted the state holds the fill of the chamber alone; `shown` adds what would fall back.
+While liquid is lifted the state holds the fill of the chamber alone; `shown` counts the lifted liquid in the
+chamber to which it would drain.
 """
 
 from __future__ import annotations

@@ -332,7 +332,7 @@ def lacking(law: object) -> tuple[str, ...]:
 def completed_model(law: object, *, by: CompleteLaw) -> BalancerModel:
     """Balancer of a law of the caller's own; attributes that the law lacks come from `by`.
 
-    A law that bears the name of a law of the program, as a wrapper may, is named by its class instead.
+    A law without a name, or with that of a law of the program, as a wrapper may have, is named by its class.
 
     Raises: TypeError: a law without velocities.
     """

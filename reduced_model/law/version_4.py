@@ -41,7 +41,7 @@ def split(document: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _without(table: Mapping[str, Any], numbers: slice) -> tuple[dict[str, Any], FloatArray]:
-    """Table without some columns, and the first column removed."""
+    """Table without some columns, and the first of the removed columns."""
     columns = np.reshape(np.array(table["columns"], dtype=np.float64), (-1, len(table["knots"])))
     return {**table, "columns": np.delete(columns, numbers, axis=0).ravel().tolist()}, columns[numbers][0]
 

@@ -183,7 +183,7 @@ _LONGEST_PIECE: Final = 128
 def knots_of(x: FloatArray, columns: Sequence[TableColumn], *, shortest: int = 1) -> IntArray:
     """Samples at which pieces meet; each is halved until its errors are allowed or it has the least length.
 
-    Args: `x`: 2^n + 1 samples. `shortest`: samples from end to end of such a piece.
+    Args: `x`: 2^n + 1 samples. `shortest`: least length of a piece, in steps from sample to sample.
     """
     length = min(_LONGEST_PIECE * shortest, x.size - 1)
     starts, knots = np.arange(0, x.size - 1, length), [np.array([x.size - 1])]

@@ -156,7 +156,7 @@ def _far_leg(
 
 
 def _bend_shares(tube: Tube) -> tuple[FloatArray, FloatArray]:
-    """Fractions s/L of both halves of every bend: (i + 1/2)/n of both legs, or of a tube without a crest.
+    """Fractions s/L of both halves of every bend: (i + 1/2)/n of both legs together, or of a plain tube.
 
     The halves of a bend in the middle sit at both ends of the crest.
     """

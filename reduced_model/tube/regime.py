@@ -161,7 +161,8 @@ def discharges_openly(path: Any, ends: Any) -> Any:
 def cavity_bounds(path: Any, ends: Any) -> Any:
     """Lowest and highest pressure of a cavity in a primed tube, Pa.
 
-    Vapour pressure and, with dissolved gas, that of the downstream chamber, into which excess gas leaves.
+    Vapour pressure and, with dissolved gas, the downstream gas pressure, at which gas leaves through there;
+    with an open downstream port both are the downstream gas pressure.
     """
     low = chosen(discharges_openly(path, ends), ends[1], path.vapour_pressure)
     return low, chosen(path.released == 0.0, low, np.maximum(ends[1], low))
@@ -219,7 +220,7 @@ def can_flow(path: Any, ends: Any, primed: Any) -> Any:
 
 @both_ways
 def holds_at_rest(path: Any, ends: Any, primed: Any) -> Any:
-    """True where a primed column at rest stays: without a crest, or with one in exact balance."""
+    """True where a primed column at rest stays: no crest, or balanced and above the cavity pressure there."""
     held = primed & covered(path, ends)
     if not path.crest:
         return held
@@ -244,10 +245,6 @@ class ColumnFlow(Generic[Pressure]):
     """Velocity of a full siphon, m/s."""
     separation_velocity: Pressure
     """Velocity of a column that is separated at the crest, m/s; without a crest that of the siphon."""
-    spill_velocity: Pressure
-    """Velocity of a column separated at the crest pressure before the flow (unprimed: of gas), m/s."""
-    holding: Pressure
-    """Pressure that drives the column up to the crest, Pa; without a crest that of the siphon."""
     separated: Truth
     """True where the column is separated."""
     primed: Truth
@@ -282,8 +279,6 @@ def column_flow(
             velocity=full,
             siphon_velocity=full,
             separation_velocity=full,
-            spill_velocity=full,
-            holding=driving,
             separated=full < full,
             primed=flows | holds_at_rest(path, ends, primed),
         )
@@ -303,8 +298,6 @@ def column_flow(
         velocity=chosen(separated, broken, full),
         siphon_velocity=full,
         separation_velocity=broken,
-        spill_velocity=spill,
-        holding=margin,
         separated=separated,
         primed=(flows & keeps) | holds_at_rest(path, ends, primed),
     )

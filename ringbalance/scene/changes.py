@@ -144,14 +144,14 @@ def checked_scene(scene: SceneFile) -> AnyScene:
 
 
 def document_of(scene: SceneFile) -> Mapping[str, Any]:
-    """The scene's document, parsed from TOML. Raises: SceneError: a scene that was not read from a file."""
+    """The scene's document, parsed from TOML. Raises: SceneError: a scene that was made without checks."""
     return _known(scene).document
 
 
 def file_text(scene: SceneFile, *, to: Path) -> bytes:
     """Bytes of a scene file for a folder; the path of a mesh becomes relative to that folder.
 
-    Raises: SceneError: a scene that was not read from a file.
+    Raises: SceneError: a scene made without the checks of a file.
     """
     checked = _known(scene)
     document = deepcopy(dict(checked.document))
@@ -161,7 +161,7 @@ def file_text(scene: SceneFile, *, to: Path) -> bytes:
 
 
 def _known(scene: SceneFile) -> CheckedValues:
-    """Checked values of a scene. Raises: SceneError: a record that was not read from a file."""
+    """Checked values of a scene. Raises: SceneError: a scene made without the checks of a file."""
     if scene.checked is None:
         allowed = "ringbalance.load_scene(path), and with_values to change what it gives"
         raise SceneError.of_file(scene.file, "this scene was made without the checks of a file", allowed)
@@ -177,7 +177,7 @@ def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
         if is_dataclass(now) and type(now) is type(before):
             for field in fields(now):
                 path, value = f"{name}.{field.name}", getattr(now, field.name)
-                # Meshes of one file name compare equal, whatever their nodes: only identity counts.
+                # Meshes compare by their digest alone, whatever their nodes: only identity counts.
                 comparable = not isinstance(value, ChamberGeometry)
                 checked = getattr(before, field.name)
                 if value is not checked and not (comparable and value == checked):

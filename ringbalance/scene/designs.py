@@ -156,7 +156,7 @@ def alike(scenes: Sequence[Scene]) -> list[list[int]]:
 def in_batches(
     scenes: Sequence[Scene], function: Callable[[Designs], FloatArray], *, each: int | None = None
 ) -> FloatArray:
-    """Values of a function of designs for scenes that may differ in more than numbers; one call a group.
+    """Values of a function of designs for scenes that may differ in more than numbers; one call per group.
 
     Args: `function`: returns an array whose last axis runs over the designs. `each`: number of designs n
         in every scene, whose numbers are then arrays of shape (n,).

@@ -209,7 +209,7 @@ def _water_series() -> FloatArray:
 
 
 def with_liquid(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
-    """The scene with the liquid's values, those given in the scene first; and the errors."""
+    """The reading with the liquid's values, those in the file before tabulated ones; and the errors."""
     if "liquid" in reading.broken or not reading.given("liquid"):
         return reading, ()
     liquid = _find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None

@@ -78,7 +78,8 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
 def half_widths(scene: Scene) -> Mapping[str, float]:
     """Absolute expanded uncertainties (95 %) of a scene's inputs, without correlations.
 
-    Those of the joint distribution come first, then stated ones, then assumed ones and the liquid's own.
+    The joint distribution takes precedence over stated uncertainties, and these over assumed ones and the
+    liquid's own.
     Returns: SI half-width by quantity; only those above zero.
     """
     liquid = scene.liquid

@@ -240,7 +240,7 @@ def _scale_findings(
 def _covered_findings(
     body: Body, points: FloatArray, *, radii: Mapping[str, float], fill: float
 ) -> Iterator[Contradiction]:
-    """Errors of a port above the liquid at the start, and of a gas inlet below it at the largest fill.
+    """Errors of a port that the liquid leaves free at the start, and of a gas inlet that it covers when most.
 
     Args: `radii`: of "port_radius" and "inlet_radius", as far as known. `fill`: greatest fill ratio of a
         chamber, of which one holds half at the start.

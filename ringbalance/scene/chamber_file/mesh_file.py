@@ -71,7 +71,7 @@ def _by_meshio(
     allowed: str,
     unread: Mapping[str, str] = MappingProxyType({}),
 ) -> meshio.Mesh:
-    """Raises: MeshFileError: the file is no such mesh.
+    """Read a file with meshio. Raises: MeshFileError: the file is no such mesh.
 
     Args: `allowed`: accepted files. `unread`: sentences on sound files, by a text in the file or the error.
     """
@@ -123,7 +123,7 @@ def _read_gmsh(content: bytes) -> Contents:
 
 
 def _groups(mesh: meshio.Mesh) -> Iterator[Mark]:
-    """Physical groups: sets of version 4.1, several for an element, and group numbers.
+    """Physical groups: the sets of version 4.1, of which an element may have several, or group numbers.
 
     A group without a name keeps its number, so that a message can name it.
     """
@@ -313,7 +313,10 @@ def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
 
 
 def _add(parts: _MeshContent, keyword: str, options: dict[str, str], data: list[str]) -> None:
-    """Raises: MeshFileError: a keyword or an option that is not supported and might change the mesh."""
+    """Add the data of a keyword to the content.
+
+    Raises: MeshFileError: a keyword or an option that is not supported and might change the mesh.
+    """
     if keyword == "include":
         raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
     if keyword not in _READ:

@@ -89,7 +89,7 @@ class ChamberGeometry:
     file: str = field(compare=False)
     """Name of the mesh file in the scene."""
     digest: str
-    """SHA-256 of the file's bytes, unit and axis."""
+    """SHA-256 of the file's bytes, of how they were read (unit, axis, middle) and of each stretch."""
     kind: CellKind = field(compare=False)
     points: FloatArray = field(compare=False, repr=False)
     """Coordinates of the nodes, m, shape (n, 3)."""

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 LOG: Final = logging.getLogger("ringbalance")
-"""Log of progress and messages (info), of warnings and of errors; nothing is
-written unless a handler is added."""
+"""Log of progress and messages (info), of warnings and of errors; nothing is written without a handler."""
 LOG.addHandler(logging.NullHandler())
 _FORMAT: Final = "%(asctime)s %(levelname)s %(message)s"
 

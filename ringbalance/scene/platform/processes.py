@@ -67,7 +67,10 @@ class Workers(ProcessPoolExecutor):
             super().__init__(count, mp_context=get_context("spawn"), initializer=_begin)
 
     def submit(self, fn: Callable[_P, _R], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_R]:
-        """Call in a worker a function of an importable module. Raises: BrokenProcessPool: no worker left."""
+        """Have a worker call a function of an importable module.
+
+        Returns: Its future; where no worker is left, one with the error BrokenProcessPool.
+        """
         with _quiet_start():
             try:
                 future = super().submit(fn, *args, **kwargs)

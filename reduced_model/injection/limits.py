@@ -51,7 +51,7 @@ def hold_liquid(plants: npt.NDArray[np.void], designs: Designs) -> None:
 def stalled_fills(plants: Record, fills: FloatArray) -> None:
     """Fill ratio of each plant at which an injection moves no liquid, into an array of shape (n,).
 
-    As `residual_liquid.stalled_fill_ratio`: with what the tube holds while the gas is off.
+    As `residual_liquid.stalled_fill_ratio`, from the liquid that the tube holds while the gas is off.
     """
     for i in range(plants.size):
         fills[i] = _stalled_fill(plants[i])
@@ -89,8 +89,8 @@ def _moves(plant: Record, fill: float) -> bool:
 def running_velocities(plants: Record, rows: IntArray, fills: FloatArray, velocities: FloatArray) -> None:
     """Velocity out of a driven chamber through a tube that is full, m/s, zero where none leaves it.
 
-    Args: `rows`: of the plants. `fills`: of their driven chambers; the opposite ones have the rest of the
-        largest fill. `velocities`: is written.
+    Args: `rows`: indices of the plants. `fills`: fill ratios of their driven chambers; the opposite ones have
+        the rest of the largest fill. `velocities`: array for the result.
     """
     for i in range(rows.size):
         plant, fill = plants[rows[i]], fills[i]

@@ -1,8 +1,7 @@
 """A pair of chambers through time: fill, velocity and gas as one system, with its events, in plain numbers.
 
-The liquid either rests or moves in one direction; what changes that ends a step: the column comes to rest,
-begins to move or separates at rest, a chamber empties or is full, its level leaves the port, or a valve
-moves.
+The liquid either rests or moves in one direction. A step ends when the column comes to rest, begins to move
+or separates at rest, when a chamber is empty or full, when its level leaves the port, or when a valve moves.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.units import plain_number
 
 CALIBRATED: Final = "calibrated"
-"""Name of the law that `calibrate` makes, which is used where no other is asked for."""
+"""Name of the law that `calibrate` makes, the default."""
 UNCHECKED: Final = "calibrated, unchecked"
 """Name of a calibrated law without finite elements and uncertain inputs, for runs of many designs."""
 FILL_SLACK: Final = 1e-9
@@ -103,13 +103,13 @@ class FlowLaw(Protocol):
     ) -> Flow:
         """Flow for a driven chamber's fill ratio and gauge gas pressure.
 
+        Arguments may be quantities with units, such as those of pint.
         Args:
             fill_ratio: x of the driven chamber, any shape, within [0, max_fill_ratio].
             opposite_fill_ratio: of the opposite chamber; default max_fill_ratio - fill_ratio.
             gas_pressure: gauge, Pa, in the driven chamber; the opposite one is vented.
             primed: whether the tube holds a continuous column beforehand.
         Returns: Flow, of the broadcast shape of the arguments.
-        Quantities with units of their own, such as pint's, are taken as they are.
         Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
         """
         ...
@@ -290,7 +290,7 @@ class CompleteLaw(FlowLaw, Protocol):
         ...
 
     def table(self) -> Mapping[str, FloatArray]:
-        """Plain arrays for code of one's own, named in the implementing law's docstring."""
+        """Plain arrays for use in other code, named in the implementing law's docstring."""
         ...
 
     def save(self, path: Path | str) -> Path:

@@ -2,10 +2,10 @@
 
 The one source of every host: Python runs it as it stands, `translate` writes it in other languages, so it
 keeps to numbers, rows of numbers, `if`, `while` and functions.  `c` holds the law's numbers, `p` its pieces,
-`q` those of the levels, `k` cells of equal length that say at which piece to begin looking, the levels'
-first, `w` a query with its answer and all between; the names below are places in them.  A piece is a
-polynomial in the distance from its end.  Gauge pressures in Pa, velocities in m/s; upstream is the chamber
-that gives liquid.  Source: `tube.regime`, whose conditions these are.
+`q` those of the levels, `k` cells of equal length, the levels' first, each with the piece at which a search
+begins, `w` a query with its answer and intermediate values; the names below are indices into them.  A piece
+is a polynomial in the distance from its end.  Gauge pressures in Pa, velocities in m/s; upstream is the
+chamber that gives liquid.  Source: `tube.regime`, whose conditions these are.
 
 A full siphon loses a part R of what drives it, p_d, up to the crest, so that a column separates where the
 pressure that holds it there is below R p_d.  Both velocities are worked out only next to that, where an
@@ -221,7 +221,7 @@ def set_swept(c: Law, k: Cells, p: Pieces, w: Query, way: int) -> None:
 
 @both_ways
 def lost_part(p: Pieces, row: int, t: float, way: int) -> float:
-    """Part of the driving pressure that is lost up to the crest; `row`: beside a piece of the whole tube."""
+    """Part of the driving pressure that is lost up to the crest; `row`: of the shares of a piece."""
     if way == THERE:
         return p[row][SHARE_0] + t * (p[row][SHARE_1] + t * p[row][SHARE_2])
     return p[row][BACK_0] + t * (p[row][BACK_1] + t * p[row][BACK_2])

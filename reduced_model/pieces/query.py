@@ -51,7 +51,7 @@ from ringbalance.scene.platform.both_ways import both_ways
 
 @both_ways
 def turn(w: Query) -> None:
-    """Look from the other chamber."""
+    """Swap the upstream and the downstream chamber."""
     swapped = w[UP_LEVEL]
     w[UP_LEVEL] = w[DOWN_LEVEL]
     w[DOWN_LEVEL] = swapped

@@ -72,7 +72,7 @@ class Places:
 
 
 def reversed_tube(tube: Tube) -> Tube:
-    """The tube as the opposite chamber sees it. Returns: The tube with crest and bends from the other end."""
+    """The tube with its crest and bends counted from the opposite chamber."""
     errors = tuple(
         replace(each, even=-each.even) if each.cause == CREST_ERROR else each for each in tube.model_errors
     )

@@ -59,11 +59,11 @@ class TubeEnds(NamedTuple):
         return TubeEnds(self[1], self[0], self[3], self[2])
 
     def upstream_pressure(self) -> Any:
-        """At the upstream outer wall, gas and liquid, p_A + P_A, Pa."""
+        """Pressure of gas and liquid at the upstream outer wall, p_A + P_A, Pa."""
         return self.upstream_gas + self.upstream_hydrostatic
 
     def downstream_pressure(self) -> Any:
-        """At the downstream outer wall, gas and liquid, p_C + P_C, Pa."""
+        """Pressure of gas and liquid at the downstream outer wall, p_C + P_C, Pa."""
         return self.downstream_gas + self.downstream_hydrostatic
 
 
@@ -240,7 +240,7 @@ class ColumnFlow(Generic[Pressure]):
     """Quasi-steady flow in one direction."""
 
     velocity: Pressure
-    """m/s, the smaller of the two below; zero where nothing flows."""
+    """Velocity, m/s, the smaller of the two below; zero where nothing flows."""
     siphon_velocity: Pressure
     """Velocity of a full siphon, m/s."""
     separation_velocity: Pressure

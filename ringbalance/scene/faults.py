@@ -45,7 +45,7 @@ class Fault:
 
 
 class SceneError(Exception):
-    """A scene that cannot be used; `faults` holds everything that is wrong with it.
+    """A scene that cannot be used; `faults` has all its errors.
 
     Args: `faults`: one or more errors; the lines of the first fifty, and the number of the others, are the
         message.

@@ -32,7 +32,7 @@ CHANGED: Final = ", changed"
 def load_scene(path: str | PathLike[str]) -> AnyScene:
     """The scene of a scene file (TOML), in SI, with its units, defaults and cross-checks.
 
-    Raises: SceneError: the file cannot be read, or anything in it is wrong; all of it is said at once.
+    Raises: SceneError: a file that cannot be read, or all errors in it together.
 
     Example:
         >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))

@@ -404,7 +404,7 @@ class Scene(SceneFile):
 
     @property
     def required_amplitude(self) -> float | None:
-        """Amplitude that [requirement] lets remain, m zero-to-peak; None where it states none."""
+        """Amplitude that [requirement] allows, m zero-to-peak; None where it states none."""
         return required_amplitude(
             speed=self.rotor.speed,
             influence_coefficient=self.rotor.influence_coefficient,

@@ -178,12 +178,11 @@ class SceneFile:
     def with_values(self, values: Mapping[str, object], *, origin: Origin = "given") -> Self:
         """The scene with other values, checked as a file is checked, with hashes of its own.
 
-        What follows from a changed value, such as a default, follows again.
+        Values that are derived from a changed one, such as defaults, are derived again.
         Args: `values`: by path in a scene file, such as "tube.bore": text with a unit ("2 mm"), a number in
-            SI, or a quantity of pint's; None takes a key away. A number of the package uncertainties also
+            SI, or a quantity of pint's; None removes a key. A number of the package uncertainties also
             states its expanded uncertainty (95 %) in [uncertainty]. `origin`: of all of them.
-        Raises: SceneError: everything that is wrong with the result; or this record was itself changed in
-            another way.
+        Raises: SceneError: all errors of the result; or this record was itself changed in another way.
         """
         return cast(Self, registered("function", "with_values")(self, values, origin=origin))
 

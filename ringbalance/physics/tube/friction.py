@@ -94,7 +94,7 @@ def friction_factor(
         the laminar branch, broadcasts. `turbulent_ratio`: F_turb, factor on the turbulent branch, broadcasts.
         `critical_ratio`: c, critical Re over the straight tube's, broadcasts.
     Returns: f, of the broadcast shape; with all factors one it is Churchill's formula.
-    Range: the formula states none. Tests hold it against data of smooth tubes for Re from 11 to 1e6, and of
+    Range: the formula states none. Tests compare it with data of smooth tubes for Re from 11 to 1e6, and of
         sand-roughened ones up to eps/d = 0.033; its expanded uncertainty is `friction_uncertainty`.
     Source: Churchill, Chem. Eng. 84 (1977) 91; the three factors are ours.
     """
@@ -135,8 +135,8 @@ def friction_uncertainty(
     sand-like walls still act smooth there.
     Args: `relative_roughness`: eps/d.
     Range: as for `friction_factor`.
-    Source: spread against McKeon et al., J. Fluid Mech. 511 (2004) 41, and Nikuradse, VDI Forschungsheft 361
-        (1933), which the tests hold inside it.
+    Source: deviations from McKeon et al., J. Fluid Mech. 511 (2004) 41, and Nikuradse, VDI Forschungsheft 361
+        (1933); tests check that it covers them.
     """
     re = np.asarray(reynolds, dtype=np.float64)
     shape = {

@@ -310,7 +310,7 @@ def _broadcast(
     rotation_reynolds: npt.ArrayLike,
     critical_ratio: npt.ArrayLike,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The first three in one shape, and the share of turbulent flow."""
+    """Friction factor, Re and R_Om in one shape, and the share of turbulent flow."""
     f, re, rotation = np.broadcast_arrays(
         *(np.asarray(v, dtype=np.float64) for v in (friction_factor, reynolds, rotation_reynolds))
     )

@@ -97,7 +97,7 @@ class Schema:
     ) -> Schema:
         """The schema of a kind of balancer, with the keys of every scene file.
 
-        Args: `balancer`: presence of that key. `uncertainty`: that table; by default it has
+        Args: `balancer`: rule when that key is absent. `uncertainty`: that table; by default it has
             a subtable of half-widths for each table, for tables that share names of keys.
         """
         if uncertainty is None:

@@ -14,7 +14,7 @@ _LINE_INTERVAL_S: Final = 30.0
 
 
 class ProgressLine:
-    """Shows how far a function is; give one to `progress` of any function.
+    """Line with the progress of a function, for the argument `progress` of any function.
 
     A notebook and a terminal keep one line up to date; elsewhere a line is written every half minute, so that
     a short call writes nothing. All of it goes to standard error, or into the cell's output.
@@ -37,7 +37,7 @@ class ProgressLine:
         self._end = "" if in_place else "\n"
 
     def __call__(self, *how_far: object) -> None:
-        """Take what a function says of itself: a text, amounts done and in all, or both."""
+        """Show the progress that a function reports: a text, amounts done and in total, or both."""
         if monotonic() < self._next:
             return
         self._next = monotonic() + self._wait

@@ -120,8 +120,8 @@ class HumpProfile:
         if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
             line = _blocked(scene, law, ends, primed, points)
         else:
-            cavity = _pressure_over_crest(law, from_upstream, reverse, abs(velocity))
-            line = _flowing(scene, law.path, tube, abs(velocity), from_upstream, cavity, points)
+            over_crest = _pressure_over_crest(law, from_upstream, reverse, abs(velocity))
+            line = _flowing(scene, law.path, tube, abs(velocity), from_upstream, over_crest, points)
             if reverse:
                 line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
         crest, cavity, margin = crest_span(scene.tube)[0 if reverse else 1], None, None
@@ -130,8 +130,7 @@ class HumpProfile:
             driving = np.maximum(driving_pressure(law.path, from_upstream), 0.0)
             column = BACK_SHARE if reverse and law.heads.return_hump else SHARE
             lost = law.heads.siphon.cubic((driving / law.density) ** 0.125, column) * driving
-            resting = resting_pressure(law.path, from_upstream)
-            margin = float(resting - cavity_pressure(law.path, from_upstream) - lost)
+            margin = float(resting_pressure(law.path, from_upstream) - cavity - lost)
         return cls(
             path=line.share * scene.tube.length,
             radius=path_radius(tube=scene.tube, share=line.share),

@@ -217,6 +217,10 @@ class ImportedElements:
     def of(cls, scene: Scene, geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> ImportedElements:
         """Solve the pressure at a few fills, with the errors of the elements and of the meshed volume."""
         disc, density = scene.disc, scene.liquid.density
+        radii, filled = (
+            surface_radius(disc=disc, fill_ratio=fill_ratio),
+            fill_ratio * chamber_volume(disc=disc),
+        )
         rings = [
             solved_ring(
                 geometry=geometry,
@@ -224,19 +228,18 @@ class ImportedElements:
                 angular_velocity=scene.rotor.speed,
                 surface_radius=float(radius),
             )
-            for radius in surface_radius(disc=disc, fill_ratio=fill_ratio)
+            for radius in radii
         ]
         wall = chamber_table(geometry).wall_area
         wet = np.array([ring.loads[OUTER_WALL].area / wall for ring in rings])
         pressure = wet * np.array([float(ring.wall_pressure.value) for ring in rings])
         moment = np.array([ring.first_moment[0] for ring in rings])
         volume = np.array([ring.volume for ring in rings])
-        surplus = volume - fill_ratio * chamber_volume(disc=disc)
-        volume_error = np.abs(volume / (fill_ratio * chamber_volume(disc=disc)) - 1)
+        surplus, volume_error = volume - filled, np.abs(volume / filled - 1)
         # The surface moves until the surplus of the meshed liquid is gone: da^2 = 2 dV/A on a free surface of
         # area a A, whose facets err by a fraction of the tolerance.
         head = chamber_pressure(scene=scene, fill_ratio=fill_ratio)
-        area = chamber_table(geometry).surface(surface_radius(disc=disc, fill_ratio=fill_ratio))[0]
+        area = chamber_table(geometry).surface(radii)[0]
         moved = density * scene.rotor.speed**2 * surplus / area
         status = next((ring.status for ring in rings if not ring.status.ok), Status())
         return cls(

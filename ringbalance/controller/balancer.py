@@ -33,6 +33,8 @@ WATCH_TIME_S: Final = 60.0
 """Time for which a run is watched after it has held its limit, s."""
 REQUIRED_FRACTION: Final = 0.9
 """Fraction of the devices that must meet every demand, unless the scene states another."""
+ROTOR_AMPLITUDE: Final = "rotor_amplitude"
+"""Code of the demand of `rotor_within`."""
 Settings = Mapping[str, Any]
 """Values that a controller or designer may choose, by path in a scene file; numbers in SI."""
 Progress = Callable[[float, float], None]
@@ -121,7 +123,7 @@ class RunResult:
     settling_time: float
     """s, from the start of balancing; infinite where not settled."""
     final_amplitude: float
-    """m zero-to-peak."""
+    """Of the rotor, m zero-to-peak."""
     energy: float
     """Energy that the run took, J."""
     usable_moment: float
@@ -310,6 +312,10 @@ class Balancer(ABC):
         """Demands on every device: first that it settles in time, then any others of the scene."""
         return (settles_within(self.span(), stated=False),)
 
+    def reported(self) -> tuple[Demand, ...]:
+        """Quantities of every device that are reported beside the demands, and decide no verdict."""
+        return ()
+
     def trials(self) -> tuple[Trials, ...]:
         """Settings to try, of the scene's kind of controller first; empty: there are none."""
         return ()
@@ -452,6 +458,18 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
                     half = (width or of_scene)(path, float(each))
                     inputs.append(Input(path=path, value=float(each), half_width=half, unit=unit))
     return tuple(inputs)
+
+
+def rotor_within(amplitude: float, *, stated: bool) -> Demand:
+    """Demand on the vibration of the rotor at the end of its run, m, which a sensor's runout hides."""
+    return Demand(
+        code=ROTOR_AMPLITUDE,
+        outcome="final_amplitude",
+        sense=AT_MOST,
+        required=amplitude,
+        unit="m",
+        stated=stated,
+    )
 
 
 def settles_within(time: float, *, stated: bool, amplitude: float | None = None) -> Demand:

@@ -33,7 +33,8 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
     """A run as a JSON document in SI.
 
     `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` have one length and hold the true
-    state; the samples of the sensor are under `samples`, null where one was dropped or not a number.
+    state, `reading_amplitude_m` what an exact sensor with runout shows of it; the samples of the sensor are
+    under `samples`, null where one was dropped or not a number.
     """
     scene, gas = simulation.scene, simulation.gas
     measurements = [sample.measurement for sample in simulation.samples]
@@ -58,6 +59,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
+        **({"reading_amplitude_m": simulation.reading.tolist()} if _has_runout(simulation) else {}),
         "injections": [
             {
                 "time_s": each.time,
@@ -115,6 +117,7 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
         "time_s": time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
+        **({"reading_amplitude_m": simulation.reading.tolist()} if _has_runout(simulation) else {}),
         "measured_amplitude_m": [None if m is None else finite(m.amplitude) for m in seen],
         "measured_phase_rad": [None if m is None else finite(m.phase) for m in seen],
     }
@@ -126,6 +129,11 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
                 gas[(time >= injection.time) & (time <= end)] = 1
         columns |= {f"fill_ratio_{letter}": fill.tolist(), f"valve_open_{letter}": gas.tolist()}
     return columns
+
+
+def _has_runout(simulation: Simulation) -> bool:
+    """True if a reading without noise is not the rotor's vibration."""
+    return simulation.scene.sensor.runout_amplitude is not None
 
 
 _BARS: Final = "▁▂▃▄▅▆▇█"
@@ -191,6 +199,11 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
         ("settling_time", "settling time", "s", simulation.settling_time),
         ("initial_amplitude", "amplitude before", "m", float(simulation.amplitude[0])),
         ("final_amplitude", "amplitude at the end", "m", float(simulation.amplitude[-1])),
+        *(
+            [("final_reading", "reading at the end, without noise", "m", float(simulation.reading[-1]))]
+            if _has_runout(simulation)
+            else []
+        ),
         ("limit", "limit", "m", simulation.limit),
         ("hold_time", "hold time", "s", simulation.hold_time),
         ("loop_factor", "loop factor", "1", loop.value),

@@ -90,7 +90,7 @@ def simulate(
     tabulate_moment(plant[0], balancer, total=total)
     runs = plan.runs(
         1,
-        start=scene.rotor.initial_vibration,
+        start=scene.rotor_as_read.initial_vibration,
         gain=scene.rotor.influence,
         noise_floor=noise_floor(scene),
         residual_fill=residual,
@@ -125,6 +125,7 @@ def simulate(
         time=trace.instants[:, 0],
         amplitude=np.abs(vibration),
         phase=np.angle(vibration),
+        reading=np.abs(vibration + scene.sensor.runout),
         fill_ratio=dict(zip(chamber_letters(scene.disc.chambers), fills, strict=True)),
         injections=_injections(trace, scene.disc.chambers),
         samples=_samples(trace, scene.disc.chambers, outside),

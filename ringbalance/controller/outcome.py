@@ -46,6 +46,7 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
     if allowed is not None and scene.controller.limit > allowed:
         values = {"limit": scene.controller.limit, "allowed": allowed}
         findings.append(Finding(code="limit_above_requirement", values=values))
+    findings += _runout(run)
     findings += _causes(run)
     if count := run.shortened:
         values = {"count": count, "residual_fill": run.plant.residual_fill}
@@ -54,6 +55,19 @@ def run_findings(run: Simulation) -> tuple[Finding, ...]:
     if run.loop.fixed:
         findings += default_gain(scene)
     return tuple(findings)
+
+
+def _runout(run: Simulation) -> Iterator[Finding]:
+    """Findings on the vibration of the rotor where the sensor shows more than that."""
+    sensor, final, allowed = run.scene.sensor, float(run.amplitude[-1]), run.scene.required_amplitude
+    if sensor.runout_amplitude is None:
+        return
+    values: dict[str, Value] = {"runout": sensor.runout_amplitude, "reading": float(run.reading[-1])}
+    yield Finding(code="runout", values={**values, "final_amplitude": final})
+    if sensor.runout_phase is None:
+        yield Finding(code="runout_phase_open")
+    if allowed is not None and final > allowed and run.settled:
+        yield Finding(code="rotor_above_requirement", values={"final_amplitude": final, "allowed": allowed})
 
 
 def _moves(run: Simulation) -> bool:
@@ -70,8 +84,8 @@ def _numbers(run: Simulation) -> dict[str, Value]:
     """Numbers by the names that the sentences use."""
     settings = run.scene.controller
     numbers: dict[str, Value] = {
-        "initial_amplitude": float(run.amplitude[0]),
-        "final_amplitude": float(run.amplitude[-1]),
+        "initial_amplitude": float(run.reading[0]),
+        "final_amplitude": float(run.reading[-1]),
         "limit": settings.limit,
         "time": float(run.state["time"]),
         "time_limit": run.scene.run.time_limit,
@@ -147,9 +161,9 @@ def _dead_time(run: Simulation) -> list[Finding]:
 def _moments(run: Simulation) -> dict[str, Value]:
     """Unbalance, usable moment of a pair under the scene's gas, and vibration left at best."""
     return {
-        "unbalance": abs(run.scene.rotor.initial_unbalance),
+        "unbalance": abs(run.scene.rotor_as_read.initial_unbalance),
         "pair_moment": abs(run.plant.largest_pair_moment()),
-        "unreachable": run.plant.unreachable_vibration(rotor=run.scene.rotor),
+        "unreachable": run.unreachable_amplitude,
     }
 
 

@@ -213,9 +213,11 @@ class Simulation(PresentedResult):
     time: FloatArray
     """s, shape (m,): samples, and instants within operations and waits."""
     amplitude: FloatArray
-    """True vibration, m zero-to-peak, shape (m,)."""
+    """Vibration of the rotor, m zero-to-peak, shape (m,)."""
     phase: FloatArray
-    """Phase of the true vibration, rad within (-pi, pi], shape (m,)."""
+    """Phase of the rotor's vibration, rad within (-pi, pi], shape (m,)."""
+    reading: FloatArray
+    """Amplitude as a sensor without noise shows it, with its runout, m zero-to-peak, shape (m,)."""
     fill_ratio: Mapping[str, FloatArray]
     """x of each chamber by letter, shape (m,) each."""
     injections: tuple[Injection, ...]
@@ -273,8 +275,8 @@ class Simulation(PresentedResult):
 
     @cached_property
     def unreachable_amplitude(self) -> float:
-        """Vibration that remains with the best fills, m."""
-        return self.plant.unreachable_vibration(rotor=self.scene.rotor)
+        """Reading that remains with the best fills, m."""
+        return self.plant.unreachable_vibration(rotor=self.scene.rotor_as_read)
 
     @property
     def longest(self) -> Injection | None:
@@ -291,20 +293,20 @@ class Simulation(PresentedResult):
     def outcome(self) -> Outcome:
         """End of the run.
 
-        SETTLED takes a true amplitude that held within the limit for the hold time and then in all but 1 % of
-        the samples of a further minute, or a run in which nothing can change any more.  Both are known when
-        they happen, so that a later time limit gives the same answer.
+        SETTLED takes a reading, without noise, that held within the limit for the hold time and then in all
+        but 1 % of the samples of a further minute, or a run in which nothing can change any more.  Both are
+        known when they happen, so that a later time limit gives the same answer.
         """
         state, limit, cause = self.state, self.limit, self.state["cause"]
         if self.settling_time is not None:
             return Outcome.SETTLED
         residual = self.plant.residual_fill
-        beyond_disc = self.plant.unreachable_vibration(rotor=self.scene.rotor, least_fill=residual)
+        beyond_disc = self.plant.unreachable_vibration(rotor=self.scene.rotor_as_read, least_fill=residual)
         if beyond_disc > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
         if state["drains"]:
             return Outcome.DRIFTING
-        higher = self.amplitude[-1] > self.amplitude[0] + self.noise_floor
+        higher = self.reading[-1] > self.reading[0] + self.noise_floor
         if cause == RISING or (cause == IDLE and higher):
             return Outcome.DRIFTING if state["drift"] > NOTICEABLE_CHANGE else Outcome.DIVERGING
         if self.loop.unstable:

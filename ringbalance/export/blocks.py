@@ -189,7 +189,7 @@ def _disc(
         raise SceneError.of_file(
             scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
         )
-    gas, rotor, half, fill = scene.gas, scene.rotor, scene.disc.chambers // 2, scene.disc.initial_fill
+    gas, rotor, half, fill = scene.gas, scene.rotor_as_read, scene.disc.chambers // 2, scene.disc.initial_fill
     compact = compact_law(scene=scene, law=law)
     dynamics = dynamics_of(scene=scene, model=BalancerModel.of(law), modelled=modelled)
     longest = _LONGEST_PART_S

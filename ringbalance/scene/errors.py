@@ -57,6 +57,7 @@ VOLUME: Final = f"{MODEL}volume"
 """Errors of a chamber's liquid outside `MODEL_KINDS`: of pressure, of moment, and of volume by facets."""
 AMPLITUDE: Final = "rotor.initial_amplitude"
 PHASE: Final = "rotor.initial_phase"
+RUNOUT_PHASE: Final = "sensor.runout_phase"
 _PARTS: Final = ("even", "odd")
 
 
@@ -286,7 +287,7 @@ def of_chamber(name: str, half_width: float | None = None) -> Uncertainty:
 
 def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
     """Further uncertainties of device runs: influence coefficient and lag angle where the scene states none,
-    amplitude and phase of the initial vibration."""
+    amplitude and phase of the initial vibration, phase of a runout where the scene states none."""
     rotor, stated = scene.rotor, {each.key for each in scene.fitted.quantities}
     stated |= {each.quantity for each in scene.uncertainty}
     assumed = {
@@ -294,10 +295,12 @@ def of_runs(scene: Scene) -> tuple[Uncertainty, ...]:
         "lag_angle": _ASSUMED_LAG_U95_RAD,
     }
     errors = [of_input(name, width) for name, width in assumed.items() if name not in stated]
-    starts: tuple[tuple[str, Distribution, float], ...] = (
+    starts: list[tuple[str, Distribution, float]] = [
         (AMPLITUDE, "lognormal", ASSUMED_AMPLITUDE),
         (PHASE, "uniform", scene.requirement.phase_range),
-    )
+    ]
+    if scene.sensor.runout_amplitude is not None and scene.sensor.runout_phase is None:
+        starts.append((RUNOUT_PHASE, "uniform", math.pi))
     for name, distribution, width in starts:
         errors.append(
             Uncertainty(

@@ -16,7 +16,7 @@ from ringbalance.scene.keys.reading import SceneReading, TableRead
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.origins import CheckedValues, InputUncertainty, ShownOrigin
+from ringbalance.scene.origins import VECTOR_KEYS, CheckedValues, InputUncertainty, ShownOrigin
 from ringbalance.scene.platform.files import read_bounded
 from ringbalance.scene.registry import balancers
 from ringbalance.scene.rules.fitted import fitted_faults
@@ -201,10 +201,9 @@ def _records(reading: SceneReading, before: CheckedValues | None) -> dict[str, A
     `before` keeps that record, so that comparing thousands of scenes costs little.
     """
     values: dict[str, Any] = dict(reading.values)
-    vibration = values.get("rotor.initial_vibration")
-    if vibration is not None:
-        values["rotor.initial_amplitude"] = vibration.amplitude
-        values["rotor.initial_phase"] = vibration.phase
+    for field_path, key in VECTOR_KEYS.items():
+        if (vector := values.get(key)) is not None:
+            values[field_path] = getattr(vector, field_path.rpartition("_")[2])
     parts_before = before.parts if before else {}
     records = {}
     for name, table in reading.schema.tables.items():

@@ -125,8 +125,22 @@ class Rotor:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Runout:
+    """Runout of the sensor's track on the shaft."""
+
+    amplitude: Annotated[PositiveLength, needed("zero-to-peak")]
+    phase: Annotated[
+        Turn | None,
+        unused(
+            "not known: any, drawn for each device; 0 deg in the scene's own run",
+            "in the frame of the rotor, with the rotation",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Sensor:
-    """Standard deviations of the vibration measurement; zero: exact."""
+    """Vibration measurement: standard deviations, zero: exact, and runout, the same in every turn."""
 
     amplitude_noise: Annotated[
         Length,
@@ -136,6 +150,17 @@ class Sensor:
     phase_noise: Annotated[
         Angle, standard("0 deg", "standard deviation of the measured phase"), Shown("phase noise", "deg")
     ]
+    runout_amplitude: Annotated[
+        float | None, Shown("runout", "um", note="zero-to-peak", dimension="length")
+    ] = None
+    """m zero-to-peak; None: no runout."""
+    runout_phase: Annotated[float | None, Shown("phase of the runout", "deg", dimension="angle")] = None
+    """rad; None: not known."""
+
+    @property
+    def runout(self) -> complex:
+        """Vector that the sensor adds to the rotor's vibration, m zero-to-peak; at 0 rad if not known."""
+        return complex((self.runout_amplitude or 0.0) * np.exp(1j * (self.runout_phase or 0.0)))
 
 
 _DEFAULT_LIMIT_M: Final = 0.05e-6
@@ -187,7 +212,7 @@ class ControllerSettings:
         PositiveLength,
         derived(
             "what requirement.residual or requirement.grade leaves; 0.05 um without them",
-            "amplitude (zero-to-peak) below which the controller rests",
+            "reading (zero-to-peak) below which the controller rests",
             "rotor.speed",
             "rotor.influence_coefficient",
             also=("rotor.mass", "requirement.residual", "requirement.grade"),
@@ -322,7 +347,7 @@ class RequirementSettings:
     ] = None
     residual: Annotated[
         PositiveLength | None,
-        unused("limit of [controller]", "vibration amplitude (zero-to-peak) that may remain"),
+        unused("limit of [controller]", "amplitude (zero-to-peak) of the rotor itself that may remain"),
         Shown("residual amplitude allowed", "um"),
     ] = None
     grade: Annotated[

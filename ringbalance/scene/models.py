@@ -5,8 +5,9 @@ radians, positive with the rotation; amplitudes are zero-to-peak; gas pressures 
 absolute.  A field's annotation declares its key: accepted values, meaning and default, see `scene.keys`.
 """
 
+import cmath
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
@@ -412,6 +413,14 @@ class Scene(SceneFile):
             residual=self.requirement.residual,
             grade=self.requirement.grade,
         )
+
+    @property
+    def rotor_as_read(self) -> Rotor:
+        """Rotor as a sensor without noise shows it: its initial vibration includes the sensor's runout."""
+        if self.sensor.runout_amplitude is None:
+            return self.rotor
+        seen = self.rotor.initial_vibration + self.sensor.runout
+        return replace(self.rotor, initial_amplitude=abs(seen), initial_phase=cmath.phase(seen))
 
     @property
     def mesh_digest(self) -> str:

@@ -89,9 +89,15 @@ Origin = Literal["given", "inferred", "assumed", "measured"]
 """Stated in the machine's documents; inferred from other values; chosen, as nothing is known; measured."""
 ShownOrigin = Origin | Literal["derived", "default"]
 """`Origin`, or "derived": read off the mesh that the scene names; or "default": not in the file."""
-KEY_OF_FIELD = {
+VECTOR_KEYS = {
     "rotor.initial_amplitude": "rotor.initial_vibration",
     "rotor.initial_phase": "rotor.initial_vibration",
+    "sensor.runout_amplitude": "sensor.runout",
+    "sensor.runout_phase": "sensor.runout",
+}
+"""Path of the key whose value has an amplitude and a phase, by path of a record's field."""
+KEY_OF_FIELD = {
+    **VECTOR_KEYS,
     "tolerance": "accuracy.tolerance",
     "disc.geometry": "disc.mesh",
 }

@@ -36,6 +36,8 @@ class Judgement:
     """Fraction of the devices that must meet every demand."""
     demands: tuple[Demand, ...]
     outcomes: Outcomes
+    reported: tuple[Demand, ...] = ()
+    """Quantities that decide no verdict."""
 
     @classmethod
     def of(cls, balancer: Balancer, settings: Settings, outcomes: Outcomes) -> Judgement:
@@ -45,6 +47,7 @@ class Judgement:
             required_fraction=balancer.required_fraction(),
             demands=balancer.demands(),
             outcomes=outcomes,
+            reported=balancer.reported(),
         )
 
     def extended(self, outcomes: Outcomes) -> Judgement:

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Final
 
-from ringbalance.controller.balancer import WATCH_TIME_S
+import numpy as np
+
+from ringbalance.controller.balancer import ROTOR_AMPLITUDE, WATCH_TIME_S, Demand
 from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
@@ -17,7 +19,7 @@ from ringbalance.controller.trials import Information
 from ringbalance.results.numbers import format_given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.results.result import Cells, Result, Rows, Table
-from ringbalance.results.rows import Finding, Quantity
+from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.describe import setting_text
@@ -190,6 +192,12 @@ class Tuning(Result):
         ):
             if judgement is not None:
                 yield Quantity.of_fraction(judgement.fraction, key=key, name=name)
+        if self._of_rotor is not None:
+            for key, name, demand in (
+                ("fraction_reading", "devices whose reading settles in time", self.recommended.demands[0]),
+                ("fraction_rotor", "devices whose rotor is within the limit at the end", self._of_rotor),
+            ):
+                yield Quantity.of_fraction(self.recommended.fraction_of(demand), key=key, name=name)
         times = self.recommended.settling_times
         for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
             yield Quantity(
@@ -201,6 +209,12 @@ class Tuning(Result):
                 status="ok" if times[part] is not None else "not_reached",
                 digits=3,
             )
+
+    @property
+    def _of_rotor(self) -> Demand | None:
+        """Demand on the vibration of the rotor itself; None where the sensor has no runout."""
+        demands = (*self.recommended.demands, *self.recommended.reported)
+        return next((each for each in demands if each.code == ROTOR_AMPLITUDE), None)
 
     def _findings(self) -> Iterator[Finding]:
         """Sentences on the verdict, the settling times, the scene's own settings, causes and remedies."""
@@ -216,6 +230,14 @@ class Tuning(Result):
         if times["p50"] is not None:
             code = "tuned_half" if times["p90"] is None else "tuned_times"
             yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+        if (of_rotor := self._of_rotor) is not None:
+            shares: dict[str, Value] = {
+                "reading": best.fraction_of(best.demands[0]).value,
+                "rotor": best.fraction_of(of_rotor).value,
+                "limit": of_rotor.required,
+                "median": float(np.median(best.outcomes.final_amplitude)),
+            }
+            yield Finding(code="tuned_runout", values=shares)
         if unchanged is None:
             yield Finding(code="tuned_own_none")
         elif not best.settings:

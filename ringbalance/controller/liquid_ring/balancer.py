@@ -25,6 +25,7 @@ from ringbalance.controller.balancer import (
     Setting,
     Settings,
     inputs_of,
+    rotor_within,
     settles_within,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
@@ -35,7 +36,7 @@ from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
 from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
+from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, rotor_fault, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import DrawnInput, Information, Trials
@@ -165,13 +166,15 @@ class LiquidRingBalancer(Balancer):
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
-        """Settled in time, and the unbalance that must be corrected."""
+        """Settled in time by the reading, the amplitude of the rotor, and the unbalance to be corrected."""
         requirement = self.scene.requirement
         time = self.span() if requirement.settling_time is None else requirement.settling_time
         stated, allowed = requirement.settling_time is not None, self.scene.required_amplitude
-        settles = settles_within(time, stated=stated, amplitude=allowed)
+        demands = [settles_within(time, stated=stated, amplitude=allowed)]
+        if allowed is not None and self.scene.sensor.runout_amplitude is not None:
+            demands.append(rotor_within(allowed, stated=True))
         if requirement.correction_moment is None:
-            return (settles,)
+            return tuple(demands)
         moment = Demand(
             code="correction_moment",
             outcome="usable_moment",
@@ -180,7 +183,13 @@ class LiquidRingBalancer(Balancer):
             unit="kg m",
             stated=True,
         )
-        return settles, moment
+        return (*demands, moment)
+
+    def reported(self) -> tuple[Demand, ...]:
+        """The rotor's own vibration against a limit of the readings, where they differ."""
+        if self.scene.required_amplitude is not None or self.scene.sensor.runout_amplitude is None:
+            return ()
+        return (rotor_within(self.limit, stated=False),)
 
     def trials(self) -> tuple[Trials, ...]:
         """Gain, integral time and a common offset of the valve-open times, and the gas pressure."""
@@ -271,7 +280,10 @@ class LiquidRingBalancer(Balancer):
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> LiquidRingBalancer:
         """Balancer on another rotor, with the same valve-open time per unbalance and the same errors of
-        assumptions. Raises: SceneError: the rotor is too slow to form a ring."""
+        assumptions. Raises: SceneError: the rotor is too slow to form a ring, or the sensor has runout."""
+        if self.scene.sensor.runout_amplitude is not None:
+            problem = "a comparison is of balancers under one sensor without runout"
+            raise rotor_fault(self.scene, "sensor.runout", problem, "no runout")
         before, control = self.scene.rotor, self.scene.controller
         after = rotor_like(before, rotor)
         share = after.influence_coefficient / before.influence_coefficient

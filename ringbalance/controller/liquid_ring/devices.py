@@ -23,6 +23,7 @@ from ringbalance.scene.errors import (
     LOSS,
     MOMENT,
     PHASE,
+    RUNOUT_PHASE,
     WAVES,
     Uncertainty,
     of_chamber,
@@ -230,4 +231,7 @@ def _shifted(scene: Scene, spread: Spread, z: Mapping[str, float]) -> tuple[Scen
         initial_amplitude=rotor.initial_amplitude * spread.factor(AMPLITUDE, z),
         initial_phase=rotor.initial_phase + half * z[PHASE] / NORMAL_95,
     )
-    return replace(device, rotor=started), clipped
+    sensor = device.sensor
+    if RUNOUT_PHASE in z:
+        sensor = replace(sensor, runout_phase=math.pi * z[RUNOUT_PHASE] / NORMAL_95)
+    return replace(device, rotor=started, sensor=sensor), clipped

@@ -34,7 +34,7 @@ from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fil
 from ringbalance.reduced_model.injection.moment import tabulate_moment
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import HELD
-from ringbalance.scene.arrays import FloatArray, IntArray, Records
+from ringbalance.scene.arrays import ComplexArray, FloatArray, IntArray, Records
 from ringbalance.scene.designs import Designs, alike
 from ringbalance.scene.draws import noise_table
 from ringbalance.scene.models import Scene
@@ -242,7 +242,7 @@ class _Group:
             fields={
                 "plant": np.arange(len(some)),
                 "speed": np.array([each.speed for each in some]),
-                "start": np.array([each.rotor.initial_vibration for each in scenes]),
+                "start": np.array([each.rotor_as_read.initial_vibration for each in scenes]),
                 "gain": np.array([each.rotor.influence for each in scenes]),
                 "noise_floor": np.array([noise_floor(each) for each in scenes]),
             },
@@ -261,6 +261,7 @@ class _Group:
             residual[rows] = residual_fills(plants[rows], designs)
         stalled_fills(plants, stalled)
         unbalance = [each.rotor.initial_unbalance for each in self.scenes]
+        as_read = np.array([each.rotor_as_read.initial_unbalance for each in self.scenes])
         sizes = np.array([abs(each) for each in unbalance])
         towards = np.array([-each / abs(each) if each else 1.0 for each in unbalance])
         factors = np.array([each.moment for each in self.devices])
@@ -277,8 +278,9 @@ class _Group:
             group=self,
             changed={name: plants[name].copy() for name in _CHANGED},
             residual=residual,
-            unreachable=unreachable_moment(usable, -np.array(unbalance)) * influence,
-            beyond_disc=unreachable_moment(beyond, -np.array(unbalance)) * influence,
+            unreachable=unreachable_moment(usable, -as_read) * influence,
+            beyond_disc=unreachable_moment(beyond, -as_read) * influence,
+            runout=np.array([each.sensor.runout for each in self.scenes]),
             usable_moment=factors * moment_towards(usable, towards),
             unbalance=factors * sizes,
             work=np.array(
@@ -307,9 +309,11 @@ class _Under:
     residual: FloatArray
     """Fill of a driven chamber at which gas enters its port."""
     unreachable: FloatArray
-    """Vibration that remains with the best fills that the gas can reach, m."""
+    """Reading that remains with the best fills that the gas can reach, m."""
     beyond_disc: FloatArray
-    """Vibration that remains if the gas can empty each chamber to its residual fill, m."""
+    """Reading that remains if the gas can empty each chamber to its residual fill, m."""
+    runout: ComplexArray
+    """Vector by which a reading differs from the rotor's vibration, m."""
     usable_moment: FloatArray
     """Usable moment in the direction of the device's own unbalance, kg m."""
     unbalance: FloatArray
@@ -323,8 +327,9 @@ class _Under:
         """Results of runs of some devices, shape (`ARRAYS`, settings, rows), and indices into `_ENDS`."""
         shape, group = (plan.loops.size, rows.size), self.group
         numbers, ends = np.empty((len(ARRAYS), *shape)), np.empty(shape, dtype=np.int64)
-        # Devices that cannot come to the limit: the vibration that remains with the best fills.
-        numbers[0], numbers[1], numbers[2] = math.inf, self.unreachable[rows], math.nan
+        # Devices whose reading cannot come to the limit: the least vibration of the rotor with the best one.
+        least = np.abs(self.unreachable - np.abs(self.runout))
+        numbers[0], numbers[1], numbers[2] = math.inf, least[rows], math.nan
         numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
         carried = complete | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
         if not carried.any():
@@ -340,7 +345,9 @@ class _Under:
         settled = held | ((runs["cause"] == AT_REST) & (runs["since"] < math.inf))
         since = np.where(held, runs["held_since"], runs["since"])
         numbers[0][:, carried] = np.where(settled, since, math.inf)
-        numbers[1][:, carried] = runs["amplitude"]
+        runout = self.runout[rows]
+        of_rotor = np.abs(runs["vibration"] - runout)
+        numbers[1][:, carried] = np.where(runout == 0.0, runs["amplitude"], of_rotor)
         numbers[2][:, carried] = runs["gas"] * self.work[rows]
         shown = (
             settled,

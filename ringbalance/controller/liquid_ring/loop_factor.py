@@ -139,7 +139,7 @@ def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     changes = [change_of(0, pair) for pair in range(pairs)]
     for at in changes:
         row[at + LOWEST_CHANGE], row[at + HIGHEST_CHANGE] = float(low - now), float(high - now)
-    unbalance = scene.rotor.initial_unbalance
+    unbalance = scene.rotor_as_read.initial_unbalance
     split(row, 0, pairs, -unbalance.real, -unbalance.imag)
     plant = empty_plants(1)[0]
     tabulate_moment(plant, model, total=total)

@@ -63,12 +63,20 @@ def _trial_changes(scene: SceneFile, observations: Observations, _: object) -> F
 def _trial_amplitudes(scene: Scene, observations: Observations, _: object) -> FloatArray:
     """|V0 + K U exp(j angle)|, m zero to peak.
 
-    Without a phase V0 cannot be eliminated: it is the scene's initial vibration, with amplitude and phase as
-    parameters.  Only its phase relative to K U has an effect, so that neither the phase nor the lag is
-    identified alone.
+    Without a phase V0 cannot be eliminated: it is the scene's initial vibration as read, with amplitude and
+    phase of the rotor's as parameters.  Only its phase relative to K U has an effect, so that neither the
+    phase nor the lag is identified alone.
     """
-    start = cmath.rect(scene.rotor.initial_amplitude, scene.rotor.initial_phase)
-    return np.asarray(np.abs(start + scene.rotor.influence * _weights(observations)))
+    rotor = scene.rotor_as_read
+    start = cmath.rect(rotor.initial_amplitude, rotor.initial_phase)
+    return np.asarray(np.abs(start + rotor.influence * _weights(observations)))
+
+
+def _phase_of_runout_unknown(scene: Scene, _: Observations) -> str:
+    """Reason why amplitudes alone tell no vibration of the rotor; empty if they do."""
+    if scene.sensor.runout_amplitude is None or scene.sensor.runout_phase is not None:
+        return ""
+    return "the amplitudes contain sensor.runout, whose phase the scene does not state"
 
 
 def _weights(observations: Observations) -> ComplexArray:
@@ -244,6 +252,7 @@ LIQUID_RING: Final[Mapping[str, Kind]] = {
         title="amplitude alone of the vibration with a known unbalance on the rotor",
         columns=_WEIGHT,
         predict=_trial_amplitudes,
+        obstacle=_phase_of_runout_unknown,
         informs=always("influence_coefficient", "initial_amplitude", "initial_phase"),
         offers=_some_weights,
     ),

@@ -13,6 +13,7 @@ from typing import Any, Literal
 from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import KeyPath, Schema
+from ringbalance.scene.registry import balancers, registered
 from ringbalance.scene.toml import toml_key, toml_text
 from ringbalance.scene.units import FieldError, format_quantity
 
@@ -280,6 +281,8 @@ def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None)
                     if home
                     else " (it belongs at the top, before the first table)"
                 )
+            elif not meant and (home := _other_balancer(steps)):
+                hint = f" (a scene of the balancer {home} has it)"
             problem, allowed = f"unknown {kind}{hint}", ", ".join(names)
     # Named as in "bends[2].radius"; entries of a list are counted from one.
     path = ""
@@ -293,6 +296,15 @@ def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None)
         problem=problem,
         allowed=allowed,
     )
+
+
+def _other_balancer(steps: KeyPath) -> str:
+    """Name of a balancer whose scenes have a key of a table; empty for none."""
+    for name in balancers() if len(steps) == 2 else ():
+        schema: Schema = registered("scene", name).schema
+        if steps[1] in schema.keys_in([str(steps[0])]):
+            return name
+    return ""
 
 
 def _meant(rejected: _Rejected, schema: Schema) -> str:

@@ -160,10 +160,18 @@ _VIBRATION = Key(
     takes=Entries(record=loop_models.Vibration, keys=keys_of(loop_models.Vibration), example=""),
     presence=standard(
         {"amplitude": "10 um", "phase": "90 deg"},
-        "{ amplitude, phase } before balancing, zero-to-peak",
+        "{ amplitude, phase } of the rotor itself before balancing, zero-to-peak",
     ),
 )
-"""One key, whose entries are two fields of the rotor's record."""
+_RUNOUT = Key(
+    takes=Entries(record=loop_models.Runout, keys=keys_of(loop_models.Runout), example=""),
+    presence=unused(
+        "none",
+        "{ amplitude, phase }: vector that the sensor shows beside the rotor's vibration, the same in every "
+        "turn; a steady vibration from elsewhere at once per turn acts alike",
+    ),
+)
+"""Keys whose entries are two fields of a record each."""
 _LIQUID_RING = {
     # The dimensions of the chambers, or the mesh of one from which they follow.
     "disc": TableSchema(
@@ -180,7 +188,11 @@ _LIQUID_RING = {
         keys={**keys_of(loop_models.Rotor), "initial_vibration": _VIBRATION},
         record=loop_models.Rotor,
     ),
-    "sensor": TableSchema.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
+    "sensor": TableSchema(
+        text="the vibration sensor; exact when left out",
+        keys={**keys_of(loop_models.Sensor), "runout": _RUNOUT},
+        record=loop_models.Sensor,
+    ),
     "controller": TableSchema.of(loop_models.ControllerSettings, "the control algorithm"),
     "requirement": TableSchema.of(
         loop_models.RequirementSettings,

@@ -170,7 +170,9 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
         kind="disc",
         title="Disc of a liquid-ring balancer on its rotor",
         scene=scene.file,
-        facts=tabulation(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
+        facts=tabulation(compact)
+        + "\n   Liquid without mass: its velocity is the law's at every instant."
+        + ("" if scene.sensor.runout_amplitude is None else "\n   Vibration as read: with sensor.runout."),
         constants=tuple(constants),
         tables=compact.tables,
         start=tuple(row),

@@ -7,14 +7,13 @@ lies within the 95 % interval of their difference (Newcombe's method 10, from bo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, cast
 
 import numpy as np
 import pytest
 from own_draws import drawn
-from own_plant import run, settings_of, settling_times
+from own_plant import Share, run, settings_of, settling_times
 
 import ringbalance
 from ringbalance.controller.balancer import AS_GIVEN, Draws, Outcomes, balancer_of
@@ -23,36 +22,13 @@ from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import with_values_at
-from scenes import with_tables
+from scenes import bundled, with_tables
 
 ASKED: Final = 0.9
 SEED: Final = 29
 OFFSET: Final = {"controller.gas_time_offset": (1.2e-3,)}
 VALVE: Final = {"gas.conductance": "1 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
 PAPER, SIX, CALIBRATED = "liquid_ring_paper", "six_chamber", "liquid_ring_paper_calibrated"
-
-
-class Share(NamedTuple):
-    """Of drawn devices that settle, with its Wilson bounds (95 %)."""
-
-    value: float
-    low: float
-    high: float
-
-    @classmethod
-    def of(cls, settled: Any) -> Share:
-        n, p, z = len(settled), float(np.mean(settled)), 1.959964
-        middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-        return cls(p, (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n))
-
-    def agrees(self, other: Share) -> bool:
-        above, below = (self, other) if self.value >= other.value else (other, self)
-        return above.value - below.value <= math.hypot(above.value - above.low, below.high - below.value)
-
-
-def bundled(name: str, values: Mapping[str, object] | None = None) -> Scene:
-    scene = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene(name)))
-    return scene.with_values(values) if values else scene
 
 
 @pytest.fixture(scope="module")

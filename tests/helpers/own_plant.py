@@ -135,16 +135,22 @@ def _settled(c: Any, held: Floats, time: float, amplitude: float) -> bool:
 
 
 @compiled
-def _loop(d: Any, tables: Any, moment: Floats, c: Any, noise: Floats, trace: Floats) -> float:
-    """The closed loop; time and amplitude of every sample are left in `trace`. Returns: settling time."""
+def _loop(
+    d: Any, tables: Any, moment: Floats, c: Any, noise: Floats, runout: complex, trace: Floats
+) -> float:
+    """The closed loop; time, reading and vibration of the rotor at every sample are left in `trace`.
+
+    Returns: settling time of the reading.
+    """
     n = int(d.chambers)
     half, time = n // 2, 0.0
     pairs, empty = np.zeros((half, STATES)), np.zeros(n, np.bool_)
     pairs[:, X] = d.total / 2
     memory, held = np.array([0.0, 0.0, math.inf, 0.0]), np.array([math.inf, math.inf, 0.0])
     for k in range(noise.shape[0]):
-        z = _vibration(d, pairs, moment)
-        trace[k, 0], trace[k, 1] = time, abs(z)
+        of_rotor = _vibration(d, pairs, moment)
+        z = of_rotor + runout
+        trace[k, 0], trace[k, 1], trace[k, 2] = time, abs(z), abs(of_rotor)
         if _settled(c, held, time, abs(z)):
             return float(held[_SINCE])
         if time > c.time_limit and held[_SINCE] > c.time_limit:
@@ -166,16 +172,22 @@ class Run(NamedTuple):
     settling_time: float
     """s; infinite: not settled."""
     trace: Floats
-    """Time, s, and amplitude, m, of every sample; NaN beyond the end."""
+    """Time, s, amplitude of the exact reading and of the rotor, m, at every sample; NaN beyond the end."""
+
+    @property
+    def residual(self) -> float:
+        """Amplitude of the rotor at the last sample, m."""
+        return float(self.trace[~np.isnan(self.trace[:, 2]), 2][-1])
 
 
-def run(machine: Drawn, settings: Settings, *, noise_seed: int) -> Run:
-    """One closed loop."""
+def run(machine: Drawn, settings: Settings, *, noise_seed: int, runout: complex = 0j) -> Run:
+    """One closed loop. Args: `runout`: vector that is added to the vibration in every reading, m."""
     tables = (machine.loss, machine.upstream, machine.downstream, machine.square)
     samples = 2 + int((settings.time_limit + settings.hold_time + FURTHER) / settings.period)
     noise = np.random.default_rng([noise_seed, 7]).standard_normal((samples, 2))
-    trace = np.full((samples, 2), np.nan)
-    return Run(float(_loop(machine.device, tables, machine.moment, settings, noise, trace)), trace)
+    trace = np.full((samples, 3), np.nan)
+    settled = _loop(machine.device, tables, machine.moment, settings, noise, complex(runout), trace)
+    return Run(float(settled), trace)
 
 
 def settling_times(scene: Scene, settings: Settings, *, numbers: int, seed: int) -> Floats:
@@ -183,3 +195,21 @@ def settling_times(scene: Scene, settings: Settings, *, numbers: int, seed: int)
     machines = [drawn(scene, number=i, seed=seed) for i in range(numbers)]
     runs = [run(each, settings, noise_seed=seed + 1000 + i) for i, each in enumerate(machines)]
     return np.array([each.settling_time for each in runs])
+
+
+class Share(NamedTuple):
+    """Of drawn devices that settle, with its Wilson bounds (95 %)."""
+
+    value: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, settled: Any) -> Share:
+        n, p, z = len(settled), float(np.mean(settled)), 1.959964
+        middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+        return cls(p, (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n))
+
+    def agrees(self, other: Share) -> bool:
+        above, below = (self, other) if self.value >= other.value else (other, self)
+        return above.value - below.value <= math.hypot(above.value - above.low, below.high - below.value)

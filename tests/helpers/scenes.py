@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
+
+import ringbalance
+from ringbalance.scene.models import Scene
 
 Record = TypeVar("Record")
 
@@ -21,3 +24,9 @@ def with_tables(scene: Record, **tables: Any) -> Record:
         changes[name] = replace(table, **values) if inside else values
     copy: Record = replace(scene, **changes)  # type: ignore[type-var]
     return copy
+
+
+def bundled(name: str, values: Mapping[str, object] | None = None) -> Scene:
+    """A bundled scene of a liquid ring with other values, checked."""
+    scene = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene(name)))
+    return scene.with_values(values) if values else scene

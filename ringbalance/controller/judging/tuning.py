@@ -216,6 +216,20 @@ class Tuning(Result):
         demands = (*self.recommended.demands, *self.recommended.reported)
         return next((each for each in demands if each.code == ROTOR_AMPLITUDE), None)
 
+    @property
+    def runout(self) -> tuple[Finding, ...]:
+        """Finding on readings and rotors of the devices; empty where the sensor has no runout."""
+        if self._of_rotor is None:
+            return ()
+        best = self.recommended
+        values: dict[str, Value] = {
+            "reading": best.fraction_of(best.demands[0]).value,
+            "rotor": best.fraction_of(self._of_rotor).value,
+            "limit": self._of_rotor.required,
+            "median": float(np.median(best.outcomes.final_amplitude)),
+        }
+        return (Finding(code="tuned_runout", values=values),)
+
     def _findings(self) -> Iterator[Finding]:
         """Sentences on the verdict, the settling times, the scene's own settings, causes and remedies."""
         best, unchanged, met = self.recommended, self.own, self.recommended.verdict == MET
@@ -230,14 +244,7 @@ class Tuning(Result):
         if times["p50"] is not None:
             code = "tuned_half" if times["p90"] is None else "tuned_times"
             yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
-        if (of_rotor := self._of_rotor) is not None:
-            shares: dict[str, Value] = {
-                "reading": best.fraction_of(best.demands[0]).value,
-                "rotor": best.fraction_of(of_rotor).value,
-                "limit": of_rotor.required,
-                "median": float(np.median(best.outcomes.final_amplitude)),
-            }
-            yield Finding(code="tuned_runout", values=shares)
+        yield from self.runout
         if unchanged is None:
             yield Finding(code="tuned_own_none")
         elif not best.settings:

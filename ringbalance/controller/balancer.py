@@ -123,7 +123,7 @@ class RunResult:
     settling_time: float
     """s, from the start of balancing; infinite where not settled."""
     final_amplitude: float
-    """Of the rotor, m zero-to-peak."""
+    """Vibration of the rotor itself, m zero-to-peak."""
     energy: float
     """Energy that the run took, J."""
     usable_moment: float

@@ -341,7 +341,7 @@ def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
 
     Down to these speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: to the first
     at any pressure of a cavity over the crest, to the second at the pressure that runs assume.  Below them
-    opposite chambers level out, and a restart begins with the fills that the run-down has left.
+    it runs back as the speed falls, until at two further speeds the column holds full at equal fills, too.
     """
     factor, controller = run.loop.value, run.scene.controller
     if run.loop.fixed and factor is not None and factor < run.loop.limit:
@@ -373,3 +373,10 @@ def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
     ):
         name = f"correction lasts without gas, {how_sure} down to"
         yield key, name, speed, "rad/s", "ok" if speed is not None else status
+    level = Holding.of(run.scene, fill_ratio=run.scene.disc.initial_fill)
+    for key, how_sure, before, speed in (
+        ("levelled_speed", "perhaps", held.sure_speed, level.sure_speed),
+        ("likely_levelled_speed", "as runs assume", held.likely_speed, level.likely_speed),
+    ):
+        name = f"opposite chambers level after a slow run-down, {how_sure}, to"
+        yield key, name, None if before is None else speed, "rad/s", "ok" if before is not None else status

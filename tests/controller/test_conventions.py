@@ -48,6 +48,25 @@ def test_a_run_prints_the_sure_speed_first(paper_scene: Scene) -> None:
     assert (held.sure_speed or 0.0) > 1.4 * (held.likely_speed or math.inf)
 
 
+def test_chambers_are_level_where_a_column_holds_at_equal_fills(paper_scene: Scene) -> None:
+    """Liquid runs back from the fullest chamber first, and from equal fills last."""
+    rows = {
+        each.key: each.value or 0.0 for each in conventions(simulate(paper_scene, paper_model(paper_scene)))
+    }
+    missing = pressure(CREST) - pressure(level(paper_scene.disc.initial_fill))
+    for key, before, cavity in (
+        ("levelled_speed", "lasting_speed", VAPOUR),
+        ("likely_levelled_speed", "likely_lasting_speed", VAPOUR / 2),
+    ):
+        by_hand = 10_000 * math.sqrt(-cavity / missing)
+        assert rows[key] * 30 / math.pi == pytest.approx(by_hand, rel=1e-3)
+        assert rows[key] < rows[before]
+    lost = with_tables(paper_scene, tube={"hump_radius": None})
+    values = {each.key: each for each in conventions(simulate(lost, paper_model(lost)))}
+    assert values["likely_levelled_speed"].value is None
+    assert values["likely_levelled_speed"].status != "ok"
+
+
 def test_a_crest_that_only_dissolved_gas_lets_part_is_undecided(paper_scene: Scene) -> None:
     """Between the speeds of vapour and of a cavity halfway to ambient pressure."""
     slower = with_tables(paper_scene, rotor={"speed": 6000 * math.pi / 30})

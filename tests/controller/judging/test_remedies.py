@@ -48,6 +48,9 @@ class Machine:
     def demands(self) -> Any:
         return (settles_within(2.0, stated=True),)
 
+    def reported(self) -> Any:
+        return ()
+
     def run_all(
         self, settings: Sequence[Mapping[str, Any]], draws: Draws, *, watch_time: float = 60.0
     ) -> tuple[Outcomes, ...]:

@@ -31,7 +31,7 @@ MAX_CHAMBERS: Final = len(ascii_uppercase)
 _OF_ONE_ROTOR: Final = ("influence_coefficient", "lag_angle", "initial_vibration")
 """Keys of a rotor whose defaults are those of one machine."""
 Sensor = Callable[[float, complex], Measurement | None]
-"""Takes the time (s) and the vibration (m, complex); None is a dropped sample."""
+"""Takes the time (s) and the vibration (m, complex) with the scene's runout; None is a dropped sample."""
 
 
 def chamber_letters(chambers: int) -> tuple[str, ...]:

@@ -141,3 +141,20 @@ def test_its_vibration_is_linear_in_the_unbalance(paper_scene: Scene, by_vectors
     grown = np.array(linear.columns["amplitude"]) * np.array([1.0, 1.0, 1.0, 1.25, 1.6])
     bent = replace(linear, columns=dict(linear.columns) | {"amplitude": grown})
     assert not Review.of(fit(rotor(paper_scene), data=[bent])).criticism.describes
+
+
+def test_amplitudes_contain_a_runout_whose_phase_must_be_known(paper_scene: Scene) -> None:
+    """V0 + R in the place of V0; the rotor's own vibration follows only where the scene states both of R."""
+    kind, data = (
+        KINDS["trial_amplitude"],
+        observed(np.array([0.0, 6e-6]), np.zeros(2), np.array([9e-6, 9e-6]), None),
+    )
+    scene = rotor(paper_scene, amplitude=9e-6, phase=0.5)
+    sensor = replace(scene.sensor, runout_amplitude=1e-6, runout_phase=1.2)
+    known = replace(scene, sensor=sensor)
+    start = 9e-6 * np.exp(0.5j) + 1e-6 * np.exp(1.2j)
+    expected = np.abs(start + scene.rotor.influence * np.array([0.0, 6e-6]))
+    assert kind.predict(known, data, None) == pytest.approx(expected, rel=1e-12)
+    assert kind.obstacle(known, data) == kind.obstacle(scene, data) == ""
+    unknown = replace(scene, sensor=replace(sensor, runout_phase=None))
+    assert "sensor.runout" in kind.obstacle(unknown, data)

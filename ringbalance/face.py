@@ -89,8 +89,8 @@ def simulate(
             your own; what that lacks is the calibrated law's, and the status says so. Default the calibrated
             law.
         controller: an algorithm of your own, see `Controller`; default that of the scene.
-        sensor: measured vibration, called with the time, s, and the vibration, m, complex; default the
-            scene's noise from the scene's seed.
+        sensor: measured vibration, called with the time, s, and the vibration, m, complex, which
+            includes the scene's runout; default the scene's noise from the scene's seed.
         progress: called with the simulated time and the time limit, s.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
             default all that the scene gives numbers for.

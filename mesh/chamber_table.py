@@ -36,7 +36,8 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
 TOLERANCE: Final = 1e-9
 """Error of a table between its nodes, over the whole volume and over the whole moment."""
 SLOPE_TOLERANCE: Final = 1e-5
-"""Error of the free surface's area and of its moment, over the largest."""
+"""Error of the free surface's area, of its moment, and of the wet share of the outer wall, over the
+largest."""
 _FIRST_NODES: Final = 9
 _EMPTY: Final = 1 - 4 * float(np.finfo(np.float64).eps)
 """Share of the outermost L that counts as empty: the square of a root falls short of it by rounding."""
@@ -182,11 +183,10 @@ def _refined(
     nodes: FloatArray, columns: FloatArray, exact: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Refined nodes, columns at the nodes, and differences in the intervals."""
-    # Slopes have a tolerance, except that of the wall's mean.
     size, volume = np.abs(columns).max(axis=1), columns[0, 0]
     moment, turning = size[1:3].max(), size[COLUMNS + 1 : COLUMNS + 3].max()
     values = TOLERANCE * np.array([size[0], moment, moment, size[3]])
-    slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, np.inf])
+    slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, size[7]])
     allowed = np.concatenate([values, slopes])[:, None]
     error = np.full((len(columns), nodes.size - 1), np.inf)
     for _ in range(_HALVINGS):

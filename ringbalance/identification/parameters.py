@@ -22,7 +22,7 @@ from ringbalance.controller.balancer import Input, balancer_of
 from ringbalance.identification.device import ModelledDevice, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
-from ringbalance.reduced_model.chamber.values import drawing_shares
+from ringbalance.mesh.faceting import drawing_shares
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.errors import Uncertainty, model_uncertainties, with_places
 from ringbalance.scene.faults import did_you_mean

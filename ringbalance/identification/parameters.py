@@ -34,8 +34,8 @@ from ringbalance.scene.uncertain import (
     SHAPE,
     UNCERTAIN_QUANTITIES,
     half_widths,
+    moved,
     nominal_value,
-    shifted,
     with_value,
 )
 
@@ -333,7 +333,7 @@ class _LiquidRingInputs(_SceneInputs):
     def changed(self, name: str, change: float) -> SceneFile:
         if name in self.errors:
             return self.errors[name].moved(self.scene, change)
-        return shifted(scene=self.scene, quantity=name, change=change)
+        return moved(self.scene, {name: change})
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
         error = self.errors.get(name)

@@ -4,27 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.reading import SceneReading, TableRead, read_document
+from ringbalance.scene.keys.reading import SceneInput, SceneReading
 from ringbalance.scene.keys.schema import Schema
 from ringbalance.scene.registry import registered
 from ringbalance.scene.units import format_quantity
 
-
-class _Reads(Protocol):
-    def __call__(
-        self,
-        document: Mapping[str, Any],
-        *,
-        file: str,
-        folder: Path,
-        derived: Mapping[str, Any],
-        before: Mapping[str, TableRead],
-    ) -> tuple[SceneReading, tuple[Fault, ...]]: ...
+Read = Callable[[SceneInput], tuple[SceneReading, tuple[Fault, ...]]]
+"""Function that reads a document: values with derived defaults, and all errors."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +23,7 @@ class SceneKind:
 
     schema: Schema
     """Keys, and the record that they are read into."""
-    read: _Reads
-    """Function that reads a document: values with derived defaults, and all errors."""
+    read: Read
     main: tuple[tuple[str, ...], ...]
     """Paths of the values that a terminal shows, line by line."""
     usual_units: Mapping[str, str] = field(default_factory=dict)
@@ -144,15 +133,11 @@ def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[
             yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)
 
 
-def reader_of(
-    schema: Schema, checks: tuple[Check, ...]
-) -> Callable[..., tuple[SceneReading, tuple[Fault, ...]]]:
-    """Reader of a kind of scene that has only keys and rules; see `SceneKind.read`."""
+def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Read:
+    """Reader of a kind of scene that has only keys and rules."""
 
-    def read(
-        document: Mapping[str, Any], *, file: str, before: Mapping[str, TableRead], **_: object
-    ) -> tuple[SceneReading, tuple[Fault, ...]]:
-        reading, faults = read_document(document, file=file, schema=schema, before=before)
+    def read(given: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
+        reading, faults = given.read(schema)
         reading = reading.completed()
         return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, checks))
 

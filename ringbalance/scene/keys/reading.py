@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any, Literal
 
 from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
@@ -41,6 +41,26 @@ class TableRead:
     values: Mapping[str, Any]
     """SI values by path, standard defaults included."""
     rejected: tuple[_Rejected, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneInput:
+    """A document to be read into a scene."""
+
+    document: Mapping[str, Any]
+    """Content of a scene file, parsed from TOML."""
+    file: str
+    """Name of the file, for messages."""
+    folder: Path
+    """Folder from which a mesh is read."""
+    derived: Mapping[str, Any] = field(default_factory=dict)
+    """Values by path already read from the mesh; empty: the mesh is read."""
+    before: Mapping[str, TableRead] = field(default_factory=dict)
+    """Tables of the document from which this one was made."""
+
+    def read(self, schema: Schema) -> tuple[SceneReading, tuple[Fault, ...]]:
+        """Values by the declared keys, and an error for each value, key or table that cannot be read."""
+        return read_document(self.document, file=self.file, schema=schema, before=self.before)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,7 +64,7 @@ class DrawingShares:
     """Relative expanded uncertainties (95 %) by facets and by the table, along the fills."""
 
     volume: float
-    """Of the whole chamber."""
+    """Uncertainty of the whole chamber's volume."""
     wall_pressure: FloatArray
     hydrostatic_pressure: FloatArray
     first_moment: FloatArray

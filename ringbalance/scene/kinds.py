@@ -136,8 +136,8 @@ def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[
 def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Read:
     """Reader of a kind of scene that has only keys and rules."""
 
-    def read(given: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
-        reading, faults = given.read(schema)
+    def read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
+        reading, faults = content.read(schema)
         reading = reading.completed()
         return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, checks))
 

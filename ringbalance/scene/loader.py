@@ -71,16 +71,16 @@ def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyS
     except (ValueError, RecursionError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise SceneError.of_file(file, f"this is not TOML: {' '.join(reason.split())}") from error
-    place = (Path(file).parent if folder is None else folder).absolute()
+    mesh_folder = (Path(file).parent if folder is None else folder).absolute()
     return scene_of(
-        SceneInput(document=document, file=file, folder=place),
+        SceneInput(document=document, file=file, folder=mesh_folder),
         source=PurePath(file).name,
         sha256=lambda: hashlib.sha256(content).hexdigest(),
     )
 
 
 def scene_of(
-    given: SceneInput, *, source: str, sha256: Callable[[], str], before: CheckedValues | None = None
+    content: SceneInput, *, source: str, sha256: Callable[[], str], before: CheckedValues | None = None
 ) -> AnyScene:
     """The scene of a document.
 
@@ -88,7 +88,7 @@ def scene_of(
         changed.
     Raises: SceneError: all errors in the document.
     """
-    reading = _checked_reading(given, before)
+    reading = _checked_reading(content, before)
     decisive = {
         path: value.digest if path == "disc.geometry" else value
         for path, value in reading.values.items()
@@ -115,7 +115,7 @@ def scene_of(
         **_records(reading, before),
         "name": reading.values["name"],
         "source": source,
-        "file": given.file,
+        "file": content.file,
         "sha256": sha256(),
         "values_sha256": hashlib.sha256(repr(sorted(decisive.items())).encode()).hexdigest(),
         "defaulted": defaulted,
@@ -123,35 +123,35 @@ def scene_of(
     }
     of_mesh = {path: reading.values[path] for path in reading.derived}
     checked = CheckedValues(
-        document=given.document, folder=given.folder, parts=parts, derived=of_mesh, tables=reading.tables
+        document=content.document, folder=content.folder, parts=parts, derived=of_mesh, tables=reading.tables
     )
     scene: AnyScene = reading.schema.scene(**parts, checked=checked)
     return scene
 
 
-def nameless_scene(given: SceneInput, before: CheckedValues) -> AnyScene:
+def nameless_scene(content: SceneInput, before: CheckedValues) -> AnyScene:
     """Make a scene as `scene_of` does, without names, hashes and origins: several times faster."""
-    reading = _checked_reading(given, before)
+    reading = _checked_reading(content, before)
     names = dict.fromkeys(("name", "source", "sha256"), "")
-    scene: AnyScene = reading.schema.scene(**_records(reading, before), **names, file=given.file)
+    scene: AnyScene = reading.schema.scene(**_records(reading, before), **names, file=content.file)
     return scene
 
 
-def _checked_reading(given: SceneInput, before: CheckedValues | None) -> SceneReading:
+def _checked_reading(content: SceneInput, before: CheckedValues | None) -> SceneReading:
     """Checked values of a document.
 
     Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last.
     """
-    kind, file = _kind(given.document), given.file
+    kind, file = _kind(content.document), content.file
     if before and _kind(before.document) == kind:
-        given = replace(given, before=before.tables)
-    reading, read_faults = scene_kind(kind).read(given)
+        content = replace(content, before=before.tables)
+    reading, read_faults = scene_kind(kind).read(content)
     schema, faults = reading.schema, list(read_faults)
     faulty = {(fault.table, fault.key) for fault in faults}
     for name in schema.tables:
-        content = reading.tables[name].content
+        table = reading.tables[name].content
         for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
-            if key not in content and (name, key) not in faulty:
+            if key not in table and (name, key) not in faulty:
                 fault = Fault(
                     file=file,
                     table=name,

@@ -17,12 +17,12 @@ from ringbalance.scene.registry import registered
 from ringbalance.scene.rules import shape, working
 
 
-def _read(given: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
-    reading, faults = given.read(LIQUID_RING)
-    if given.derived:
-        reading = reading.following(given.derived)
+def _read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
+    reading, faults = content.read(LIQUID_RING)
+    if content.derived:
+        reading = reading.following(content.derived)
     elif any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
-        reading, mesh_faults = registered("function", "with_chamber")(reading, folder=given.folder)
+        reading, mesh_faults = registered("function", "with_chamber")(reading, folder=content.folder)
         faults = (*faults, *mesh_faults)
     reading = reading.completed()
     port_radius, hump_radius = reading.values.get("tube.port_radius"), reading.values.get("tube.hump_radius")

@@ -337,7 +337,7 @@ class RequirementSettings:
     ] = None
     fraction: Annotated[
         ProperFraction,
-        standard(0.9, "fraction of the devices that the scene may be which must meet every requirement"),
+        standard(0.9, "fraction of the drawn devices that must meet every requirement"),
         Shown("fraction of devices required"),
     ] = 0.9
     phase_range: Annotated[

@@ -184,7 +184,7 @@ class EccentricRequirement:
     ] = None
     fraction: Annotated[
         ProperFraction,
-        standard(0.9, "fraction of the devices that the scene may be which must meet every requirement"),
+        standard(0.9, "fraction of the drawn devices that must meet every requirement"),
     ] = 0.9
     phase_range: Annotated[
         Angle,

@@ -147,8 +147,8 @@ _RUN = {
     "accuracy": TableSchema(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
     "fitted": TableSchema.of(
         Fitted,
-        "what a fit leaves uncertain, jointly: standard deviations of the values in this file, and how they "
-        "go together; `ringbalance fit --save` writes it",
+        "joint uncertainty that a fit leaves: standard deviations of the values in this file, and their "
+        "correlations; `ringbalance fit --save` writes it",
     ),
     "measured": TableSchema.of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"

@@ -52,7 +52,7 @@ class FitError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One quantity that is fitted, t = ln(x + offset) or t = x/scale."""
+    """One quantity that is fitted, t = ln gain (x + offset) or t = x/scale."""
 
     name: str
     symbol: str

@@ -269,9 +269,7 @@ class Calibration(PresentedResult):
     def quantities(self) -> Mapping[str, Quantity]:
         """Main numbers by key, with intervals, computed on first use."""
         by_paper = paper.stall_pressure(
-            disc=self.scene.disc,
-            density=self.scene.liquid.density,
-            angular_velocity=self.scene.rotor.speed,
+            disc=self.scene.disc, density=self.scene.liquid.density, angular_velocity=self.scene.rotor.speed
         )
         rest = (
             ("lambda_variation", "variation of lambda over fills", "1", self.lambda_variation),

@@ -237,10 +237,7 @@ def gravity_shares(scene: Scene) -> _GravityShares:
     )
     parts = (
         (ring.wall_pressure_ripple / wall, _CORIOLIS_FACTOR * np.maximum(1.0, largest)),
-        (
-            ring.moment_ripple / moment,
-            np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_ERROR,
-        ),
+        (ring.moment_ripple / moment, np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_ERROR),
     )
     return _GravityShares(
         mean=float(np.max(np.abs(np.array(changes) - 1))),

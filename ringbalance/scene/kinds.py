@@ -71,10 +71,7 @@ class Check:
 
 
 def check(
-    rule: Rule,
-    *needs: str,
-    when: Callable[[SceneReading], bool] = lambda _: True,
-    moot: tuple[str, ...] = (),
+    rule: Rule, *needs: str, when: Callable[[SceneReading], bool] = lambda _: True, moot: tuple[str, ...] = ()
 ) -> Check:
     """Bind a rule to paths "table.key"."""
     return Check(rule=rule, needs=needs, when=when, moot=moot)

@@ -238,9 +238,7 @@ class ControllerSettings:
     assumed_influence_coefficient: Annotated[
         Influence,
         derived(
-            "influence_coefficient of [rotor]",
-            "value used by the controller",
-            "rotor.influence_coefficient",
+            "influence_coefficient of [rotor]", "value used by the controller", "rotor.influence_coefficient"
         ),
         Shown("influence coefficient assumed", "um/(g*mm)"),
     ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import SimpleNamespace
 from typing import Any
 
 from ringbalance.scene.faults import Fault
@@ -77,6 +76,10 @@ def check(
     return Check(rule=rule, needs=needs, when=when, moot=moot)
 
 
+class _Values:
+    """Values of a condition as attributes, by their keys: made thousands of times, so that it is bare."""
+
+
 class _Written:
     """A value in the text of an error: {outer_radius:mm} has the unit, other formats are Python's."""
 
@@ -94,7 +97,7 @@ def condition(
     holds: Callable[[Any], bool],
     problem: str,
     allowed: str,
-    more: Callable[[Any], Mapping[str, Any]] = lambda _: {},
+    more: Callable[[Any], Mapping[str, Any]] | None = None,
     when: Callable[[SceneReading], bool] = lambda _: True,
     moot: tuple[str, ...] = (),
 ) -> Check:
@@ -104,11 +107,13 @@ def condition(
         `more`: further values, such as a limit, from those of the keys.
     """
 
+    keys = [path.split(".")[1] for path in needs]
+
     def rule(*arguments: Any) -> Contradiction | None:
-        values = SimpleNamespace(
-            **{path.split(".")[1]: each for path, each in zip(needs, arguments, strict=True)}
-        )
-        vars(values).update(more(values))
+        values = _Values()
+        vars(values).update(zip(keys, arguments, strict=True))
+        if more:
+            vars(values).update(more(values))
         if holds(values):
             return None
         texts = {key: _Written(value) for key, value in vars(values).items()}
@@ -124,7 +129,7 @@ def failed_checks(reading: SceneReading, checks: tuple[Check, ...]) -> Iterator[
     for each in checks:
         if not reading.known(*each.needs) or not each.when(reading) or (failed and failed & set(each.moot)):
             continue
-        finding = each.rule(*(reading.values[path] for path in each.needs))
+        finding = each.rule(*[reading.values[path] for path in each.needs])
         if finding is not None:
             failed.add(each.rule.__name__.removeprefix("_"))
             yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)

@@ -97,7 +97,7 @@ class SceneReading:
 
     def known(self, *paths: str) -> bool:
         """True when there is a value for each path, read or by default."""
-        return all(path in self.values for path in paths)
+        return self.values.keys() >= {*paths}
 
     def lacks(self, path: str) -> bool:
         """True when a value is missing; False when it is present but unreadable."""
@@ -137,14 +137,16 @@ class SceneReading:
         A key is declared after those from which its default is derived, so that their values are known first;
         a needed key is derived from values in the file.
         """
-        unnamed = self.lacks("name")
-        reading = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
+        values = dict(self.values)
+        if self.lacks("name"):
+            values["name"] = PurePath(self.file).stem or "scene"
         for path, presence in self.schema.following:
-            if path not in reading.values and reading.lacks(path) and reading.known(*presence.needs):
+            if path not in values and self.lacks(path) and values.keys() >= {*presence.needs}:
                 needs = (*presence.needs, *presence.also)
-                result = presence.value(*(reading.values.get(need) for need in needs))
-                reading = reading if result is None else reading.adding({path: result})
-        return reading
+                result = presence.value(*(values.get(need) for need in needs))
+                if result is not None:
+                    values[path] = result
+        return replace(self, values=values)
 
     def missing_faults(self) -> Iterator[Fault]:
         """One error for each missing key, defaults included; one for a whole table that is missing."""

@@ -39,6 +39,7 @@ from skfem.models.poisson import mass, unit_load
 
 from ringbalance.mesh.chamber import FREE_SURFACE, chamber_mesh
 from ringbalance.mesh.section import LiquidSection, middle_section
+from ringbalance.physics.cell_mapping import CellMapping
 from ringbalance.physics.pressure.solve import stiffness
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
@@ -126,7 +127,7 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
     mapping: Any = mesh.mapping()
     element: Any = ElementTriP2()
     if isinstance(mapping, MappingIsoparametric):
-        mapping, element = _FilmMapping(mesh, mapping.elem, mapping.bndelem), ElementQuad2()
+        mapping, element = _FilmMapping(mesh), ElementQuad2()
     basis = Basis(mesh, element, mapping=mapping, intorder=4)
 
     def on_facets(facets: Any) -> Any:
@@ -178,42 +179,20 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
     )
 
 
-class _FilmMapping(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
+class _FilmMapping(CellMapping):
     """Mapping for films, where rounding exceeds the 1e-12 at which scikit-fem's Newton method ends.
 
-    An end at 1e-6 suffices, because the method converges quadratically.  Shape functions are evaluated once
-    for all components, and points of a facet are located once.
+    An end at 1e-6 suffices, because the method converges quadratically.  Points of a facet are located once.
     """
 
-    def __init__(self, mesh: Any, element: Any, of_facets: Any) -> None:
-        super().__init__(mesh, element, of_facets)
-        self._shapes: tuple[Any, list[tuple[Any, Any]]] = (None, [])
-        self._inverse: tuple[Any, Any, Any] = (None, None, None)
+    def __init__(self, mesh: Any) -> None:
+        super().__init__(mesh)
+        self._located: tuple[Any, Any, Any] = (None, None, None)
 
     def invF(self, x: Any, tind: Any = None, **_: Any) -> Any:  # noqa: N802
-        if self._inverse[0] is not x or not np.array_equal(self._inverse[1], tind):
-            self._inverse = (x, tind, super().invF(x, tind, newton_tol=1e-6))
-        return self._inverse[2]
-
-    def Fmap(self, i: int, X: Any, tind: Any = None) -> Any:  # noqa: N802
-        return self._summed(i, tind, [value for value, _ in self._shapes_at(X)])
-
-    def _J(self, i: int, j: int, X: Any, tind: Any = None) -> Any:  # noqa: N802
-        return self._summed(i, tind, [slope[j] for _, slope in self._shapes_at(X)])
-
-    def _shapes_at(self, points: Any) -> list[tuple[Any, Any]]:
-        if self._shapes[0] is not points:
-            count = self.mesh.dofs.element_dofs.shape[0]
-            self._shapes = (points, [self.elem.lbasis(points, each) for each in range(count)])
-        return self._shapes[1]
-
-    def _summed(self, i: int, tind: Any, shapes: list[Any]) -> Any:
-        nodes = self.mesh.dofs.element_dofs
-        nodes = nodes if tind is None else nodes[:, tind]
-        total = np.zeros((nodes.shape[1], shapes[0].shape[-1]))
-        for row, shape in zip(nodes, shapes, strict=True):
-            total += self.mesh.doflocs[i, row][:, None] * shape
-        return total
+        if self._located[0] is not x or not np.array_equal(self._located[1], tind):
+            self._located = (x, tind, super().invF(x, tind, newton_tol=1e-6))
+        return self._located[2]
 
 
 def _outward(psi: Any, w: Any) -> Any:

@@ -17,13 +17,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.fitted import (
-    CAVITY_ERROR,
-    CLEARING_ERROR,
-    CREST_ERROR,
-    MODEL,
-    START_ERROR,
-)
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, CREST_ERROR, MODEL, START_ERROR
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (

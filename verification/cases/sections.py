@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, Final
 
 import numpy as np
@@ -234,7 +234,7 @@ def _component(component: int, points: FloatArray) -> FloatArray:
 
 def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Decay rates along the turning tube: creeping flow at rest, fast rotation, the bound that k(u) uses."""
-    coarse, fine = (cells.system() for cells in _MESHES[level])
+    coarse, fine = (_section(cells) for cells in _MESHES[level])
     speed = 0.7 if defect == "coriolis_too_weak" else 1.0
     rates = _slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12)
     exact = _CREEPING_PER_DIAMETER / (2 if defect == "radius_for_bore" else 1)
@@ -272,6 +272,12 @@ def _decay_length(system: FlowSystem, reynolds: float, rotation_reynolds: float)
     return -1 / float(rates[0].real)
 
 
+@lru_cache(maxsize=2)
+def _section(cells: SectionMesh) -> FlowSystem:
+    return cells.system()
+
+
+@lru_cache(maxsize=16)
 def _slowest_decay(
     *, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int
 ) -> ComplexArray:

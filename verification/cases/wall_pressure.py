@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
+from functools import lru_cache, partial
 from typing import Final
 
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.pressure.ring import ring_quantities
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.reduced_model import paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
@@ -137,15 +137,9 @@ def _gravity_table(scene: Scene) -> CaseTable:
     """Mean wall pressure over a turn with gravity, relative to that without, at falling speeds."""
     speeds = [share * scene.rotor.speed for share in _SPEED_RATIOS]
     middle = scene.disc.max_fill_ratio / 2
+    density, gravity = scene.liquid.density, scene.environment.gravity
     rings = [
-        ring_quantities(
-            disc=scene.disc,
-            density=scene.liquid.density,
-            angular_velocity=speed,
-            fill_ratio=middle,
-            gravity=scene.environment.gravity,
-            dimension=2,
-        )
+        _tilted(disc=scene.disc, density=density, speed=speed, fill=middle, gravity=gravity)
         for speed in speeds
     ]
     plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEED_RATIOS)
@@ -160,6 +154,18 @@ def _gravity_table(scene: Scene) -> CaseTable:
             "ring": ["closed" if each else "no closed ring" for each in closed],
         },
         units={"speed": "rad/s", "change by gravity": "1", "ripple": "1"},
+    )
+
+
+@lru_cache(maxsize=4)
+def _tilted(*, disc: Disc, density: float, speed: float, fill: float, gravity: float) -> RingQuantities:
+    return ring_quantities(
+        disc=disc,
+        density=density,
+        angular_velocity=speed,
+        fill_ratio=fill,
+        gravity=gravity,
+        dimension=2,
     )
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.mesh.section import middle_section
+from ringbalance.physics.results import Estimate
 from ringbalance.physics.sloshing import (
     SloshingResponse,
     default_sloshing_cells,
@@ -31,6 +32,8 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Evidence, FigureCurve, Level, as_found, figure
 from ringbalance.verification.reference.chambers import CosineWaves, disc_chamber
 
+_BACKWARDS: Final = "forcing_backwards"
+"""Mutation of the reference alone."""
 _MODES: Final = 4
 _FILLS: Final = (0.1, 0.25, 0.5)
 _IMPORTED_FILL: Final = 0.4
@@ -53,7 +56,7 @@ def sloshing(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         quantities=as_found(
             still=np.abs(still - 1).max(),
             frequencies=np.abs(turning - 1).max(),
-            **_swing_errors(bare, _FILLS, swing, backwards=defect == "forcing_backwards"),
+            **_swing_errors(bare, _FILLS, swing, backwards=defect == _BACKWARDS),
         )
     )
 
@@ -121,8 +124,35 @@ def _swing_errors(
 def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Plane waves in the middle section of an imported chamber, against sums of cosines; their order."""
     bare, fills = replace(scene.disc, plate_thickness=0.0), (_IMPORTED_FILL,)
-    disc = replace(bare, geometry=disc_chamber(bare, _CELLS[level]))
     exact = _waves(bare, fills)[0].frequencies(modes=_IMPORTED_MODES)
+    frequencies, swing = _imported(bare, _CELLS[level], None if defect == _BACKWARDS else defect)
+    values, widths = frequencies.value[0], frequencies.uncertainty[0]
+    study = _still_study(bare, _LEVELS[level])
+    shown = figure(
+        "plane waves of an imported sector",
+        ("wave", "1", np.arange(1.0, _IMPORTED_MODES + 1)),
+        FigureCurve("imported mesh", "1", values),
+        FigureCurve("sum of cosines", "1", exact, style="reference"),
+    )
+    return Evidence(
+        quantities=as_found(
+            plane=np.abs(values / exact - 1).max(),
+            held=(np.abs(values - exact) / widths).max(),
+            **_swing_errors(bare, fills, swing, backwards=defect == _BACKWARDS),
+            still_order=study.settled_order,
+            still_error=study.finest_error,
+        ),
+        series=(shown,),
+        convergence=(study,),
+    )
+
+
+@lru_cache(maxsize=4)
+def _imported(
+    bare: Disc, cells: tuple[int, int, int], defect: str | None
+) -> tuple[Estimate, SloshingResponse]:
+    """Natural frequencies over the speed and the swing of an imported sector without plates."""
+    disc, fills = replace(bare, geometry=disc_chamber(bare, cells)), (_IMPORTED_FILL,)
 
     def system(mesh: Any, *, ends: float) -> SloshingSystem:
         if defect == "an_edge_of_the_surface_taken_for_a_wall":
@@ -137,25 +167,7 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
         frequencies = sloshing_modes(disc=disc, fill_ratio=fills, modes=_IMPORTED_MODES).frequency_ratio
         swing = _swing(disc, fills)
     imported_system.cache_clear()
-    values, widths = frequencies.value[0], frequencies.uncertainty[0]
-    study = _still_study(bare, _LEVELS[level])
-    shown = figure(
-        "plane waves of an imported sector",
-        ("wave", "1", np.arange(1.0, _IMPORTED_MODES + 1)),
-        FigureCurve("imported mesh", "1", values),
-        FigureCurve("sum of cosines", "1", exact, style="reference"),
-    )
-    return Evidence(
-        quantities=as_found(
-            plane=np.abs(values / exact - 1).max(),
-            held=(np.abs(values - exact) / widths).max(),
-            **_swing_errors(bare, fills, swing, backwards=defect == "forcing_backwards"),
-            still_order=study.settled_order,
-            still_error=study.finest_error,
-        ),
-        series=(shown,),
-        convergence=(study,),
-    )
+    return frequencies, swing
 
 
 @lru_cache(maxsize=2)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -21,12 +21,13 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
-from ringbalance.mesh.chamber import chamber_mesh
+from ringbalance.mesh.chamber import ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics.pressure.solve import (
     PressureProblem,
     PressureSolution,
     RotatingLiquid,
+    quadratic_basis,
     solve_pressure,
 )
 from ringbalance.physics.pressure.surface import solve_with_gravity
@@ -283,7 +284,9 @@ def manufactured_study(
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
     wall, fields, walls = _exact_wall_integral(disc, exact, dimension=dimension), {}, {}
     for name, wall_order in _WALL_ORDER.items():
-        solutions = _solutions(disc, exact.problem(defect), cells, straight=name == "straight")
+        liquids = [_liquid(disc, count, name == "straight") for count in cells]
+        problem = exact.problem(defect)
+        solutions = [solve_pressure(chamber=each, problem=problem, basis=basis) for each, basis in liquids]
         unknowns = solutions[-1].pressure.size
         study = partial(
             Convergence.of_errors,
@@ -320,24 +323,20 @@ def manufactured_study(
     )
 
 
-def _solutions(
-    disc: Disc, problem: PressureProblem, cells: Sequence[tuple[int, ...]], *, straight: bool
-) -> list[PressureSolution]:
-    """Solutions on ever finer meshes, with curved cells or, if `straight`, with straight sides.
+@lru_cache(maxsize=12)
+def _liquid(disc: Disc, count: tuple[int, ...], straight: bool) -> tuple[ChamberMesh, Any]:
+    """A mesh with its quadratic elements, the same for all mutations; `straight`: cells with straight sides.
 
     Straight sides make the wall integral differ from that over the true arc.
     """
     radius = float(surface_radius(disc=disc, fill_ratio=_FILL_OF_MAX * disc.max_fill_ratio))
-    solutions = []
-    for count in cells:
-        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=count)
-        if straight:
-            mesh = chamber.mesh
-            first, second = (MeshQuad1, MeshQuad2) if chamber.dimension == 2 else (MeshHex1, MeshHex2)
-            flat = second.from_mesh(first(mesh.p, mesh.t))
-            chamber = replace(chamber, mesh=second(flat.doflocs, mesh.t, mesh.boundaries))
-        solutions.append(solve_pressure(chamber=chamber, problem=problem))
-    return solutions
+    chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=count)
+    if straight:
+        mesh = chamber.mesh
+        first, second = (MeshQuad1, MeshQuad2) if chamber.dimension == 2 else (MeshHex1, MeshHex2)
+        flat = second.from_mesh(first(mesh.p, mesh.t))
+        chamber = replace(chamber, mesh=second(flat.doflocs, mesh.t, mesh.boundaries))
+    return chamber, quadratic_basis(chamber.mesh)
 
 
 def _wall_integral(solution: PressureSolution) -> float:

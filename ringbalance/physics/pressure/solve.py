@@ -22,9 +22,9 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import cg, splu
 from skfem import Basis, DiscreteField, ElementTetP2, LinearForm
 from skfem.helpers import dot, grad
-from skfem.quadrature import get_quadrature
 
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh
+from ringbalance.physics.cell_mapping import CellMapping, quadrature
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.registry import registered
@@ -46,7 +46,8 @@ def quadratic_basis(mesh: Any) -> Any:
     hexahedron, with the same errors.  Of order 2 on tetrahedra: exact for straight ones, of the same order
     for curved ones; that of order 3 has a negative weight.
     """
-    return Basis(mesh, mesh.elem(), intorder=2 if mesh.elem is ElementTetP2 else 4)
+    rule = quadrature(mesh.refdom, 2 if mesh.elem is ElementTetP2 else 4)
+    return Basis(mesh, mesh.elem(), mapping=CellMapping(mesh), quadrature=rule)
 
 
 def stiffness(basis: Any) -> csr_matrix:
@@ -113,7 +114,7 @@ def side(mesh: Any, boundary: str) -> BoundarySide:
     parts = [corners, *([edges[0, mesh.f2e]] if len(edges) else []), mesh.dofs.facet_dofs]
     nodes = np.vstack([part for part in parts if len(part)])[:, facets]
     element = mesh.mapping().bndelem
-    points, weights = get_quadrature(element.refdom, 4)
+    points, weights = quadrature(element.refdom, 4)
     functions = [element.lbasis(points, k) for k in range(len(nodes))]
     values = np.stack([value for value, _ in functions])
     # Differences first: a film's depth would cancel in the sums.
@@ -160,10 +161,7 @@ def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
     # Symmetric mode halves the fill of the default ordering; a positive definite matrix needs no pivoting.
     try:
         factor = splu(
-            matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
     except RuntimeError:  # singular: the residual of zeros says so
         return np.zeros_like(right)

@@ -60,6 +60,12 @@ _LITTLE_MOVED: Final = 1e-9
 """Moved fill ratio below which a flow counts as the last swing of a column about its balance."""
 _OPENINGS: Final = 42
 """Largest number of valve-open times tried to leave a chamber its residual fill."""
+_HALVINGS: Final = 60
+"""Largest number of valve-open times tried to bring a chamber to a fill."""
+_BEFORE: Final = 1.0 - 1e-9
+"""Part of the time to the end of a step that lies within that step."""
+_CLOCK: Final = 4e-16
+"""Round-off of a valve-open time, relative."""
 SPARE: Final = 3
 """Number of motions needed for these trials."""
 _LEFT_OVER: Final = 1e-4
@@ -182,6 +188,66 @@ def opening_within(
         if high - low <= near or -spared <= short_of_residual <= 0.0:
             break
     return low
+
+
+@in_place
+def opening_to(
+    plant: Record,
+    motions: Record,
+    pair: int,
+    spare: int,
+    chamber: int,
+    target: float,
+    longest: float,
+    allowed: float,
+    w: FloatArray,
+) -> float:
+    """Valve-open time after which the driven chamber is at a fill, at most `longest`, s.
+
+    The root is searched in the one step that passes it, by regula falsi with the weight of an end that stays
+    halved (Illinois rule).
+    Args: `spare`: first of `SPARE` motions that are written to; the last one then holds the pair at the end.
+        `target`: below the present fill. `allowed`: error of the fill.
+    Returns: infinity where the chamber does not come to that fill.
+    """
+    opened, way, end = spare, spare + 1, spare + 2
+    motions[opened] = motions[pair]
+    motions[opened].steps, motions[opened].residual = 0, target
+    _open(plant, motions[opened], chamber, w)
+    motions[way] = motions[opened]
+    _march(plant, motions[way], longest, w, 0, 0, w, False)
+    if motions[way].least_fill < target:
+        motions[end] = motions[way]
+        motions[way] = motions[opened]
+        _march(plant, motions[way], motions[end].now * _BEFORE, w, 0, 0, w, False)
+    else:
+        motions[end] = motions[way]
+        _march(plant, motions[end], longest - motions[way].now, w, 0, 0, w, True)
+        _settle(plant, motions[end])
+    low, high, stays = motions[way].now, motions[end].now, 0
+    above = _driven_fill(plant, motions[way]) - target
+    off = below = _driven_fill(plant, motions[end]) - target
+    if off > 0.0:
+        return math.inf
+    time = high
+    for _ in range(_HALVINGS):
+        if abs(off) <= allowed or high - low <= _CLOCK * high:
+            break
+        time = low + (high - low) * (above / (above - below) if above > below else 0.5)
+        motions[end] = motions[way]
+        _march(plant, motions[end], time - motions[way].now, w, 0, 0, w, True)
+        off = _driven_fill(plant, motions[end]) - target
+        if off > 0.0:
+            low, above, below, stays = time, off, below * (0.5 if stays > 0 else 1.0), 1
+        else:
+            high, below, above, stays = time, off, above * (0.5 if stays < 0 else 1.0), -1
+    return float(time)
+
+
+@inlined
+def _driven_fill(plant: Record, motion: Record) -> float:
+    x = shown(plant, motion, motion.state[X])
+    return float(plant.total - x if motion.chamber else x)
 
 
 @inlined

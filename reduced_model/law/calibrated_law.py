@@ -329,11 +329,14 @@ class CalibratedLaw:
         return save_record(path=Path(path), record=self)
 
 
-def constants_of(laws: Sequence[CalibratedLaw]) -> tuple[FloatArray, FloatArray]:
-    """`CalibratedLaw.constants` of laws with equally many ways and knots, stacked on a first axis."""
+def constants_of(laws: Sequence[CalibratedLaw], *, clearing: bool = True) -> tuple[FloatArray, FloatArray]:
+    """`CalibratedLaw.constants` of laws with equally many ways and knots, stacked on a first axis.
+
+    Args: `clearing`: false: as if no flow cleared the gas, for `cleared_laws`.
+    """
     siphon, *ways = (Table.stacked(each) for each in zip(*(law.heads.tables for law in laws), strict=True))
     density = np.array([law.density for law in laws])
-    froude = np.array([law.path.froude_velocity for law in laws])
+    froude = np.array([law.path.froude_velocity if clearing else 0.0 for law in laws])
     rows = LawRows.of(1 + len(ways), stack=(len(laws),))
     rows.add_levels(Table.stacked([law.levels for law in laws]))
     for row, way in enumerate((siphon, *ways)):

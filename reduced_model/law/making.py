@@ -98,23 +98,25 @@ def nominal_laws(
     gravity: bool,
     waves: Sequence[float] | None = None,
     rings: Rings | None = None,
+    clearing: bool = True,
 ) -> tuple[CalibratedLaw, ...]:
     """Nominal laws of many scenes; those that differ in numbers alone, but not in fills, are made together.
 
     Args: `waves`: error of each scene's levels by unmodelled effects, in standard deviations. `rings`: values
-        of chambers from earlier calls; missing ones are added.
+        of chambers from earlier calls; missing ones are added. `clearing`: as in `constants_of`.
     """
     rings = {} if rings is None else rings
     laws: dict[int, CalibratedLaw] = {}
     for rows in alike(scenes):
         group = [scenes[row] for row in rows]
         moved = None if waves is None else [waves[row] for row in rows]
-        laws |= zip(rows, _nominal(group, rings, gravity=gravity, waves=moved), strict=True)
+        made = _nominal(group, rings, gravity=gravity, waves=moved, clearing=clearing)
+        laws |= zip(rows, made, strict=True)
     return tuple(laws[row] for row in range(len(scenes)))
 
 
 def _nominal(
-    scenes: Sequence[Scene], rings: Rings, *, gravity: bool, waves: Sequence[float] | None
+    scenes: Sequence[Scene], rings: Rings, *, gravity: bool, waves: Sequence[float] | None, clearing: bool
 ) -> list[CalibratedLaw]:
     """Laws of scenes that differ in numbers alone, with their constants, which is faster than one by one."""
     fills, designs = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0], Designs.stacked(scenes)
@@ -147,7 +149,7 @@ def _nominal(
         )
         for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True)
     ]
-    for law, *constants in zip(laws, *constants_of(laws), strict=True):
+    for law, *constants in zip(laws, *constants_of(laws, clearing=clearing), strict=True):
         vars(law)["constants"] = tuple(constants)
     return laws
 

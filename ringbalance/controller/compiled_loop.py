@@ -66,8 +66,8 @@ def continue_runs(
         loops: one for each of some settings, type `LOOP`. plants: one for each device, type `PLANT`.
         assumed: the device that the law-based algorithm assumes; not read by the others.
         runs: of type `RUN`, shape (n,), changed; each names its settings and its device.
-        motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the true pairs and, with a
-            spare one, the pairs as the law-based algorithm estimates them.
+        motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the true pairs and, both with
+            spare ones, the pairs as the law-based algorithm estimates them.
         noise: of every device, amplitude and phase in standard deviations, shape (devices, samples, 2).
         until: number of samples; with 0 the runs are started.
         instants, injections, samples: rows of the trace of a single run (time and every pair's fill;

@@ -62,7 +62,7 @@ class LoopPlan:
     assumed: Records | None
     """Type `PLANT`, shape (1,): device that the law-based algorithm assumes; None: another algorithm."""
     liquid: Records
-    """Type `MOTION`: the pairs as the law-based algorithm estimates them, and a spare one; else empty."""
+    """Type `MOTION`: the pairs as the law-based algorithm estimates them, and spare ones; else empty."""
 
     @classmethod
     def of(

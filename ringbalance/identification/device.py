@@ -120,13 +120,13 @@ class ModelledDevice:
         devices = [each for each in self.together if "law" not in vars(each)] or [self]
         scenes = [each.scene for each in devices]
         gravity = self.scene.environment.gravity > 0
-        laws = nominal_laws(scenes, gravity=gravity, rings=self.models.rings)
+        laws = nominal_laws(scenes, gravity=gravity, rings=self.models.rings, clearing=False)
         velocities = [_primed_velocity(law, each.scene) for law, each in zip(laws, devices, strict=True)]
-        flowing = [i for i, velocity in enumerate(velocities) if velocity > 0 and self.models.velocity > 0]
-        froude = [laws[i].path.froude_velocity * velocities[i] / self.models.velocity for i in flowing]
-        cleared = dict(zip(flowing, cleared_laws([laws[i] for i in flowing], froude), strict=True))
-        for i, (device, law) in enumerate(zip(devices, laws, strict=True)):
-            vars(device)["law"] = cleared.get(i, law)
+        fitted = self.models.velocity
+        flows = [(each, fitted) if each > 0 and fitted > 0 else (1.0, 1.0) for each in velocities]
+        froude = [law.path.froude_velocity * u / u0 for law, (u, u0) in zip(laws, flows, strict=True)]
+        for device, law in zip(devices, cleared_laws(laws, froude), strict=True):
+            vars(device)["law"] = law
         result: CalibratedLaw = vars(self)["law"]
         return result
 

@@ -30,6 +30,7 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.stepped import Stepped
 from ringbalance.reduced_model.injection.dynamics import PLANT, WORKSPACE
+from ringbalance.reduced_model.injection.march import SPARE
 from ringbalance.reduced_model.injection.moment import MOMENT_NODES, fill_for_moment
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -82,10 +83,9 @@ def gas_time_of(
     """
     plant, loop = ring.dynamics.kept_plant(total=0.5), np.zeros(1, dtype=LOOP)
     loop["maximum_gas_time"], loop["probe"] = longest, probe
-    liquid = np.repeat(at_rest(plant, fill=fill), 2)
+    liquid = np.repeat(at_rest(plant, fill=fill), 1 + SPARE)
     liquid["ended"] = ended
-    room = np.zeros((2, 1)), np.zeros(WORKSPACE)
-    return float(_gas_time(loop[0], plant[0], liquid, 0, side, wanted, *room))
+    return float(_gas_time(loop[0], plant[0], liquid, 0, side, wanted, np.zeros(WORKSPACE)))
 
 
 @pytest.fixture

@@ -42,7 +42,7 @@ from ringbalance.reduced_model.injection.column import steady
 from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR, Event, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
-from ringbalance.reduced_model.injection.march import advance
+from ringbalance.reduced_model.injection.march import SPARE, advance, opening_to
 from ringbalance.reduced_model.injection.moment import fill_for_moment, pair_moment, tabulate_moment
 from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -57,7 +57,6 @@ LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 """Lower bound of the relative standard deviation of a flow law's velocity."""
 FILL_ERROR: Final = 1e-3
 """Tolerance in fill ratio of a valve-open time, as a multiple of the error allowed to a step."""
-_HALVINGS: Final = 60
 _BLOCKED: Final = EVENTS.index(Event.BLOCKED)
 _EMPTY: Final = EVENTS.index(Event.EMPTY)
 _FULL: Final = EVENTS.index(Event.FULL)
@@ -135,13 +134,13 @@ class LawBased(BuiltIn):
         run["memory"][VARIANCE] = abs(PRIOR_STANDARD_DEVIATION * influence) ** 2
 
     def liquid(self) -> Records:
-        """Pairs at rest at equal fills, and a spare one for trial integrations."""
+        """Pairs at rest at equal fills, and spare ones for trial integrations."""
         return self._liquid.copy()
 
     @cached_property
     def _liquid(self) -> Records:
         level = at_rest(self.plant, fill=self.ring.total / 2)
-        return np.repeat(level, self.ring.chambers // 2 + 1)
+        return np.repeat(level, self.ring.chambers // 2 + SPARE)
 
 
 def first_memory(axes: ComplexArray) -> FloatArray:
@@ -173,7 +172,7 @@ def law_based_step(
     if run.seen_amplitude <= loop.rest_limit:
         run.resting = 1
         return
-    _aim(loop, plant, run, liquid, notes, w)
+    _aim(loop, plant, run, liquid, w)
     for i in range(loop.chambers // 2):
         run.given[i], run.given_side[i] = run.asked[i], run.side[i]
 
@@ -226,7 +225,7 @@ def _follow(
 
 
 @in_place
-def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray) -> None:
+def _aim(loop: Record, plant: Record, run: Record, liquid: Record, w: FloatArray) -> None:
     """Command the valve-open times that remove the residual."""
     half, lowest, m = loop.chambers // 2, loop.least_fill, run.memory
     highest = plant.total - lowest
@@ -245,7 +244,7 @@ def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatA
             if is_try(m, 0, i, side):
                 time = _try_time(loop, plant, abs(wanted - fill))
             else:
-                time = _gas_time(loop, plant, liquid, i, side, wanted, notes, w)
+                time = _gas_time(loop, plant, liquid, i, side, wanted, w)
             chamber = i + side * half
             open_valve(loop, run, chamber, time, loop.offset[chamber])
 
@@ -256,30 +255,8 @@ def _along(plant: Record, fill: float) -> float:
 
 
 @in_place
-def _fill_after(
-    plant: Record, liquid: Record, pair: int, side: int, time: float, notes: FloatArray, w: FloatArray
-) -> float:
-    """Fill of a driven chamber after its valve has been open for a time, s, integrated on the spare pair."""
-    trial = liquid.size - 1
-    liquid[trial] = liquid[pair]
-    motion = liquid[trial]
-    motion.steps = 0
-    command(plant, motion, side, 2.0 * time + 1.0)
-    advance(plant, motion, time, notes, 1, 0, w)
-    fill = shown(plant, motion, motion.state[X])
-    return plant.total - fill if side else fill
-
-
-@in_place
 def _gas_time(
-    loop: Record,
-    plant: Record,
-    liquid: Record,
-    pair: int,
-    side: int,
-    wanted: float,
-    notes: FloatArray,
-    w: FloatArray,
+    loop: Record, plant: Record, liquid: Record, pair: int, side: int, wanted: float, w: FloatArray
 ) -> float:
     """Valve-open time that brings a pair to a fill of its positive chamber, t = (V/S) integral dx/u(x), s.
 
@@ -290,12 +267,13 @@ def _gas_time(
     target, now = (plant.total - wanted, plant.total - fill) if side else (wanted, fill)
     if target >= now:
         return 0.0
-    reached = _fill_after(plant, liquid, pair, side, longest, notes, w)
+    allowed = FILL_ERROR * plant.relative_error
+    time = opening_to(plant, liquid, pair, liquid.size - SPARE, side, target, longest, allowed, w)
     motion = liquid[liquid.size - 1]
     if motion.event == _BLOCKED:
         return float(loop.probe)
-    if reached <= target:
-        return _time_to(plant, liquid, pair, side, target, now, reached, longest, notes, w)
+    if time <= longest:
+        return time
     lowest = max(0.0, plant.total - plant.max_fill_ratio)
     flows = now > lowest
     if flows and motion.ended == 0.0:
@@ -303,7 +281,8 @@ def _gas_time(
     # A chamber that an earlier command has emptied does not flow again.
     ended, more = motion.ended if flows else 0.0, 0.0
     if motion.event in (_EMPTY, _FULL):
-        more = _try_time(loop, plant, reached - target)
+        reached = shown(plant, motion, motion.state[X])
+        more = _try_time(loop, plant, (plant.total - reached if side else reached) - target)
     return float(min(ended + more, longest))
 
 
@@ -316,37 +295,3 @@ def _try_time(loop: Record, plant: Record, change: float) -> float:
     level = plant.total / 2.0
     speed = steady(plant, level, level, plant.gas_pressure, 0.0, True, 0.0)[0]
     return float(min(change * plant.chamber_volume / (plant.tube_area * max(speed, 1e-12)), loop.probe))
-
-
-@in_place
-def _time_to(
-    plant: Record,
-    liquid: Record,
-    pair: int,
-    side: int,
-    target: float,
-    now: float,
-    reached: float,
-    longest: float,
-    notes: FloatArray,
-    w: FloatArray,
-) -> float:
-    """Valve-open time, at most `longest`, s, after which a driven chamber is at a fill within its reach.
-
-    Args: `now`, `reached`: fill of the chamber at first, and after the longest time.
-
-    By regula falsi, with the weight of an end that stays halved (Illinois rule).
-    """
-    low, high, stays = 0.0, longest, 0
-    above, below = now - target, reached - target
-    time = longest
-    for _ in range(_HALVINGS):
-        time = low + (high - low) * above / (above - below) if above > below else (low + high) / 2.0
-        off = _fill_after(plant, liquid, pair, side, time, notes, w) - target
-        if abs(off) <= FILL_ERROR * plant.relative_error or high - low <= 4e-16 * high:
-            break
-        if off > 0.0:
-            low, above, below, stays = time, off, below * (0.5 if stays > 0 else 1.0), 1
-        else:
-            high, below, above, stays = time, off, above * (0.5 if stays < 0 else 1.0), -1
-    return time

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from types import ModuleType
 from typing import Any, Final, ParamSpec, TypeVar
 
 import numpy as np
@@ -27,7 +28,10 @@ def called_both_ways(function: Callable[..., Any]) -> Iterator[Callable[..., Any
     """Marked functions that a function may call by name, directly or through other marked ones."""
     todo, seen = [function], {id(function)}
     while todo:
-        for each in todo.pop().__globals__.copy().values():
+        caller = todo.pop()
+        names, known = caller.__code__.co_names, caller.__globals__
+        modules = [vars(known[name]) for name in names if isinstance(known.get(name), ModuleType)]
+        for each in (space.get(name) for space in (known, *modules) for name in names):
             if id(each) not in seen and callable(each) and _MARK in getattr(each, "__dict__", {}):
                 seen.add(id(each))
                 todo.append(each)

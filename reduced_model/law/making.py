@@ -110,8 +110,8 @@ def nominal_laws(
     for rows in alike(scenes):
         group = [scenes[row] for row in rows]
         moved = None if waves is None else [waves[row] for row in rows]
-        made = _nominal(group, rings, gravity=gravity, waves=moved, clearing=clearing)
-        laws |= zip(rows, made, strict=True)
+        computed = _nominal(group, rings, gravity=gravity, waves=moved, clearing=clearing)
+        laws |= zip(rows, computed, strict=True)
     return tuple(laws[row] for row in range(len(scenes)))
 
 

@@ -29,9 +29,9 @@ def called_both_ways(function: Callable[..., Any]) -> Iterator[Callable[..., Any
     todo, seen = [function], {id(function)}
     while todo:
         caller = todo.pop()
-        names, known = caller.__code__.co_names, caller.__globals__
-        modules = [vars(known[name]) for name in names if isinstance(known.get(name), ModuleType)]
-        for each in (space.get(name) for space in (known, *modules) for name in names):
+        names, namespace = caller.__code__.co_names, caller.__globals__
+        modules = [vars(each) for name in names if isinstance(each := namespace.get(name), ModuleType)]
+        for each in (space.get(name) for space in (namespace, *modules) for name in names):
             if id(each) not in seen and callable(each) and _MARK in getattr(each, "__dict__", {}):
                 seen.add(id(each))
                 todo.append(each)

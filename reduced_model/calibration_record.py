@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -44,37 +44,29 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.registry import registered
 from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES
 
-
-class _Named(NamedTuple):
-    """Name, symbol and unit with which an answer is shown."""
-
-    name: str
-    symbol: str
-    unit: str
-
-
-ANSWERED: Final[Mapping[str, _Named]] = MappingProxyType(
+ANSWERED: Final[Mapping[str, tuple[str, str, str]]] = MappingProxyType(
     {
-        "lambda": _Named("lambda per transferred mass", "λ", "m"),
-        "usable_moment": _Named("usable moment of a pair", "U", "kg m"),
-        "velocity": _Named("velocity at the operating point", "u", "m/s"),
-        "reach": _Named("usable moment in any direction", "", "kg m"),
-        "drag_coefficient": _Named("k there", "k", "1"),
-        "chamber_volume": _Named("volume of a chamber", "V", "m^3"),
-        "wall_pressure": _Named("wall pressure, largest fill", "p", "Pa"),
-        "moment": _Named("moment of a chamber, largest fill", "U", "kg m"),
-        "least_fill_ratio": _Named("smallest usable fill ratio", "x", "1"),
-        "stall_pressure": _Named("full siphon stalls, chamber empty", "p", "Pa"),
-        "priming_pressure_vented": _Named("priming pressure, vented", "p", "Pa"),
-        "priming_pressure_trapped": _Named("priming pressure, trapped", "p", "Pa"),
-        "crest_pressure": _Named("gauge pressure over the crest", "p", "Pa"),
-        "cavitation_margin": _Named("cavitation margin over the crest", "Δp", "Pa"),
-        "usable_volume": _Named("usable volume of a pair", "", "m^3"),
-        "residual_depth": _Named("liquid over the port as gas enters", "", "m"),
-        "largest_fill_ratio": _Named("largest usable fill ratio", "", "1"),
+        "lambda": ("lambda per transferred mass", "λ", "m"),
+        "usable_moment": ("usable moment of a pair", "U", "kg m"),
+        "velocity": ("velocity at the operating point", "u", "m/s"),
+        "reach": ("usable moment in any direction", "", "kg m"),
+        "drag_coefficient": ("k there", "k", "1"),
+        "chamber_volume": ("volume of a chamber", "V", "m^3"),
+        "wall_pressure": ("wall pressure, largest fill", "p", "Pa"),
+        "moment": ("moment of a chamber, largest fill", "U", "kg m"),
+        "least_fill_ratio": ("smallest usable fill ratio", "x", "1"),
+        "stall_pressure": ("full siphon stalls, chamber empty", "p", "Pa"),
+        "priming_pressure_vented": ("priming pressure, vented", "p", "Pa"),
+        "priming_pressure_trapped": ("priming pressure, trapped", "p", "Pa"),
+        "crest_pressure": ("gauge pressure over the crest", "p", "Pa"),
+        "cavitation_margin": ("cavitation margin over the crest", "Δp", "Pa"),
+        "usable_volume": ("usable volume of a pair", "", "m^3"),
+        "residual_depth": ("liquid over the port as gas enters", "", "m"),
+        "largest_fill_ratio": ("largest usable fill ratio", "", "1"),
     }
 )
-"""Answers that have an uncertainty budget, in the order in which they are shown, the main ones first."""
+"""Name, symbol and unit of the answers that have an uncertainty budget, in the order in which they are shown,
+the main ones first."""
 MAIN: Final = 4
 """Number of answers that a short text shows."""
 FIELDS: Final = {"lambda": "moment_per_mass"}
@@ -109,9 +101,12 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
         low, high = around(value, parts.total, stated=stated)
         if low is not None:
             low, high = value - math.hypot(numerical, down), value + math.hypot(numerical, up)
+        name, symbol, unit = ANSWERED[key]
         yield Quantity(
             key=key,
-            **ANSWERED[key]._asdict(),
+            name=name,
+            symbol=symbol,
+            unit=unit,
             value=value,
             lower=low,
             upper=high,

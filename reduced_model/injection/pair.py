@@ -126,20 +126,12 @@ class Injections:
         if end["filled"] >= 0:
             # If it closed at exactly this instant, round-off would decide whether the tube is primed.
             return float(end["filled"]) + _TIME_ERROR_S
-        return max(self._filling_time, self._arrival)
-
-    @property
-    def _filling_time(self) -> float:
-        """Filling time of the driven chamber without flow, s."""
         line, supply = self.dynamics.line, self.dynamics.gas_pressure + self.dynamics.ambient_pressure
         volume = (1 - self.fill) * self.dynamics.chamber_volume + self.dynamics.dead_volume
-        return 0.0 if line is None else float(line.filling_time(supply, volume=volume))
-
-    @property
-    def _arrival(self) -> float:
-        """Time at which lifted liquid reaches the end of the crest under a valve that stays open, s."""
+        filled = 0.0 if line is None else float(line.filling_time(supply, volume=volume))
         if self.dynamics.lift is None:
-            return 0.0
+            return filled
+        # When lifted liquid reaches the end of the crest under a valve that stays open.
         plant, early, late = self.dynamics.kept_plant(total=self.total)[0], 0.0, _TAIL
         crest_end = plant["return_crest_end" if self.chamber else "crest_end"]
         while late - early > _TIME_ERROR_S:
@@ -149,7 +141,7 @@ class Injections:
                 late = middle
             else:
                 early = middle
-        return late
+        return max(filled, late)
 
     def moved(self, opening: float) -> float:
         """Fill ratio that has left the driven chamber when all is at rest after an opening, s."""

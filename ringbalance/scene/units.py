@@ -146,10 +146,17 @@ def parse_quantity(text: object, dimension: str) -> float:
     Raises: FieldError: not such a quantity; the error says what is wrong and which units exist.
     Range: magnitudes up to `_Dimension.largest`; a temperature above absolute zero.
     """
-    return _parsed_text(text, dimension) if isinstance(text, str) else _parsed(text, dimension)
+    if isinstance(text, str):
+        return _parsed(text, dimension)
+    problem = "a bare number has no unit"
+    if isinstance(text, bool) or not isinstance(text, int | float):
+        problem = "it is not text with a number and a unit"
+    raise FieldError(problem, _allowed(DIMENSIONS[dimension]))
 
 
-def _parsed(text: object, dimension: str) -> float:
+@lru_cache(4096)
+def _parsed(text: str, dimension: str) -> float:
+    """SI value of a text, cached: scenes of a sweep share most of their texts."""
     kind = DIMENSIONS[dimension]
     number, unit_text = _split(text, kind)
     unit = kind.units.get(_canonical(unit_text))
@@ -173,12 +180,6 @@ def _parsed(text: object, dimension: str) -> float:
     if kind is DIMENSIONS["temperature"] and value <= 0:
         raise FieldError("it lies at or below absolute zero", "a temperature above 0 K (-273.15 degC)")
     return value
-
-
-@lru_cache(4096)
-def _parsed_text(text: str, dimension: str) -> float:
-    """SI value of a text, cached: scenes of a sweep share most of their texts."""
-    return _parsed(text, dimension)
 
 
 def written_like(value: float, like: object, dimension: str) -> str:
@@ -263,11 +264,7 @@ def unit_of(text: str) -> str:
     return "" if match is None else _canonical(match[2])
 
 
-def _split(text: object, kind: _Dimension) -> tuple[str, str]:
-    if isinstance(text, bool) or not isinstance(text, int | float | str):
-        raise FieldError("it is not text with a number and a unit", _allowed(kind))
-    if not isinstance(text, str):
-        raise FieldError("a bare number has no unit", _allowed(kind))
+def _split(text: str, kind: _Dimension) -> tuple[str, str]:
     if len(text) > _TEXT_CHARACTERS:
         raise FieldError(f"it is longer than {_TEXT_CHARACTERS} characters", _allowed(kind))
     spelled = _respelled(text)

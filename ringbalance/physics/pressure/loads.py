@@ -142,10 +142,18 @@ def solved_ring(
     walls = {name: side(mesh, name) for name in mesh.boundaries if name != FREE_SURFACE}
     # The error of r^2 by the facets of the outer wall is taken for the other walls as well.
     doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
+    loads = {}
+    for name, wall in walls.items():
+        force, at_rest = (
+            (wall.area * wall.at_points(values)).sum(axis=(1, 2)) for values in (linear.values, exact)
+        )
+        area = float(wall.weights.sum())
+        error = np.abs(force - at_rest) + doubt * area
+        loads[name] = _BoundaryLoad(force=Estimate(value=force, uncertainty=error), area=area)
     mean, still = (_mean(walls[OUTER_WALL], values) for values in (linear.values, exact))
     return ImportedRing(
         wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
-        loads={name: _load(wall, linear.values, exact, doubt) for name, wall in walls.items()},
+        loads=loads,
         volume=float(basis.dx.sum()),
         first_moment=density * np.sum(basis.dx * np.asarray(basis.global_coordinates()), axis=(1, 2)),
         status=linear.status,
@@ -155,12 +163,3 @@ def solved_ring(
 
 def _mean(wall: BoundarySide, nodal: FloatArray) -> float:
     return float(np.sum(wall.weights * wall.at_points(nodal)) / wall.weights.sum())
-
-
-def _load(wall: BoundarySide, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
-    """Load on a wall; `doubt` is the error of the pressure by the walls' facets, Pa."""
-    force, still = ((wall.area * wall.at_points(values)).sum(axis=(1, 2)) for values in (nodal, exact))
-    area = float(wall.weights.sum())
-    return _BoundaryLoad(
-        force=Estimate(value=force, uncertainty=np.abs(force - still) + doubt * area), area=area
-    )

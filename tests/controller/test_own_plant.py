@@ -28,6 +28,7 @@ ASKED: Final = 0.9
 SEED: Final = 29
 OFFSET: Final = {"controller.gas_time_offset": (1.2e-3,)}
 VALVE: Final = {"gas.conductance": "1 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
+LOW: Final = {"gas.pressure": "0.42 MPa"}
 PAPER, SIX, CALIBRATED = "liquid_ring_paper", "six_chamber", "liquid_ring_paper_calibrated"
 
 
@@ -58,14 +59,16 @@ def both(scene: Scene, count: int, *, offset: float = 0.0) -> tuple[Share, Share
 # (scene, values, offset in s, draws), and between which bounds the fraction is to lie.  Six chambers with a
 # valve settle at an offset of 15 ms in 295 of 320 in the program and 300 in the own plant, of the first 64 in
 # 58 and 64.  Of six chambers at their own gain a further plant with other correlations settles 957 to 979 of
-# 1,000.
+# 1,000.  At 0.42 MPa every device stalls in its first seconds, in either plant: 20 s show it, and the heavy
+# ones wait the scene's 120 s.
 LIGHT: Final = {
-    "paper's disc at 0.42 MPa": (PAPER, {"gas.pressure": "0.42 MPa"}, 0.0, 32, 0.0, 0.02),
+    "paper's disc at 0.42 MPa": (PAPER, LOW | {"run.time_limit": "20 s"}, 0.0, 32, 0.0, 0.02),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 128, 0.80, 0.88),
     "six chambers at their own gain": (SIX, {}, 0.0, 128, 0.95, 0.98),
     "six chambers with a valve": (SIX, VALVE, 17e-3, 64, 0.0, 1.0),
 }
 HEAVY: Final = {
+    "paper's disc at 0.42 MPa": (PAPER, LOW, 0.0, 32, 0.0, 0.02),
     "paper's disc at 0.56 MPa": (PAPER, {"gas.pressure": "0.56 MPa"}, 1.2e-3, 256, 0.9, 1.0),
     "paper's disc at 0.70 MPa": (PAPER, {}, 0.0, 512, 0.80, 0.88),
     "six chambers at their own gain": (SIX, {}, 0.0, 512, 0.95, 0.98),

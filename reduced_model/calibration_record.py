@@ -12,6 +12,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.faceting import drawing_shares
+from ringbalance.physics.evaporation import carried_off
+from ringbalance.physics.gas import applied_pressure, leaks
 from ringbalance.physics.tube.loss import TubeLoss
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration
@@ -201,7 +203,7 @@ def _values(calibration: Calibration) -> dict[str, tuple[float, float]]:
     level, moment = chamber.hydrostatic_pressure, float(np.max(chamber.moment.interpolation))
     # Two chambers count.
     width = math.sqrt(2) * math.hypot(float(level.numerical[at]), float(level.interpolation[-1]))
-    rounding = error * abs(calibration.scene.gas.pressure)
+    rounding = error * abs(applied_pressure(calibration.scene.gas))
     k = float(answers.drag_coefficient)
     numerical = {
         "lambda": chamber.moment_per_mass_numerical,
@@ -266,10 +268,16 @@ class Calibration(PresentedResult):
         by_paper = paper.stall_pressure(
             disc=self.scene.disc, density=self.scene.liquid.density, angular_velocity=self.scene.rotor.speed
         )
-        rest = (
+        rest = [
             ("lambda_variation", "variation of lambda over fills", "1", self.lambda_variation),
             ("stall_pressure_paper", "stall pressure by Eq. 19", "Pa", by_paper),
-        )
+        ]
+        if (per_gas := carried_off(self.scene)) is not None:
+            name = "liquid that gas takes, at most"
+            rest.append(("liquid_per_gas", name, "kg/m^3", per_gas))
+        if leaks(self.scene.gas):
+            name = "gas pressure over a vented chamber"
+            rest.append(("applied_pressure", name, "Pa", applied_pressure(self.scene.gas)))
         without_budget = (
             Quantity(key=key, name=name, unit=unit, value=value, digits=3) for key, name, unit, value in rest
         )
@@ -280,7 +288,9 @@ class Calibration(PresentedResult):
         """Regime of an unprimed tube at equal fills under the scene's gas pressure."""
         law = self.flow_law
         half = law.max_fill_ratio / 2
-        flow = law.evaluate(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=self.scene.gas.pressure)
+        flow = law.evaluate(
+            fill_ratio=half, opposite_fill_ratio=half, gas_pressure=applied_pressure(self.scene.gas)
+        )
         return Regime(int(flow.regime))
 
     @cached_property

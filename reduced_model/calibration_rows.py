@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, drawing_shares, faceting, inward_share
+from ringbalance.physics.gas import applied_pressure, chamber_pressures, leaks
 from ringbalance.reduced_model.calibration_record import MAIN, Calibration
 from ringbalance.reduced_model.chamber.values import paper_closed_forms
 from ringbalance.reduced_model.documents import PRESSURE_FACTORS, RowStatus, chamber_status, velocity_status
@@ -32,10 +33,8 @@ _MARKS: Final = MappingProxyType(
 def calibration_rows(calibration: Calibration) -> Rows:
     """Quantities with their expanded uncertainties (95 %), findings, and tables over fill and velocity."""
     scene = calibration.scene
-    where = (
-        f"{format_given(scene.gas.pressure, 'Pa')}, equal fills of {scene.disc.max_fill_ratio / 2:g}: "
-        f"{calibration.regime.label}"
-    )
+    pressure, half = applied_pressure(scene.gas), scene.disc.max_fill_ratio / 2
+    where = f"{format_given(pressure, 'Pa')}, equal fills of {half:g}: {calibration.regime.label}"
     return Rows(
         title=f"Calibration of {scene.name} ({scene.source})",
         quantities=tuple(calibration.quantities.values()),
@@ -91,7 +90,15 @@ def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
     if calibration.regime is Regime.BLOCKED:
         limits = [quantities.get(name) for name in ("priming_pressure_vented", "stall_pressure")]
         needed = max(each.upper or each.value or 0.0 for each in limits if each is not None)
-        yield Finding(code="blocked", values={"gas_pressure": scene.gas.pressure, "pressure": needed})
+        yield Finding(
+            code="blocked", values={"gas_pressure": applied_pressure(scene.gas), "pressure": needed}
+        )
+    if leaks(scene.gas):
+        gas, vented = scene.gas, chamber_pressures(scene.gas)[1] - scene.gas.ambient_pressure
+        values = {"applied": applied_pressure(gas), "pressure": gas.pressure, "vented": vented}
+        yield Finding(code="leak_lowers", values=values)
+    elif scene.gas.leak_to_ambient or scene.gas.leak_from_supply:
+        yield Finding(code="leak_costs_air")
     if answers.least_fill_ratio > 0:
         code = "draw_down" if answers.residual_fill_ratio >= answers.stalled_fill_ratio else "gas_stalls"
         values = {"fill_ratio": quantities["least_fill_ratio"], "depth": quantities["residual_depth"]}
@@ -99,7 +106,7 @@ def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
     if "cavitation_margin" in quantities:
         margin, parts = float(answers.cavitation_margin), quantities["cavitation_margin"].parts
         law, half = calibration.flow_law, calibration.flow_law.max_fill_ratio / 2
-        ends = law.ends(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=scene.gas.pressure)
+        ends = law.ends(fill_ratio=half, opposite_fill_ratio=half, gas_pressure=applied_pressure(scene.gas))
         held = "crest_column_holds" if margin > 0 else "crest_column_separates"
         yield Finding(
             code="crest_column_undecided" if parts is not None and abs(margin) < parts.total else held,
@@ -185,7 +192,7 @@ def _tube_table(calibration: Calibration) -> Table:
 def _law_table(calibration: Calibration) -> Table:
     x = np.linspace(0, calibration.flow_law.max_fill_ratio, 5)
     states, rows = velocity_status(calibration, x), []
-    for pressure in np.multiply(PRESSURE_FACTORS, calibration.scene.gas.pressure):
+    for pressure in np.multiply(PRESSURE_FACTORS, applied_pressure(calibration.scene.gas)):
         flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=pressure)
         by_paper = calibration.paper_law.evaluate(fill_ratio=x, gas_pressure=pressure).velocity
         cells = []

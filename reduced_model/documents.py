@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.contributions import compression
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
@@ -137,7 +138,7 @@ def _check(check: ElementCheck) -> dict[str, Any]:
 
 def _law(calibration: Calibration) -> dict[str, Any]:
     fills = calibration.chamber.reported_fill_ratio
-    pressures = np.array(PRESSURE_FACTORS) * calibration.scene.gas.pressure
+    pressures = np.array(PRESSURE_FACTORS) * applied_pressure(calibration.scene.gas)
     flow = calibration.flow_law.evaluate(fill_ratio=fills[None, :], gas_pressure=pressures[:, None])
     by_paper = calibration.paper_law.evaluate(fill_ratio=fills[None, :], gas_pressure=pressures[:, None])
     return {

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.physics.gas import pressure_factor
+from ringbalance.physics.gas import applied_pressure, pressure_factor
 from ringbalance.physics.tube.state import tube_state, tube_state_at
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
@@ -101,7 +101,8 @@ def range_flow(scene: Scene) -> RangeFlow:
     """Flow over the range of fills, the tube unprimed beforehand. Source: `column_flow`."""
     wall = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio * np.array(FILL_SHARES))
     tube = TubeFlow.of(Designs(scene=scene, size=wall.size))
-    ends, gas = tube.ends(wall, wall[::-1]), np.full_like(wall, pressure_factor(scene) * scene.gas.pressure)
+    applied, ends = applied_pressure(scene.gas), tube.ends(wall, wall[::-1])
+    gas = np.full_like(wall, pressure_factor(scene) * applied)
     driving = driving_pressure(tube.path, ends)
     separated = np.full_like(wall, np.inf)
     if tube.path.crest:
@@ -111,7 +112,7 @@ def range_flow(scene: Scene) -> RangeFlow:
         siphon=tube.velocity(driving, driving > 0, to_crest=False),
         separated=separated,
         primes=resting_pressure(tube.path, ends) > gas_over_crest(tube.path, ends),
-        starts=can_flow(tube.path, ends, False) & (scene.gas.pressure > _NO_PRESSURE_PA),
+        starts=can_flow(tube.path, ends, False) & (applied > _NO_PRESSURE_PA),
         equal=float(tube.velocity(gas, gas > 0, to_crest=False)[0]),
     )
 

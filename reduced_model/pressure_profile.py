@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from ringbalance.physics.gas import vented_pressure
+from ringbalance.physics.gas import applied_pressure, vented_pressure
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -105,7 +105,7 @@ class HumpProfile:
         """
         if points < 2:
             raise ValueError("points must be at least 2")
-        gas = scene.gas.pressure if gas_pressure is None else gas_pressure
+        gas = applied_pressure(scene.gas) if gas_pressure is None else gas_pressure
         other = law.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
         ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas)

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.tube.flow import column_pressure, tube_path
@@ -27,7 +28,7 @@ def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
     """
 
     def draws_down_to(_: IntArray, fills: FloatArray) -> FloatArray:
-        flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=True)
+        flow = law.evaluate(fill_ratio=fills, gas_pressure=applied_pressure(scene.gas), primed=True)
         return drawn_fill(scene, flow_rate=scene.tube.area * np.maximum(flow.velocity, 0.0))
 
     return float(first_gas(scene, draws_down_to, top=np.array([scene.disc.max_fill_ratio]))[0])

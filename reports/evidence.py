@@ -22,6 +22,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
 from ringbalance.controller.loop import simulate
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -147,7 +148,7 @@ def _ring_study(scene: Scene) -> Record:
     )
     nearest = int(np.argmin(np.abs(np.asarray(tube.velocity) - speed)))
     equal_fills = calibration.paper_law.evaluate(
-        fill_ratio=half, opposite_fill_ratio=half, gas_pressure=scene.gas.pressure
+        fill_ratio=half, opposite_fill_ratio=half, gas_pressure=applied_pressure(scene.gas)
     )
     # Both laws over the fill, at the pressures of Fig. 4, or at the scene's own and at twice that.
     pressures = [papers.LOW_PRESSURE_PA, papers.HIGH_PRESSURE_PA]

@@ -19,7 +19,7 @@ from ringbalance.mesh.geometry import (
     surface_radius,
     wall_square,
 )
-from ringbalance.physics.gas import pressure_factor
+from ringbalance.physics.gas import applied_pressure, pressure_factor
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL_WAVE_RATIO
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, closed_ring
@@ -253,7 +253,7 @@ def compression(scene: Scene, fills: FloatArray) -> FloatArray:
     Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.working`.
     """
     column = chamber_pressure(scene=scene, fill_ratio=fills)
-    pressure = column + max(scene.gas.pressure, 0.0) * pressure_factor(scene)
+    pressure = column + max(applied_pressure(scene.gas), 0.0) * pressure_factor(scene)
     return np.asarray(pressure / bulk_modulus(scene.liquid))
 
 

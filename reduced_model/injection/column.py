@@ -33,6 +33,7 @@ from ringbalance.reduced_model.tube.regime import CLEARING, cleared, crest_margi
 from ringbalance.scene.platform.compiled import in_place, inlined
 
 Four = tuple[float, float, float, float]
+Eight = tuple[float, float, float, float, float, float, float, float]
 _SLOWEST_M_S: Final = 1e-150
 """Velocity below which the tube's loss is neglected, m/s."""
 _SEPARATED: Final = int(Regime.SEPARATED)
@@ -308,21 +309,52 @@ def end_pressure(plant: Record, is_open: bool) -> float:
 @inlined
 def line_rates(
     plant: Record, pressure: float, content: float, volume: float, growth: float, is_open: bool
-) -> tuple[float, float, float, float, float, float, float, float]:
-    """dp/dt (Pa/s) and d(m R)/dt (W/K) of a chamber's gas that fills from the supply or vents.
+) -> Eight:
+    """dp/dt (Pa/s) and d(m R)/dt (W/K) of a chamber's gas that fills from the supply or vents, and leaks.
 
     `content` is m R = p V/T, J/K; `growth` is dV/dt.
     Returns: the two, then the derivatives of each by pressure, volume and content.
-    Source: ISO 6358-1 for the mass flow, as in `physics.gas`; first law for the chamber's gas.
+    Source: ISO 6358-1 for the mass flows, as in `physics.gas`; first law for the chamber's gas.
     """
-    outside, temperature, varies = end_pressure(plant, is_open), plant.temperature, 0.0
+    if not plant.leaks:
+        outside = end_pressure(plant, is_open)
+        return _path_rates(plant, plant.passing, outside, pressure, content, volume, growth)
+    supply, ambient = plant.supply_pressure, plant.outside_pressure
+    outside, seep = (supply, 0.0) if is_open else (ambient, plant.leak_from_supply)
+    a = _path_rates(plant, plant.passing, outside, pressure, content, volume, growth)
+    b = _path_rates(plant, plant.leak_to_ambient, ambient, pressure, content, volume, 0.0)
+    c = _path_rates(plant, seep, supply, pressure, content, volume, 0.0)
+    return (
+        a[0] + b[0] + c[0],
+        a[1] + b[1] + c[1],
+        a[2] + b[2] + c[2],
+        a[3] + b[3] + c[3],
+        a[4] + b[4] + c[4],
+        a[5] + b[5] + c[5],
+        a[6] + b[6] + c[6],
+        a[7] + b[7] + c[7],
+    )
+
+
+@inlined
+def _path_rates(
+    plant: Record,
+    passing: float,
+    outside: float,
+    pressure: float,
+    content: float,
+    volume: float,
+    growth: float,
+) -> Eight:
+    """`line_rates` by one conductance, `passing` as in `PLANT`, to a pressure outside."""
+    temperature, varies = plant.temperature, 0.0
     if pressure <= outside:
-        ratio, scale = pressure / outside, plant.passing
+        ratio, scale = pressure / outside, passing
         shape = _flow_shape(ratio, plant.critical_ratio)
         flow = scale * outside * shape
         by_pressure = scale * _flow_shape_slope(ratio, plant.critical_ratio, shape)
     else:
-        ratio, scale = outside / pressure, -plant.passing
+        ratio, scale = outside / pressure, -passing
         if plant.heat_capacity_ratio > 1.0:
             # A trial step may empty a chamber of its gas; such a step is rejected.
             temperature, varies = pressure * volume / max(content, 1e-9 * volume), 1.0

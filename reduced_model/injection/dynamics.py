@@ -19,6 +19,9 @@ from ringbalance.physics.gas import (
     REFERENCE_TEMPERATURE_K,
     VENTED,
     GasLine,
+    applied_pressure,
+    chamber_pressures,
+    leaking,
 )
 from ringbalance.reduced_model.injection.moment import MOMENT_NODES
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -80,8 +83,12 @@ _PLANT_REAL: Final = (
     "gas_off",  # gauge, Pa, at or below which a chamber counts as without gas under a one-way law
     "gas_factor",  # gas pressure on the liquid over the one at the place of measurement
     "valve_lag",  # s
-    "gas_pressure",  # of the supply, gauge, Pa
-    "ambient_pressure",  # absolute, Pa
+    "gas_pressure",  # of a chamber with its valve open, over that of a vented one, Pa
+    "ambient_pressure",  # of a vented chamber, absolute, Pa
+    "supply_pressure",  # absolute, Pa, where a chamber leaks
+    "outside_pressure",  # of the surroundings, absolute, Pa, where a chamber leaks
+    "leak_to_ambient",  # of `Dynamics`
+    "leak_from_supply",
     "temperature",  # of supply and surroundings, K
     "passing",  # C p_0 sqrt(T/T_0) of the line with gas of that temperature, m^3/s
     "critical_ratio",
@@ -106,6 +113,7 @@ _PLANT_WHOLE: Final = (
     "tabled",  # whether the law gives velocities alone, which `rows` then hold by fill
     "lifts",  # whether an unprimed tube is filled up to the crest before liquid passes
     "line",  # whether valve and line take time to pass gas
+    "leaks",  # whether leaks change the pressures of the chambers
     "most_steps",
 )
 PLANT: Final = np.dtype(
@@ -196,7 +204,7 @@ class Lift:
         if tube.hump_radius is None or not isinstance(law, CalibratedLaw):
             return None
         half = law.max_fill_ratio / 2
-        flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
+        flow = law.evaluate(fill_ratio=half, gas_pressure=applied_pressure(scene.gas), primed=True)
         return cls.at(scene, np.asarray(flow.velocity))
 
     @classmethod
@@ -243,6 +251,8 @@ _OF_DYNAMICS: Final = (
     "chamber_volume",
     "max_fill_ratio",
     "residual",
+    "leak_to_ambient",
+    "leak_from_supply",
 )
 
 
@@ -259,9 +269,9 @@ class Dynamics:
     valve_lag: float
     """Time from a command to the valve's movement, s."""
     gas_pressure: float
-    """Gauge pressure of the supply, Pa."""
+    """Pressure of a chamber with its valve open over that of a vented one, Pa."""
     ambient_pressure: float
-    """Absolute, Pa."""
+    """Pressure of a vented chamber, absolute, Pa."""
     dead_volume: float
     """Between each valve and its chamber, m^3."""
     tube_area: float
@@ -270,6 +280,10 @@ class Dynamics:
     """V, m^3."""
     max_fill_ratio: float
     """Largest x of a chamber."""
+    leak_to_ambient: float = 0.0
+    """C p_0 sqrt(T/T_0) of the leak from a chamber to the surroundings, m^3/s."""
+    leak_from_supply: float = 0.0
+    """C p_0 sqrt(T/T_0) of the leak from the supply into a chamber whose valve is closed, m^3/s."""
     residual: float = 0.0
     """Smallest fill ratio to which a command may empty a driven chamber."""
     lift: Lift | None = None
@@ -299,8 +313,10 @@ class Dynamics:
             inertia=inertia,
             line=line,
             valve_lag=valve_lag,
-            gas_pressure=scene.gas.pressure,
-            ambient_pressure=scene.gas.ambient_pressure,
+            gas_pressure=applied_pressure(scene.gas),
+            ambient_pressure=chamber_pressures(scene.gas)[1],
+            leak_to_ambient=leaking(scene.gas, "leak_to_ambient"),
+            leak_from_supply=leaking(scene.gas, "leak_from_supply"),
             dead_volume=scene.gas.dead_volume or 0.0,
             tube_area=model.tube_area,
             chamber_volume=model.chamber_volume,
@@ -336,6 +352,8 @@ class Dynamics:
             plant["critical_ratio"] = line.critical_ratio
             plant["passing"] = line.conductance * REFERENCE_PRESSURE_PA * warm
             plant["heat_capacity_ratio"] = 1.0 if line.process == "isothermal" else HEAT_CAPACITY_RATIO
+            plant["supply_pressure"], plant["outside_pressure"] = line.supply_pressure, line.ambient_pressure
+            plant["leaks"] = self.leak_to_ambient + self.leak_from_supply > 0
         # Without a path of the law's own: no crest, and the port always covered.
         plant["density"], plant["gas_factor"], plant["column_pressure"] = 1.0, 1.0, math.inf
         plant["crest_end"], plant["return_crest_end"] = 1.0, 1.0

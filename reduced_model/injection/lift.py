@@ -184,7 +184,10 @@ def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
     pressure, content = motion.state[P + chamber], motion.state[P + 2 + chamber]
     volume = gas_volume(plant, fill)
     gauge = pressure - plant.ambient_pressure
-    time = gauge * volume / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
+    supply = plant.supply_pressure if plant.leaks else plant.gas_pressure + plant.ambient_pressure
+    # What leaks is that of the mean pressure of the rise.
+    inflow = plant.passing * supply - plant.leak_to_ambient * (pressure + plant.ambient_pressure) / 2.0
+    time = gauge * volume / inflow
     path = gauge * time * time / (6.0 * plant.density * level * plant.length)
     rate = line_rates(plant, pressure, content, volume, 0.0, True)[0]
     risen, speed = _risen(plant, start, tall, max(rate, 0.0))

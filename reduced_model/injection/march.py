@@ -103,7 +103,7 @@ def inject_each(
     motions: Record,
     follows: IntArray,
     chambers: IntArray,
-    pressures: FloatArray,
+    gas: FloatArray,
     times: FloatArray,
     rest: float,
     fills: FloatArray,
@@ -112,21 +112,24 @@ def inject_each(
     """Inject gas into a chamber of a pair at rest, several times, each from its own fill or an earlier end.
 
     Args: `motions`: a pair at rest, and a second record that is written to. `follows`: injection at whose end
-        each begins; its own number where it begins with the fill in row 0. `pressures`: of the gas, Pa gauge.
-        `times`: from the command to open to the command to close, s. `rest`: time after the valve has closed,
-        s. `fills`: x of chamber 0 before and after each, shape (2, n); is written.
+        each begins; its own number where it begins with the fill in row 0. `gas`: pressures as
+        `gas_pressure`, `supply_pressure` and `ambient_pressure` of a plant, Pa, shape (3, n). `times`: from
+        the command to open to the command to close, s. `rest`: time after the valve has closed, s. `fills`:
+        x of chamber 0 before and after each, shape (2, n); is written.
     """
-    motion, ambient, total = motions[1], plant.ambient_pressure, plant.total
+    motion, total = motions[1], plant.total
     for i in range(times.size):
         if follows[i] != i:
             fills[0, i] = fills[1, follows[i]]
         x = fills[0, i]
         motions[1] = motions[0]
         motion.state[X], motion.started, motion.least_fill = x, x, x
+        plant.gas_pressure, plant.supply_pressure, ambient = gas[0, i], gas[1, i], gas[2, i]
+        plant.ambient_pressure = ambient
         for chamber in range(2):
+            motion.state[P + chamber] = ambient
             free = max(1.0 - (total - x if chamber else x), 1e-3) * plant.chamber_volume + plant.dead_volume
             motion.state[P + 2 + chamber] = ambient * free / plant.temperature
-        plant.gas_pressure = pressures[i]
         command(plant, motion, chambers[i], times[i])
         advance(plant, motion, plant.valve_lag + times[i] + rest, w, 0, 0, w)
         fills[1, i] = motion.state[X]

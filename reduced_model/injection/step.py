@@ -299,8 +299,9 @@ def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
 
 @inlined
 def in_closed_form(plant: Record, motion: Record) -> bool:
-    """True if isothermal gases alone change, while the liquid rests."""
-    return bool(motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0)
+    """True if isothermal gases alone change, each by one conductance, while the liquid rests."""
+    still = motion.direction == 0 and not plant.leaks
+    return bool(still and plant.line and plant.heat_capacity_ratio == 1.0)
 
 
 @in_place

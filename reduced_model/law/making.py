@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
-from ringbalance.physics.gas import pressure_factor
+from ringbalance.physics.gas import applied_pressure, chamber_pressures, pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
 from ringbalance.reduced_model.chamber.contributions import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import (
@@ -57,7 +57,9 @@ def calibrated_law(
     )
     if not varied:
         return law
-    return replace(law, half_widths=half_width_table(side_laws(scene), gas_pressure=scene.gas.pressure))
+    return replace(
+        law, half_widths=half_width_table(side_laws(scene), gas_pressure=applied_pressure(scene.gas))
+    )
 
 
 def side_laws(scene: Scene) -> tuple[CalibratedLaw, ...]:
@@ -67,11 +69,12 @@ def side_laws(scene: Scene) -> tuple[CalibratedLaw, ...]:
     sides = [base, *(side for error in errors for side in error.sides(base)), base, base]
     waves = [0.0] * (len(sides) - 2) + [-NORMAL_95, NORMAL_95]
     laws = nominal_laws(sides, gravity=False, waves=waves)
-    if not scene.gas.pressure:
+    applied = applied_pressure(scene.gas)
+    if not applied:
         return laws
     # The gas pressure of a side becomes a factor on that of the scene.
     factors = [
-        law.gas_factor * side.gas.pressure / scene.gas.pressure for law, side in zip(laws, sides, strict=True)
+        law.gas_factor * applied_pressure(side.gas) / applied for law, side in zip(laws, sides, strict=True)
     ]
     return tuple(law.with_gas_factor(factor) for law, factor in zip(laws, factors, strict=True))
 
@@ -160,7 +163,7 @@ def _assembled_law(
     return CalibratedLaw(
         name=CALIBRATED,
         max_fill_ratio=scene.disc.max_fill_ratio,
-        ambient_pressure=scene.gas.ambient_pressure,
+        ambient_pressure=chamber_pressures(scene.gas)[1],
         chamber_volume=chamber_volume(disc=scene.disc),
         tube_area=scene.tube.area,
         levels=levels,

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.physics.gas import chamber_pressures
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import (
     BalancerModel,
@@ -167,7 +168,7 @@ def paper_law(scene: AnyScene) -> PaperLaw:
         tube_area=scene.tube.area,
         drag_coefficient=paper.PAPER_DRAG_COEFFICIENT if drag is None else drag,
         max_fill_ratio=scene.disc.max_fill_ratio,
-        ambient_pressure=scene.gas.ambient_pressure,
+        ambient_pressure=chamber_pressures(scene.gas)[1],
         moment=PaperMoment(
             moment_per_transferred_mass=paper.PAPER_LAMBDA_M,
             density=scene.liquid.density,

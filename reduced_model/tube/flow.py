@@ -10,7 +10,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from ringbalance.physics.gas import pressure_factor, vented_pressure
+from ringbalance.physics.gas import applied_pressure, pressure_factor, vented_pressure
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.tube.path import crest_head
@@ -182,7 +182,7 @@ class TubeFlow:
     ) -> TubeFlow:
         """Make the tubes of designs, with the nodes for starting values of roots."""
         scene, path, factor = designs.scene, tube_path(designs.scene), pressure_factor(designs.scene)
-        highest = factor * np.abs(scene.gas.pressure) + chamber_pressure(
+        highest = factor * np.abs(applied_pressure(scene.gas)) + chamber_pressure(
             scene=scene, fill_ratio=scene.disc.max_fill_ratio
         )
         fastest = np.log(2 * np.maximum(highest, 1.0) / path.density * np.ones(designs.size)) / 2
@@ -218,7 +218,7 @@ class TubeFlow:
 
     def ends(self, level: FloatArray, opposite: FloatArray, *, driven: bool = True) -> TubeEnds:
         """Pressures at the tube's ends, Pa, for levels of both chambers. Args: `driven`: with the gas on."""
-        gas = self.gas_factor * self.designs.scene.gas.pressure if driven else 0.0
+        gas = self.gas_factor * applied_pressure(self.designs.scene.gas) if driven else 0.0
         return TubeEnds(
             upstream_gas=gas + 0 * level,
             downstream_gas=0 * level,

@@ -111,6 +111,8 @@ def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices:
     return {
         "limit_m": limit,
         "valve_given": scene.gas.conductance is not None,
+        "assumed_absent": assumed_absent(scene),
+        "humidity_given": scene.gas.relative_humidity is not None,
         **tuning["judged"],
         "noise_open": not scene.sensor.amplitude_noise
         and scene.origin_of("sensor.amplitude_noise") == "default",
@@ -122,6 +124,16 @@ def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices:
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in scene.uncertainty),
         "other_reading": other_reading,
     }
+
+
+def assumed_absent(scene: Scene) -> list[str]:
+    """Effects on the verdict that the scene does not state and the program assumes absent, in words."""
+    absent = {
+        "no leak of the gas distributor": scene.gas.leak_to_ambient is None
+        and scene.gas.leak_from_supply is None,
+        "no runout of the sensor": scene.sensor.runout_amplitude is None,
+    }
+    return [words for words, holds in absent.items() if holds]
 
 
 def _requirement_record(scene: Scene, *, limit: float) -> Record:

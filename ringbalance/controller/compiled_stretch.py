@@ -228,7 +228,9 @@ def keep_injections(
             forget(motion, fill)
         moved = abs(fill - motion.fill_before) > NOTICEABLE_CHANGE
         filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
+        leaked = plant.leak_to_ambient * run.asked[pair]
         run.gas += motion.closing_pressure * filled
+        run.gas += leaked * (motion.closing_pressure + plant.ambient_pressure)
         # Shorter injections do not count: noise keeps opening the other valve a little.
         if run.asked[pair] > longest:
             longest, working = run.asked[pair], moved

@@ -14,9 +14,11 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import WATCH_TIME_S
+from ringbalance.controller.liquid_ring.drying import drying
 from ringbalance.controller.liquid_ring.loop_factor import vibration_left
 from ringbalance.controller.simulation import GasUse, Simulation
 from ringbalance.physics import balancing
+from ringbalance.physics.evaporation import carried_off
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
 from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -88,6 +90,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
             "residual_fill_ratio": gas.residual_fill_ratio,
             "injections_below_residual_fill": gas.below_residual,
             "passed_through_normal_litres": gas.passed_through * 1e3,
+            "leaked_normal_litres": gas.leaked * 1e3,
             "warning": "" if gas.finding is None else gas.finding.text,
         },
         "gas_line": line_document(simulation.gas_line),
@@ -300,6 +303,10 @@ def command_document(nominal: Simulation) -> dict[str, Any]:
 _HOUR_S: Final = 3600.0
 
 
+CONSUMPTION: Final = ("gas_per_hour", "liquid_per_hour", "liquid_part_per_hour", "holding_time")
+"""Keys of `conventions` that say what holding the balance takes."""
+
+
 def conventions(run: Simulation) -> tuple[Quantity, ...]:
     """Unbalances and vibrations of the run as ISO 21940 and ISO 20816 name them, the loop's peak sensitivity,
     gas used, and lowest speed at which the correction lasts without gas.
@@ -356,14 +363,24 @@ def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
     first = min((each.time + each.duration for each in run.injections if each.moved), default=None)
     corrections = len({each.time for each in run.injections})
     per_correction = run.gas.normal_volume / corrections if corrections else None
-    hourly, since, end = None, run.settling_time, float(run.time[-1])
+    hourly, used, since, end = None, None, run.settling_time, float(run.time[-1])
+    span = 0.0 if since is None else end - since
     if since is not None and end > since:
         later = [each for each in run.injections if each.time > since]
-        used = GasUse.of(scene=run.scene, model=run.model, injections=later)
-        hourly = used.normal_volume / (end - since) * _HOUR_S
+        used = GasUse.of(scene=run.scene, model=run.model, injections=later, time=span)
+        hourly = used.normal_volume / span * _HOUR_S
     yield "first_correction", "first correction made after", first, "s", "ok"
     yield "gas_per_correction", "gas per correction, normal volume", per_correction, "m^3", "ok"
     yield "gas_per_hour", "gas per hour to hold it, normal volume", hourly, "m^3", "ok"
+    each, loss = carried_off(run.scene), drying(run, used, span=span)
+    code = "ok" if each is not None else "not_known"
+    taken = None if each is None or not corrections else each * (run.gas.normal_volume - run.gas.leaked)
+    per_correction = None if taken is None else taken / corrections
+    yield "liquid_per_correction", "liquid that gas takes per correction", per_correction, "kg", code
+    yield "liquid_per_hour", "liquid that gas takes per hour to hold it, at most", loss.per_hour, "kg", code
+    yield "liquid_part_per_hour", "part of all liquid, per hour, at most", loss.part_per_hour, "1", code
+    name = "holding until the lost liquid is missing for the initial unbalance"
+    yield "holding_time", name, loss.holding_time, "s", code
 
     held = Holding.of(run.scene, fill_ratio=max(float(each[-1]) for each in run.fill_ratio.values()))
     status = "ok" if held.finding is None else held.finding.code

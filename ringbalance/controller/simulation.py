@@ -17,7 +17,14 @@ from ringbalance.controller.liquid_ring.loop_factor import LoopFactor
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL, LiquidRing
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE_CHANGE, RISING, SAMPLES
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
+from ringbalance.physics.gas import (
+    GasLine,
+    chamber_pressures,
+    compression_work,
+    leaking,
+    normal_volume,
+    nozzle_flow,
+)
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.chamber.contributions import chamber_status
 from ringbalance.reduced_model.gas_line import LineAnswer
@@ -70,8 +77,10 @@ class GasUse:
 
     fillings: int
     normal_volume: float
-    """Gas from the supply: content of the chambers above ambient pressure as their valves close, all of which
-    is vented, and gas that passed through, normal m^3."""
+    """Gas from the supply: content of the chambers above that of vented ones as their valves close, all of
+    which is vented, gas that passed through, and gas that leaked, normal m^3."""
+    leaked: float
+    """Upper bound on the gas that leaked, normal m^3; part of `normal_volume`."""
     energy: float
     """Least work of compressing this gas, p V ln(p_1/p_a) for each filling, J."""
     run_dry: int
@@ -98,15 +107,19 @@ class GasUse:
         return Finding(code="gas_passed_through" if self.run_dry else "gas_entered_port", values=numbers)
 
     @classmethod
-    def of(cls, *, scene: Scene, model: BalancerModel, injections: Sequence[Injection]) -> GasUse:
+    def of(
+        cls, *, scene: Scene, model: BalancerModel, injections: Sequence[Injection], time: float = 0.0
+    ) -> GasUse:
         """Gas consumption of the injections of a run.
 
-        Gas through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
+        A leak counts as choked, that to ambient at the pressure at closing for the whole opening.  Gas
+        through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
         line.
+        Args: `time`: s, in which gas leaks from the supply.
         Source: (p_1 - p_a) V of each filling at closing; `compression_work`, `nozzle_flow`.
         """
         gas = scene.gas
-        supply = gas.pressure + gas.ambient_pressure
+        supply, vented = gas.pressure + gas.ambient_pressure, chamber_pressures(gas)[1]
         through = nozzle_flow(pressure=supply, area=model.tube_area, temperature=gas.temperature)
         line = GasLine.of(gas)
         if line is not None:
@@ -119,7 +132,11 @@ class GasUse:
             done.closing_pressure * ((1 - done.fill_after) * model.chamber_volume + dead)
             for done in injections
         )
-        total = content + passed
+        opened = math.fsum(done.duration for done in injections)
+        under_gas = math.fsum(done.duration * (done.closing_pressure + vented) for done in injections)
+        leaked = leaking(gas, "leak_to_ambient") * under_gas
+        leaked += leaking(gas, "leak_from_supply") * supply * (scene.disc.chambers * time - opened)
+        total = content + passed + leaked
         residual = residual_fill_ratio(scene, law=model.flow)
         return cls(
             fillings=len(injections),
@@ -133,6 +150,7 @@ class GasUse:
                 done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in injections
             ),
             passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
+            leaked=normal_volume(pressure_volume=leaked, temperature=gas.temperature),
         )
 
 
@@ -395,7 +413,8 @@ class Simulation(PresentedResult):
     @cached_property
     def gas(self) -> GasUse:
         """Gas consumption of all injections."""
-        return GasUse.of(scene=self.scene, model=self.model, injections=self.injections)
+        end = float(self.time[-1])
+        return GasUse.of(scene=self.scene, model=self.model, injections=self.injections, time=end)
 
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:

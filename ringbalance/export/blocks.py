@@ -205,7 +205,8 @@ def _disc(
             allowed = f"at least {shortest:.2g} s, no gas.conductance, or --block law"
             raise SceneError.of_file(scene.file, f"{took}, too short for a host's steps", allowed)
 
-    plant = dynamics.plant(total=2 * fill)[0]
+    plant, vented = dynamics.plant(total=2 * fill)[0], dynamics.ambient_pressure
+    supply = gas.ambient_pressure + gas.pressure
     ratio = float(plant["heat_capacity_ratio"])
     complex_numbers = [rotor.initial_vibration, rotor.influence]
     complex_numbers += chamber_directions(scene.disc.chambers)[:half].tolist()
@@ -216,7 +217,7 @@ def _disc(
         law.tube_area / law.chamber_volume,
         law.chamber_volume,
         dynamics.dead_volume,
-        gas.ambient_pressure + gas.pressure,
+        supply if dynamics.line is not None else vented + dynamics.gas_pressure,
         dynamics.valve_lag,
         residual_fill_ratio(scene, law=law),
         longest,
@@ -226,14 +227,17 @@ def _disc(
         gas.temperature,
         ratio,
         float(ratio > 1.0),
+        gas.ambient_pressure,
+        float(plant["leak_to_ambient"]),
+        float(plant["leak_from_supply"]),
         *(part for number in complex_numbers for part in (number.real, number.imag)),
     ]
     constants[point.BLOCK] = float(len(compact.constants))
     row = [0.0] * (disc.FIRST_PAIR + disc.PER_PAIR * half)
-    content = gas.ambient_pressure * disc.gas_volume(constants, fill) / gas.temperature
+    content = vented * disc.gas_volume(constants, fill) / gas.temperature
     for pair in range(half):
         at = disc.FIRST_PAIR + disc.PER_PAIR * pair
-        row[at : at + disc.STATES] = [fill, gas.ambient_pressure, gas.ambient_pressure, content, content]
+        row[at : at + disc.STATES] = [fill, vented, vented, content, content]
     return compact, constants, row
 
 

@@ -12,6 +12,7 @@ from ringbalance.export.fmu import fmu_bytes
 from ringbalance.export.grid import csv_files
 from ringbalance.export.hosts import c_files, identifier, python_files, st_files
 from ringbalance.export.libraries import EXTRA
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
@@ -61,7 +62,7 @@ def export(options: SimpleNamespace) -> int:
                     compact = compact_law(scene=scene, law=law)
                     block = law_block(compact)
         if options.to == "csv" and compact is not None:
-            pressure = scene.gas.pressure
+            pressure = applied_pressure(scene.gas)
             highest = _GRID_END * pressure if pressure > 0 else _GRID_END_WITHOUT_PRESSURE_PA
             texts = csv_files(compact, called, points=options.points or _GRID_POINTS, highest=highest)
             files = {file: text.encode() for file, text in texts.items()}

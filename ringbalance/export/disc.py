@@ -39,7 +39,8 @@ from ringbalance.reduced_model.pieces.query import set_answer
 # Constants from index c[BLOCK] on; from DIRECTIONS on, the direction of each pair's positive chamber.
 PAIRS, TOTAL, PER_SECOND, VOLUME, DEAD, SUPPLY, LAG, RESIDUAL, LONGEST = 0, 1, 2, 3, 4, 5, 6, 7, 8
 LINE, PASSING, CRITICAL, WARMTH, RATIO, TEMPERATURE_VARIES = 9, 10, 11, 12, 13, 14
-START_X, START_Y, INFLUENCE_X, INFLUENCE_Y, DIRECTIONS = 15, 16, 17, 18, 19
+OUTSIDE, LEAK, LEAK_IN = 15, 16, 17
+START_X, START_Y, INFLUENCE_X, INFLUENCE_Y, DIRECTIONS = 18, 19, 20, 21, 22
 
 # State of the disc; then work values of a part of a step.
 MOMENT_X, MOMENT_Y, VIBRATION_X, VIBRATION_Y = 40, 41, 42, 43
@@ -70,6 +71,23 @@ def passed(c: Law, ratio: float) -> float:
     return ellipse
 
 
+def add_gas_flow(
+    c: Law, w: Query, at: int, side: int, volume: float, growth: float, passing: float, outside: float
+) -> None:
+    """Add the rates of a chamber's gas by the flow through one conductance to a pressure outside."""
+    d = int(c[BLOCK])
+    pressure = w[at + GAS + side]
+    warmth = c[d + WARMTH]
+    if pressure <= outside:
+        flow = passing * outside * passed(c, pressure / outside)
+    else:
+        if c[d + TEMPERATURE_VARIES] != 0.0:
+            warmth = pressure * volume / larger(w[at + CONTENT + side], 1e-9 * volume)
+        flow = -passing * sqrt(warmth / c[d + WARMTH]) * pressure * passed(c, outside / pressure)
+    w[RATES + GAS + side] = w[RATES + GAS + side] + (flow - pressure * growth) * c[d + RATIO] / volume
+    w[RATES + CONTENT + side] = w[RATES + CONTENT + side] + flow / warmth
+
+
 def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: float) -> None:
     """Rates of a chamber's pressure, Pa/s, and content p V/T, W/K, with the growth of its volume, m^3/s."""
     d = int(c[BLOCK])
@@ -77,20 +95,17 @@ def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: flo
     w[RATES + CONTENT + side] = 0.0
     if c[d + LINE] == 0.0:
         return
-    outside = c[AMBIENT]
+    volume = gas_volume(c, fill)
+    outside = c[d + OUTSIDE]
+    leak_in = c[d + LEAK_IN]
     if w[at + VALVE + side] != 0.0:
         outside = c[d + SUPPLY]
-    pressure = w[at + GAS + side]
-    volume = gas_volume(c, fill)
-    warmth = c[d + WARMTH]
-    if pressure <= outside:
-        flow = c[d + PASSING] * outside * passed(c, pressure / outside)
-    else:
-        if c[d + TEMPERATURE_VARIES] != 0.0:
-            warmth = pressure * volume / larger(w[at + CONTENT + side], 1e-9 * volume)
-        flow = -c[d + PASSING] * sqrt(warmth / c[d + WARMTH]) * pressure * passed(c, outside / pressure)
-    w[RATES + GAS + side] = (flow - pressure * growth) * c[d + RATIO] / volume
-    w[RATES + CONTENT + side] = flow / warmth
+        leak_in = 0.0
+    add_gas_flow(c, w, at, side, volume, growth, c[d + PASSING], outside)
+    if c[d + LEAK] > 0.0:
+        add_gas_flow(c, w, at, side, volume, 0.0, c[d + LEAK], c[d + OUTSIDE])
+    if leak_in > 0.0:
+        add_gas_flow(c, w, at, side, volume, 0.0, leak_in, c[d + SUPPLY])
 
 
 def set_tube(c: Law, k: Cells, p: Pieces, q: Levels, w: Query, at: int) -> None:

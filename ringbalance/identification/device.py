@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.kinds.kind import Observations
+from ringbalance.physics.gas import applied_pressure, chamber_pressures
 from ringbalance.reduced_model.injection.dynamics import WORKSPACE, empty_plants
 from ringbalance.reduced_model.injection.limits import hold_liquid
 from ringbalance.reduced_model.injection.march import inject_each
@@ -90,7 +91,9 @@ class Models:
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
     """Velocity in a primed tube at equal fills under the scene's gas, m/s; zero if it is blocked."""
     fill = scene.disc.initial_fill
-    return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
+    return abs(
+        float(law.evaluate(fill_ratio=fill, gas_pressure=applied_pressure(scene.gas), primed=True).velocity)
+    )
 
 
 def runs_back(scene: Scene, _: Observations) -> str:
@@ -181,6 +184,8 @@ class ModelledDevice:
         late = scene.tube.model_error(START_ERROR) / NORMAL_95 * scene.tube.length / 2
         delay = late / velocity if velocity else 0.0
         count, plant = times.size, self._plant
+        gas = replace(scene.gas, pressure=cast(float, np.broadcast_to(supply, count)))
+        pressures = applied_pressure(gas), supply + scene.gas.ambient_pressure, chamber_pressures(gas)[1]
         fills = np.zeros((2, count))
         fills[0] = fill
         motions = np.repeat(at_rest(plant, fill=scene.disc.initial_fill), 2)
@@ -189,7 +194,7 @@ class ModelledDevice:
             motions,
             np.arange(count) if follows is None else np.array(follows, dtype=np.int64),
             np.broadcast_to(np.asarray(chamber, dtype=np.int64), count).copy(),
-            np.broadcast_to(supply, count).copy(),
+            np.stack([np.broadcast_to(each, count) for each in pressures]),
             # In a shorter time no flow would start.
             np.maximum(times - delay, _LEAST_LEFT * times),
             _SETTLING_TIME_S,

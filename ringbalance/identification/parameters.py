@@ -23,6 +23,7 @@ from ringbalance.identification.device import ModelledDevice, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
 from ringbalance.mesh.faceting import drawing_shares
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.errors import Uncertainty, model_uncertainties, with_places
 from ringbalance.scene.faults import did_you_mean
@@ -197,7 +198,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
         return 1.0, 1.0
     apart = _LOSS_STEP / (-2 * math.log(speeds[1] / speeds[0]))
     fill, law = scene.disc.initial_fill, ModelledDevice.of(scene, Models.of(scene)).law
-    ends = law.ends(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure)
+    ends = law.ends(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=applied_pressure(scene.gas))
     head = float(driving_pressure(law.path, ends)) / scene.liquid.density
     return apart - loss, head * 2 / speeds[0] ** 2 / apart
 

@@ -14,13 +14,19 @@ sin q = (r - b)/(1 - b), tau (1 - b) dq beyond, so tau (1 - b) pi/2 from b to r 
 would be V p/(C p_1 p_0) sqrt(T_0/T) for the gauge pressure p, a lower bound.  Venting, the chamber is
 upstream: with r = p_a/p, dr/dt = r phi(r)/tau takes tau ln(b/r) while choked and
 tau (1 - b) dq/(b + (1 - b) sin q) beyond, whose integral is elementary.
+
+**Leaks** are further conductances of the valve's critical ratio: one from the chamber to the surroundings,
+one from the supply into a chamber whose valve is closed.  A chamber under gas then comes to the pressure at
+which its valve passes what leaks, a vented one to that at which valve and leak let off what leaks in:
+    C_in p_1 phi(p/p_1) = C_out p phi(p_a/p).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from functools import lru_cache
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -40,8 +46,12 @@ LAMINAR_RATIO: Final = 0.999
 """Pressure ratio above which the conductance is taken as laminar."""
 VENTED: Final = 1 - LAMINAR_RATIO
 """Gauge pressure over ambient pressure below which a chamber counts as vented."""
-_NORMAL_PRESSURE_PA: Final = 101325.0
-_NORMAL_TEMPERATURE_K: Final = 273.15
+REACHED: Final = 0.99
+"""Part of the rise to the steady pressure at which a chamber with a leak counts as filled."""
+_LEAKING_NODES: Final = 64
+"""Nodes of the quadrature of a filling with a leak."""
+NORMAL_PRESSURE_PA: Final = 101325.0
+NORMAL_TEMPERATURE_K: Final = 273.15
 """State of a normal litre: DIN 1343."""
 
 
@@ -81,6 +91,10 @@ class GasLine:
     critical_ratio: float
     """Critical pressure ratio b."""
     process: GasProcess
+    leak_to_ambient: float = 0.0
+    """Sonic conductance of the leak from the chamber to the surroundings, m^3/(s Pa)."""
+    leak_from_supply: float = 0.0
+    """Sonic conductance of the leak from the supply into a chamber whose valve is closed, m^3/(s Pa)."""
 
     @classmethod
     def of(cls, gas: Gas) -> GasLine | None:
@@ -99,6 +113,8 @@ class GasLine:
             conductance=conductance,
             critical_ratio=critical_ratio,
             process=gas.process,
+            leak_to_ambient=0.0 if gas.conductance is None else gas.leak_to_ambient or 0.0,
+            leak_from_supply=0.0 if gas.conductance is None else gas.leak_from_supply or 0.0,
         )
 
     def time_constant(self, *, volume: float) -> float:
@@ -107,10 +123,24 @@ class GasLine:
         return volume / (self.conductance * REFERENCE_PRESSURE_PA) * warm
 
     def filling_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:
-        """Time from ambient to an absolute pressure up to the supply's, s, isothermal."""
+        """Time from ambient to an absolute pressure up to the supply's, s, isothermal.
+
+        With a leak to ambient at most to `REACHED` of the rise to the steady pressure, which is approached
+        without end; the leak from the supply is left out.
+        """
         end = np.asarray(pressure, dtype=np.float64) / self.supply_pressure
-        started = self._filled(self.ambient_pressure / self.supply_pressure)
-        return self.time_constant(volume=volume) * (self._filled(end) - started)
+        first = self.ambient_pressure / self.supply_pressure
+        if self.leak_to_ambient == 0.0:
+            return self.time_constant(volume=volume) * (self._filled(end) - self._filled(first))
+        b, leak = self.critical_ratio, self.leak_to_ambient / self.conductance
+        steady = steady_pressure(self.supply_pressure, self.ambient_pressure, 1.0, leak, b)
+        top = np.minimum(end, first + REACHED * (steady / self.supply_pressure - first))
+        part, weight = np.polynomial.legendre.leggauss(_LEAKING_NODES)
+        r = first + (top[..., None] - first) * (1 + part) / 2
+        shape = np.vectorize(flow_shape)
+        integrand = 1 / (shape(r, b) - leak * r * shape(first / r, b))
+        inside = (top - first) / 2 * np.sum(weight * integrand, axis=-1)
+        return np.asarray(self.time_constant(volume=volume) * inside)
 
     def _filled(self, ratio: npt.ArrayLike) -> FloatArray:
         """Integral of dr/phi from b to r."""
@@ -125,12 +155,16 @@ class GasLine:
         return self.time_constant(volume=volume) * (1 - self.ambient_pressure / self.supply_pressure)
 
     def venting_time(self, pressure: npt.ArrayLike, *, volume: float) -> FloatArray:
-        """Time from an absolute pressure above ambient back to ambient, s, isothermal."""
+        """Time from an absolute pressure above ambient back to ambient, s, isothermal.
+
+        Through valve and leak to ambient together; the leak from the supply is left out.
+        """
         ratio = self.ambient_pressure / np.asarray(pressure, dtype=np.float64)
         b = self.critical_ratio
         choked = np.maximum(np.log(b / ratio), 0.0)
         subsonic = (1 - b) * (_sine_integral(math.pi / 2, b) - _sine_integral(self._angle(ratio), b))
-        return self.time_constant(volume=volume) * (choked + subsonic)
+        both = 1 + self.leak_to_ambient / self.conductance
+        return self.time_constant(volume=volume) / both * (choked + subsonic)
 
     def _angle(self, ratio: npt.ArrayLike) -> FloatArray:
         b = self.critical_ratio
@@ -165,6 +199,60 @@ def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
     return pressure * area * shape * math.sqrt(AIR_CONSTANT * temperature)
 
 
+@lru_cache(maxsize=4096)
+def steady_pressure(
+    supply: float, ambient: float, inflow: float, outflow: float, critical_ratio: float
+) -> float:
+    """Absolute pressure of a chamber between a conductance from the supply and one to the surroundings, Pa.
+
+    Args: `supply`, `ambient`: absolute, Pa. `inflow`, `outflow`: sonic conductances, in any one unit.
+    Source: ISO 6358 for both, C_in p_1 phi(p/p_1) = C_out p phi(p_a/p), by bisection.
+    """
+    if supply <= ambient or outflow == 0.0:
+        return supply
+    low, high = ambient, ambient if inflow == 0.0 else supply
+    while (middle := (low + high) / 2) not in (low, high):
+        passes = inflow * supply * flow_shape(middle / supply, critical_ratio)
+        if passes > outflow * middle * flow_shape(ambient / middle, critical_ratio):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def leaks(gas: Gas) -> bool:
+    """True if a leak changes the pressure of a chamber: with an ideal supply (no conductance) none does."""
+    conductances = (each for each in (gas.leak_to_ambient, gas.leak_from_supply) if each is not None)
+    return gas.conductance is not None and any(np.any(np.greater(each, 0.0)) for each in conductances)
+
+
+def leaking(gas: Gas, leak: Literal["leak_to_ambient", "leak_from_supply"]) -> float:
+    """Flow through a leak over the absolute pressure upstream, at most: C p_0 sqrt(T/T_0), m^3/s."""
+    conductance: float = getattr(gas, leak) or 0.0
+    return conductance * REFERENCE_PRESSURE_PA * math.sqrt(gas.temperature / REFERENCE_TEMPERATURE_K)
+
+
+def chamber_pressures(gas: Gas) -> tuple[Any, Any]:
+    """Steady absolute pressures of a chamber with its valve open and closed, Pa; arrays where `gas` has them.
+
+    Those of supply and surroundings without a leak, or with an ideal supply (no conductance).
+    """
+    supply, ambient = gas.pressure + gas.ambient_pressure, gas.ambient_pressure
+    if gas.conductance is None or not leaks(gas):
+        return supply, ambient
+    leak, seep = (0.0 if each is None else each for each in (gas.leak_to_ambient, gas.leak_from_supply))
+    valve, b, steady = gas.conductance, gas.critical_ratio, np.vectorize(steady_pressure)
+    opened, closed = steady(supply, ambient, valve, leak, b), steady(supply, ambient, seep, valve + leak, b)
+    return plain(opened), plain(closed)
+
+
+def applied_pressure(gas: Gas) -> float:
+    """Pressure of a chamber under gas over that of a vented one, Pa: `gas.pressure` without a leak."""
+    opened, closed = chamber_pressures(gas)
+    applied: float = opened - closed if leaks(gas) else gas.pressure
+    return applied
+
+
 def pressure_factor(scene: Scene) -> float:
     """Gauge pressure of the gas on the liquid over that at the place of measurement.
 
@@ -185,14 +273,15 @@ def pressure_factor(scene: Scene) -> float:
 def vented_pressure(scene: Scene) -> float:
     """Absolute gas pressure on the liquid of a vented chamber, the reference of gauge pressures there.
 
-    Ambient pressure, times `pressure_factor` where the scene's pressures hold on the shaft.
+    That of `chamber_pressures`, times `pressure_factor` where the scene's pressures hold on the shaft.
     """
-    return scene.gas.ambient_pressure * pressure_factor(scene)
+    vented: float = chamber_pressures(scene.gas)[1] * pressure_factor(scene)
+    return vented
 
 
 def normal_volume(*, pressure_volume: float, temperature: float) -> float:
     """Normal volume (m^3, at 0 degC and 101.325 kPa) of the gas with a given p V (J) at a temperature."""
-    return pressure_volume / _NORMAL_PRESSURE_PA * _NORMAL_TEMPERATURE_K / temperature
+    return pressure_volume / NORMAL_PRESSURE_PA * NORMAL_TEMPERATURE_K / temperature
 
 
 def compression_work(*, pressure_volume: float, pressure: float, ambient_pressure: float) -> float:

@@ -28,6 +28,7 @@ from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
     AbsolutePressure,
+    Bounds,
     FillRatio,
     GaugePressure,
     Length,
@@ -41,6 +42,7 @@ from ringbalance.scene.keys.fields import (
     chamber_count,
     number,
     quantity,
+    share,
 )
 from ringbalance.scene.loop_models import (
     ControllerSettings,
@@ -309,7 +311,7 @@ class Gas:
 
     pressure: Annotated[
         GaugePressure,
-        needed("gauge pressure in the driven chamber while its valve is open"),
+        needed("gauge pressure in the driven chamber while its valve is open; with a leak, of the supply"),
         UNCERTAIN,
         Shown("gas pressure", "MPa", note="gauge"),
     ]
@@ -355,6 +357,38 @@ class Gas:
         UNCERTAIN,
         Shown("critical pressure ratio b"),
     ]
+    leak_to_ambient: Annotated[
+        float | None,
+        quantity("conductance", NOT_NEGATIVE),
+        unused(
+            "no leak",
+            "sonic conductance of a leak from between valve and chamber, such as a distributor's gap; with "
+            "critical_ratio of the valve. Without conductance it costs air alone",
+        ),
+        UNCERTAIN,
+        Shown("leak to ambient", "l/(s*bar)"),
+    ] = None
+    leak_from_supply: Annotated[
+        float | None,
+        quantity("conductance", NOT_NEGATIVE),
+        unused(
+            "no leak",
+            "sonic conductance of a leak from the supply into each chamber whose valve is closed; with "
+            "critical_ratio of the valve. Without conductance it costs air alone",
+        ),
+        UNCERTAIN,
+        Shown("leak from the supply", "l/(s*bar)"),
+    ] = None
+    relative_humidity: Annotated[
+        float | None,
+        share(Bounds(at_least=0, at_most=1), example=0.3),
+        unused(
+            "dry gas",
+            "of the supply at its own pressure and temperature, 1 for compressed air that is not dried; "
+            "counts in the water that the gas carries off",
+        ),
+        Shown("relative humidity of the supply"),
+    ] = None
     dead_volume: Annotated[
         float | None,
         quantity("volume", NOT_NEGATIVE),

@@ -75,6 +75,7 @@ def loop_in_c(folder: Path, disc: Block, controller: Block, *, samples: int, lon
     [
         ("six_chamber", {}, IN_A_STEP, 1e-4),
         ("grinding_spindle", {}, IN_A_STEP, 1e-4),
+        ("grinding_spindle", {"gas.leak_to_ambient": "0.15 l/(s*bar)"}, IN_A_STEP, 1e-4),
         ("liquid_ring_paper", {}, 2e-4, 1e-3),
         ("six_chamber", TRIAL, IN_A_STEP, 1e-4),
         ("six_chamber", {**LAW_BASED, "controller.assumed_lag_angle": "60 deg"}, IN_A_STEP, 1e-4),

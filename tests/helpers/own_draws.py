@@ -62,6 +62,8 @@ class Device(NamedTuple):
     gain_imaginary: float
     start_real: float
     start_imaginary: float
+    leak: float  # sonic conductance from a chamber to the surroundings
+    leak_in: float  # the same from the supply into a chamber whose valve is closed
 
 
 class Drawn(NamedTuple):
@@ -153,6 +155,8 @@ def _device(v: dict[str, Any], *, start: complex, released: float) -> Drawn:
         gain_imaginary=gain.imag,
         start_real=start.real,
         start_imaginary=start.imag,
+        leak=v["leak_to_ambient"] or 0.0,
+        leak_in=v["leak_from_supply"] or 0.0,
     )
     whole = Drawn(device, square, v["model_moment"] * moment, loss, upstream, downstream)
     residual = _residual(whole, v)

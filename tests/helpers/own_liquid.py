@@ -46,7 +46,7 @@ def _rate(table: Floats, u: float) -> float:
 
 @compiled
 def _passes(d: Any, p: float, q: float) -> float:
-    """Mass flow from absolute p to q by ISO 6358, kg/s."""
+    """Mass flow from absolute p to q by ISO 6358, kg/s, through a conductance of one."""
     if p < q:
         return float(-_passes(d, q, p))
     ratio, b = q / p, d.critical
@@ -56,7 +56,7 @@ def _passes(d: Any, p: float, q: float) -> float:
         shape = math.sqrt(1 - ((ratio - b) / (1 - b)) ** 2)
     else:
         shape = math.sqrt(1 - ((_STRAIGHT - b) / (1 - b)) ** 2) * (1 - ratio) / (1 - _STRAIGHT)
-    return float(d.passing * 1.185 * p * shape)
+    return float(1.185 * p * shape)
 
 
 @compiled
@@ -71,8 +71,10 @@ def _gas(d: Any, y: Floats, opened: int, dt: float) -> None:
         room = d.volume * (1 - fill) + d.dead_volume
         grows = y[U] * d.area if c == 0 else -y[U] * d.area
         now = y[P + c] + d.ambient
-        fed = d.gas * _passes(d, supply + d.ambient, now)
-        y[P + c] += dt * (fed - now * grows) / room
+        fed = d.passing * _passes(d, supply + d.ambient, now) - d.leak * _passes(d, now, d.ambient)
+        if c != opened:
+            fed += d.leak_in * _passes(d, d.pressure + d.ambient, now)
+        y[P + c] += dt * (d.gas * fed - now * grows) / room
 
 
 @compiled

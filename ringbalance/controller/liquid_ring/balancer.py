@@ -28,7 +28,13 @@ from ringbalance.controller.balancer import (
     rotor_within,
     settles_within,
 )
-from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
+from ringbalance.controller.document import (
+    CONSUMPTION,
+    conventions,
+    line_runs,
+    line_runs_table,
+    simulation_history,
+)
 from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.liquid_ring.capacity import beyond_capacity
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
@@ -318,9 +324,12 @@ class LiquidRingBalancer(Balancer):
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
     def information(self, scene: SceneFile) -> Information:
-        """Loop factor and margins, which need no run, and the drawn errors of the devices."""
-        loop = loop_information(liquid_ring_scene(scene), self.model)
-        return replace(loop, document={**loop.document, "drawn": self._drawn_runs.spread.document()})
+        """Loop factor and margins, drawn errors of the devices, and what a single run takes to hold."""
+        ring = liquid_ring_scene(scene)
+        loop, document = loop_information(ring, self.model), self._drawn_runs.spread.document()
+        rows = conventions(simulate(ring, self.model))
+        consumption = [each.document() for each in rows if each.key in CONSUMPTION]
+        return replace(loop, document={**loop.document, "drawn": document, "consumption": consumption})
 
     def beyond_capacity(self, scene: SceneFile, ended: Sequence[str], settings: str) -> tuple[Finding, ...]:
         """Findings on liquid that a machine moves beyond the fills at which runs end."""

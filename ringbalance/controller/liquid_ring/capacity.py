@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from ringbalance.controller.simulation import Outcome
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
@@ -29,7 +30,7 @@ def beyond_capacity(
     total, law = 2 * scene.disc.initial_fill, model.flow
     influence = scene.rotor.influence_coefficient
     residual = residual_fill_ratio(scene, law=law)
-    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=applied_pressure(scene.gas))
 
     def moment(least: float) -> float:
         """Moment of a pair with a chamber emptied to a fill, kg m."""
@@ -64,7 +65,7 @@ def running_fill(scene: Scene, model: BalancerModel) -> float:
 
     Other gas in the cavity stops the flow earlier; at its full pressure, where a new injection stalls.
     """
-    total, law, gas = 2 * scene.disc.initial_fill, model.flow, scene.gas.pressure
+    total, law, gas = 2 * scene.disc.initial_fill, model.flow, applied_pressure(scene.gas)
     if isinstance(law, CalibratedLaw):
         law = replace(law, path=replace(law.path, released=0.0))
     rest = law.evaluate(fill_ratio=total / 2, gas_pressure=0.0, primed=True)

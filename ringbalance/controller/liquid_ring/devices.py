@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.rotor import CommonRotor, Rotors
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -93,7 +94,7 @@ class Spread:
             flow = law.evaluate(
                 fill_ratio=fill,
                 opposite_fill_ratio=fill,
-                gas_pressure=scene.gas.pressure,
+                gas_pressure=applied_pressure(scene.gas),
                 primed=rest.primed,
             )
             velocity_width = float(flow.uncertainty) / (abs(float(flow.velocity)) or 1.0)

@@ -26,7 +26,7 @@ from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE_CHANGE
 from ringbalance.controller.rotor import Rotors
 from ringbalance.controller.simulation import Outcome, noise_floor
 from ringbalance.controller.terms import dynamics_of, run_terms
-from ringbalance.physics.gas import compression_work
+from ringbalance.physics.gas import applied_pressure, chamber_pressures, compression_work, vented_pressure
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import empty_plants, gives_forces
@@ -253,9 +253,14 @@ class _Group:
     def under(self, pressures: FloatArray) -> _Under:
         """The devices under gas pressures, Pa."""
         plants, residual, stalled = self.plants, np.zeros(pressures.size), np.zeros(pressures.size)
-        plants["gas_pressure"] = pressures
         for rows, kind in self.kinds:
             designs = Designs.of(kind, {"gas.pressure": pressures[rows]})
+            gas, liquid = designs.scene.gas, designs.scene.liquid
+            plants["gas_pressure"][rows] = applied_pressure(gas)
+            plants["supply_pressure"][rows] = gas.pressure + gas.ambient_pressure
+            if gas.leak_from_supply is not None:
+                plants["ambient_pressure"][rows] = chamber_pressures(gas)[1]
+                plants["vapour_pressure"][rows] = liquid.vapour_pressure - vented_pressure(designs.scene)
             if self.held:
                 hold_liquid(plants[rows], designs)
             residual[rows] = residual_fills(plants[rows], designs)
@@ -296,7 +301,8 @@ class _Group:
         )
 
 
-_CHANGED: Final = ("gas_pressure", "lift_straight", "lift_entrance")
+_PRESSURES: Final = ("gas_pressure", "supply_pressure", "ambient_pressure", "vapour_pressure")
+_CHANGED: Final = (*_PRESSURES, "lift_straight", "lift_entrance")
 """Fields of a plant that the gas pressure changes."""
 
 
@@ -348,7 +354,9 @@ class _Under:
         runout = self.runout[rows]
         of_rotor = np.abs(runs["vibration"] - runout)
         numbers[1][:, carried] = np.where(runout == 0.0, runs["amplitude"], of_rotor)
-        numbers[2][:, carried] = runs["gas"] * self.work[rows]
+        seeps = group.plants["leak_from_supply"] * group.plants["supply_pressure"]
+        seeped = group.scenes[0].disc.chambers * seeps[rows] * runs["time"]
+        numbers[2][:, carried] = (runs["gas"] + seeped) * self.work[rows]
         shown = (
             settled,
             self.beyond_disc[rows] > limit,

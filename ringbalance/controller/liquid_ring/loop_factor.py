@@ -34,6 +34,7 @@ from ringbalance.controller.algorithms.law_steps import (
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import Information
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.gas_line import line_document, line_text
 from ringbalance.reduced_model.injection.dynamics import empty_plants
 from ringbalance.reduced_model.injection.line_answers import line_answers
@@ -129,7 +130,7 @@ def _balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     total = 2.0 * start
     least, most = _range(scene, model)
     # A chamber is driven to its residual fill, or to that at which the gas stalls.
-    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=applied_pressure(scene.gas))
     lowest = max(least, min(max(residual_fill_ratio(scene, law=law), stalled), start))
     highest = min(most, total - lowest)
     ends = np.array([start, lowest, highest])
@@ -169,7 +170,7 @@ def vibration_rates(scene: Scene, model: BalancerModel) -> FloatArray:
     flow = model.flow.evaluate(
         fill_ratio=driven,
         opposite_fill_ratio=opposite,
-        gas_pressure=scene.gas.pressure,
+        gas_pressure=applied_pressure(scene.gas),
         primed=rest.primed,
     )
     per_fill = scene.rotor.influence_coefficient * model.tube_area / model.chamber_volume

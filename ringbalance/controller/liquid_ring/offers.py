@@ -18,6 +18,7 @@ from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.liquid_ring.loop_factor import loop_rate
 from ringbalance.controller.terms import dead_time
 from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Point, SearchAxis, Trials, rounded
+from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding, residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.errors import (
@@ -232,7 +233,7 @@ def _of_crest(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
     """Higher crests where liquid runs back, or other ones where gas does not lift the liquid to the crest."""
     disc, tube, law = scene.disc, scene.tube, model.flow
     held, total = Holding.of(scene, fill_ratio=disc.max_fill_ratio), 2 * disc.initial_fill
-    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=applied_pressure(scene.gas))
     lifted = stalled <= residual_fill_ratio(scene, law=law)
     if held.largest_hump_radius is None or (held.holds and lifted):
         return

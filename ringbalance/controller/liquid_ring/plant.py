@@ -44,7 +44,7 @@ class LiquidRing:
 
     @property
     def gas_pressure(self) -> float:
-        """Gas pressure of the supply, gauge, Pa."""
+        """Pressure of a chamber under gas over that of a vented one, Pa."""
         return self.dynamics.gas_pressure
 
     @property

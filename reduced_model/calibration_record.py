@@ -72,6 +72,9 @@ ANSWERED: Final[Mapping[str, _Named]] = MappingProxyType(
         "usable_volume": _Named("usable volume of a pair", "", "m^3"),
         "residual_depth": _Named("liquid over the port as gas enters", "", "m"),
         "largest_fill_ratio": _Named("largest usable fill ratio", "", "1"),
+        "crater_depth": _Named("crater of the gas jet, equal fills", "", "m"),
+        "crater_share": _Named("crater over the ring, smallest fill", "", "1"),
+        "blowing_number": _Named("blowing number, equal fills", "", "1"),
     }
 )
 """Answers that have an uncertainty budget, in the order in which they are shown, the main ones first."""

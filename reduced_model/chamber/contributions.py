@@ -54,6 +54,12 @@ _CORIOLIS_FACTOR: Final = 2.0
 particle follows gravity, however thin the ring."""
 
 
+def surface_tension(scene: Scene) -> FloatArray:
+    """Upper bound of the surface tension of a scene's liquid, N/m, which no scene gives."""
+    metal = np.greater(scene.liquid.density, METAL_DENSITY_KG_M3)
+    return np.where(metal, _METAL_TENSION_N_M, _WATER_TENSION_N_M)
+
+
 def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
     """Upper bound of capillary pressure over liquid pressure at R2, sigma (2/B + 1/(a alpha) + 1/a)/P.
 
@@ -65,8 +71,7 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]
     a = surface_radius(disc=disc, fill_ratio=fills)
     alpha = half_angle(disc=disc, radius=a)
     pressure = density * square * (disc.outer_radius**2 - a**2) / 2
-    # No scene gives a surface tension.
-    tension = _METAL_TENSION_N_M if density > METAL_DENSITY_KG_M3 else _WATER_TENSION_N_M
+    tension = surface_tension(scene)
     jump = tension * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
     # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
     length = np.sqrt(tension / (density * square * a))

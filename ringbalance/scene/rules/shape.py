@@ -167,6 +167,28 @@ def _inlet_above_liquid(
     )
 
 
+def _hole_fits_chamber(diameter: float, width: float, inner: float, outer: float) -> Contradiction | None:
+    """The hole is no larger than the chamber."""
+    limit = min(width, outer - inner)
+    if diameter <= limit:
+        return None
+    return Contradiction(
+        problem="the gas hole is larger than the chamber",
+        allowed=f"above 0 mm and at most {written(limit, 'mm')}, the smaller of axial_width and "
+        "outer_radius - inner_radius",
+    )
+
+
+def _hole_is_the_inlet(hole: float, inlet: float) -> Contradiction | None:
+    """Gas enters through the hole."""
+    if abs(hole - inlet) <= _ROUNDING * inlet:
+        return None
+    return Contradiction(
+        problem=f"gas enters the chambers at gas.inlet_radius ({written(inlet, 'mm')})",
+        allowed="that radius, or one of both keys alone",
+    )
+
+
 def _fraction_outside(radius: float, inner: float, outer: float, angle: float, thickness: float) -> float:
     """Fill ratio at which the free surface lies at a radius."""
     within = swept_area(
@@ -275,6 +297,7 @@ def _entrance_has_radius(radius: float, entrance: str) -> Contradiction | None:
 _INNER, _OUTER, _ANGLE = "disc.inner_radius", "disc.outer_radius", "disc.central_angle"
 _PLATE, _FILL = "disc.plate_thickness", "disc.max_fill_ratio"
 _PORT, _CREST, _LENGTH, _BORE = "tube.port_radius", "tube.hump_radius", "tube.length", "tube.bore"
+_HOLE_RADIUS = "disc.gas_hole_radius"
 _NO_RING = (_radii_in_order,)
 _NO_DEPTH = (_radii_in_order, _chamber_has_depth)
 _CHAMBER = (_INNER, _OUTER, _ANGLE, _PLATE)
@@ -315,6 +338,18 @@ CHECKS: tuple[Check, ...] = (
         when=_drawn,
     ),
     check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER, when=_drawn),
+    check(_hole_is_the_inlet, _HOLE_RADIUS, "gas.inlet_radius"),
+    check(
+        _inlet_above_liquid,
+        _HOLE_RADIUS,
+        _FILL,
+        *_CHAMBER,
+        moot=(*_NO_CHAMBER, _inlet_above_liquid, _hole_is_the_inlet),
+        when=_drawn,
+    ),
+    check(
+        _hole_fits_chamber, "disc.gas_hole_diameter", "disc.axial_width", _INNER, _OUTER, moot=_NO_RING
+    ),
     check(_bore_fits_bends, _BORE, "tube.bends"),
     check(_roughness_fits_bore, "tube.roughness", _BORE),
     check(_length_holds_bends, _LENGTH, "tube.bends"),

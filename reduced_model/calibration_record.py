@@ -120,8 +120,15 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
             upper=high,
             parts=parts,
             causes=causes,
-            status=str(calibration.chamber.moment_per_mass.status.code) if key == "lambda" else "ok",
+            status=_status(calibration, key),
         )
+
+
+def _status(calibration: Calibration, key: str) -> str:
+    """ "ok" or the code of the finding that limits an answer."""
+    if key in ("crater_depth", "crater_share", "blowing_number"):
+        return "ok" if calibration.scene.disc.gas_hole_direction == "outward" else "gas_jet_bound"
+    return str(calibration.chamber.moment_per_mass.status.code) if key == "lambda" else "ok"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -49,7 +49,10 @@ class Crater:
 
     @classmethod
     def of(cls, scene: Scene, fill_ratio: npt.ArrayLike) -> Crater:
-        """Crater of a scene that gives its gas hole. Args: `fill_ratio`: above zero; designs on the last axis."""
+        """Crater of a scene that gives its gas hole.
+
+        Args: `fill_ratio`: above zero; designs on the last axis.
+        """
         fill, disc, liquid = np.asarray(fill_ratio, dtype=np.float64), scene.disc, scene.liquid
         level = surface_radius(disc=disc, fill_ratio=fill)
         jet, path = _jet(scene), _path(scene, level)
@@ -70,6 +73,18 @@ class Crater:
         )
         ring = np.maximum(disc.outer_radius - level, 1e-12)
         return cls(depth=depth, share=depth / ring, blowing_number=blown)
+
+
+def largest_share(scene: Scene, least_fill: FloatArray) -> FloatArray:
+    """Largest part of the ring's depth that the jet digs where no injection begins at less than a fill.
+
+    The ring is the shallower, and its crater the larger part of it, the less a chamber holds.
+    Args: `least_fill`: infinite where nothing is injected. Returns: NaN where the scene gives no gas hole.
+    """
+    if scene.disc.gas_hole_diameter is None:
+        return np.full(least_fill.shape, math.nan)
+    injected = np.isfinite(least_fill)
+    return np.where(injected, Crater.of(scene, np.where(injected, least_fill, 1.0)).share, 0.0)
 
 
 def _jet(scene: Scene) -> Jet:
@@ -132,11 +147,22 @@ def crater_range(scene: Scene) -> Crater:
     return Crater(**{name: np.stack([vars(each)[name] for each in craters]) for name in vars(craters[0])})
 
 
-def range_text(scene: Scene) -> str:
-    """What the gas jet may do where the scene gives no hole, in one phrase."""
-    shares = crater_range(scene).share
-    sizes = " to ".join(format_given(size, "m", digits=2) for size in _HOLES_M)
+def jet_text(scene: Scene) -> str:
+    """Crater at equal fills in one phrase; where the scene gives no hole, its range."""
+    hole = scene.disc.gas_hole_diameter
+    if hole is None:
+        shares, sizes = crater_range(scene).share, [format_given(size, "m", digits=2) for size in _HOLES_M]
+        return (
+            f"not in the scene: a hole of {' to '.join(sizes)} between the inner wall and the fullest ring "
+            f"would dig {percent(float(shares.min()))} to {percent(float(shares.max()))} of the ring's depth "
+            "at equal fills; state disc.gas_hole_diameter"
+        )
+    crater = Crater.of(scene, scene.disc.max_fill_ratio / 2)
+    most = "" if scene.disc.gas_hole_direction == "outward" else "at most "
+    line = "" if scene.gas.conductance is None else " behind its valve"
+    depth, size = (format_given(each, "m", digits=2) for each in (float(crater.depth), hole))
     return (
-        f"not in the scene: holes of {sizes}, anywhere over the fullest ring, would dig "
-        f"{percent(float(shares.min()))} to {percent(float(shares.max()))} of the ring's depth at equal fills; state disc.gas_hole_diameter"
+        f"{scene.disc.gas_hole_direction} from a hole of {size}{line}, it digs {most}{depth}, "
+        f"{percent(float(crater.share))} of the ring's depth, at equal fills; blowing number {most}"
+        f"{float(crater.blowing_number):.2g}, droplets from about 1 on"
     )

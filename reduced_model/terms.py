@@ -29,7 +29,7 @@ from ringbalance.reduced_model.chamber.contributions import (
     wall_layers,
 )
 from ringbalance.reduced_model.chamber.values import chamber_pressure
-from ringbalance.reduced_model.crater import Crater, range_text
+from ringbalance.reduced_model.crater import Crater, jet_text
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
@@ -237,11 +237,9 @@ def _gas_jet(scene: Scene) -> Term:
     """Crater of the gas jet in the ring as a valve opens, over the ring's depth, at equal fills."""
     name, group = "gas jet on the ring", "q/(rho omega^2 a (R2 - a))"
     if scene.disc.gas_hole_diameter is None:
-        return Term(name, group, "", None, "n/(R2 - a)", unknown=range_text(scene))
-    crater = Crater.of(scene, scene.disc.max_fill_ratio / 2)
-    text = f"n/(R2 - a) at equal fills, {scene.disc.gas_hole_direction}"
-    remark = f"blowing number {float(crater.blowing_number):.2g}, droplets from about 1 on"
-    return Term(name, group, "", float(crater.share), text, remark)
+        return Term(name, group, "", None, "n/(R2 - a)", unknown=jet_text(scene))
+    share = Crater.of(scene, scene.disc.max_fill_ratio / 2).share
+    return Term(name, group, "", float(share), "n/(R2 - a)", jet_text(scene))
 
 
 @dataclass(frozen=True, kw_only=True)

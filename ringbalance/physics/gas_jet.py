@@ -4,10 +4,10 @@ r"""Jet of gas from a hole onto the free surface of the ring: its flow, its stag
     C p_0 sqrt(T/T_0) p_1 phi(p_h/p_1) = C_d A p_h sqrt(R T) psi(p/p_h),
     psi(r) = sqrt(2 gamma/(gamma - 1) (r^(2/gamma) - r^((gamma + 1)/gamma))), r at least the critical ratio,
 with p_1 of the supply, p_h before the hole, p in the chamber.  The left side falls with p_h, the right one
-rises, so there is one p_h.  The volume between valve and hole is left out: it fills sooner than the chamber.
+rises, so there is one p_h.  The volume between valve and hole is left out; it fills sooner than the chamber.
 
-**At the hole.** A jet of Mach number M, from p_h/p, pushes the liquid with its pressure behind a normal shock:
-p_h - p up to M = 1, else Rayleigh's pitot pressure less p.  Its momentum is m' u + (p_e - p) C_d A.
+**At the hole.** A jet of Mach number M, from p_h/p, stops at the liquid behind a normal shock: with p_h - p
+up to M = 1, else with Rayleigh's pitot pressure less p.  Its momentum is m' u + (p_e - p) C_d A.
 
 **Far from it.** A free turbulent jet keeps its momentum J and entrains the chamber's gas, so that on its axis
 u = K (4 J/(pi rho))^(1/2)/x, and q = rho u^2/2 = 2 K^2 J/(pi x^2), whatever the density.  The smaller of both
@@ -183,7 +183,10 @@ def _mach(ratio: FloatArray) -> FloatArray:
 
 
 def _pitot(mach: FloatArray) -> FloatArray:
-    """Pitot pressure behind a normal shock over the pressure before it. Source: Rayleigh; NACA 1135, Eq. 100."""
+    """Pitot pressure behind a normal shock over the pressure before it.
+
+    Source: Rayleigh's formula, NACA Report 1135 (1953), Eq. 100.
+    """
     gamma, square = HEAT_CAPACITY_RATIO, np.square(np.maximum(mach, 1.0))
     rise = ((gamma + 1) * square / 2) ** (gamma / (gamma - 1))
     shock = ((gamma + 1) / (2 * gamma * square - (gamma - 1))) ** (1 / (gamma - 1))

@@ -139,10 +139,10 @@ MODEL_KINDS: Final[Mapping[str, ModelKind]] = MappingProxyType(
 """Model errors by `ErrorCause`. Each error of k is a random function of Re with a range of its own and two
 parts, see `physics.tube.loss.with_errors`; "as built" frees the shape of k(u).  The flow that clears the
 crest and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`, the end
-of the crest's arc within that of `reduced_model.tube.path`, discharge and decay of the gas jet within those of
-`physics.gas_jet`.  The start of the flow has no measurements to
-compare with: it depends on the column's inertia, on a valve that does not open as fast as it closes, and
-on the side to which liquid on the crest runs when the gas is shut, up to half of the tube.  Its expanded
+of the crest's arc within that of `reduced_model.tube.path`, discharge and decay of the gas jet within those
+of `physics.gas_jet`.  The start of the flow has no measurements to compare with: it depends on the column's
+inertia, on a valve that does not open as fast as it closes, and on the side to which liquid on the crest
+runs when the gas is shut, up to half of the tube.  Its expanded
 uncertainty (95 %) is taken as the time L/2u in which the flow passes that half."""
 MODEL_ERRORS: Final[Mapping[str, str]] = MappingProxyType(
     {name: cause for cause, kind in MODEL_KINDS.items() for name in kind.names(cause)}

@@ -338,7 +338,9 @@ class RequirementSettings:
     ] = None
     crater: Annotated[
         PositiveShare | None,
-        unused("none is required", "largest part of the ring's depth that the gas jet may dig; 1: to the wall"),
+        unused(
+            "none is required", "largest part of the ring's depth that the gas jet may dig; 1: to the wall"
+        ),
         Shown("crater of the gas jet allowed", note="part of the ring's depth"),
     ] = None
     fraction: Annotated[

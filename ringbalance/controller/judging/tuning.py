@@ -190,6 +190,10 @@ class Tuning(Result):
         ):
             if judgement is not None:
                 yield Quantity.of_fraction(judgement.fraction, key=key, name=name)
+        crater = self.recommended.crater_reached
+        if crater is not None:
+            name = "crater over the ring in nine tenths at most"
+            yield Quantity(key="crater_reached", name=name, value=crater, origin="simulated", digits=2)
         times = self.recommended.settling_times
         for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
             yield Quantity(

@@ -29,6 +29,7 @@ from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import compression_work
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.crater import largest_share
 from ringbalance.reduced_model.injection.dynamics import empty_plants, gives_forces
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
 from ringbalance.reduced_model.injection.moment import tabulate_moment
@@ -326,6 +327,7 @@ class _Under:
         # Devices that cannot come to the limit: the vibration that remains with the best fills.
         numbers[0], numbers[1], numbers[2] = math.inf, self.unreachable[rows], math.nan
         numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
+        numbers[5] = math.nan
         carried = complete | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
         if not carried.any():
             return numbers, ends
@@ -342,6 +344,7 @@ class _Under:
         numbers[0][:, carried] = np.where(settled, since, math.inf)
         numbers[1][:, carried] = runs["amplitude"]
         numbers[2][:, carried] = runs["gas"] * self.work[rows]
+        numbers[5][:, carried] = self._crater(runs["least_driven"], rows)
         shown = (
             settled,
             self.beyond_disc[rows] > limit,
@@ -354,6 +357,20 @@ class _Under:
         )
         ends[:, carried] = np.argmax([np.broadcast_to(each, settled.shape) for each in shown], axis=0)
         return numbers, ends
+
+    def _crater(self, fills: FloatArray, rows: IntArray) -> FloatArray:
+        """Part of the ring's depth that the gas jet digs, zero where no valve opened, NaN without a hole.
+
+        Args: `fills`: of the driven chambers, shape (settings, rows).
+        """
+        largest = np.full((len(fills), len(self.group.devices)), math.inf)
+        largest[:, rows] = fills
+        shares = [
+            largest_share(Designs.of(kind, {"gas.pressure": self.changed["gas_pressure"][each]}).scene, part)
+            for each, kind in self.group.kinds
+            for part in (largest[:, each],)
+        ]
+        return np.concatenate(shares, axis=1)[:, rows]
 
 
 def _group(number: int) -> range:

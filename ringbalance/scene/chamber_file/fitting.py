@@ -246,8 +246,8 @@ def _covered_findings(
 ) -> Iterator[Contradiction]:
     """Errors of a port that the liquid leaves free at the start, and of a gas inlet that it covers when most.
 
-    Args: `radii`: of "port_radius", "inlet_radius" and "gas_hole_radius", as far as known. `fill`: greatest fill ratio of a
-        chamber, of which one holds half at the start.
+    Args: `radii`: of "port_radius", "inlet_radius" and "gas_hole_radius", as far as known. `fill`: greatest
+        fill ratio of a chamber, of which one holds half at the start.
     """
     at = np.hypot(points[:, 0], points[:, 1])[body.cells]
     low, high = at.min(axis=1), at.max(axis=1)

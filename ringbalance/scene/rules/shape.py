@@ -347,9 +347,7 @@ CHECKS: tuple[Check, ...] = (
         moot=(*_NO_CHAMBER, _inlet_above_liquid, _hole_is_the_inlet),
         when=_drawn,
     ),
-    check(
-        _hole_fits_chamber, "disc.gas_hole_diameter", "disc.axial_width", _INNER, _OUTER, moot=_NO_RING
-    ),
+    check(_hole_fits_chamber, "disc.gas_hole_diameter", "disc.axial_width", _INNER, _OUTER, moot=_NO_RING),
     check(_bore_fits_bends, _BORE, "tube.bends"),
     check(_roughness_fits_bore, "tube.roughness", _BORE),
     check(_length_holds_bends, _LENGTH, "tube.bends"),

@@ -22,13 +22,13 @@ from ringbalance.physics.gas_jet import (
     crater_depth,
     jet_of,
 )
-from ringbalance.reduced_model.chamber.contributions import percent, surface_tension
 from ringbalance.reduced_model.gas_line import line_ends
-from ringbalance.results.numbers import format_given
+from ringbalance.results.numbers import format_given, percent
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.fitted import HOLE_ERROR, JET_ERROR
 from ringbalance.scene.models import GasHoleDirection, Scene
+from ringbalance.scene.rules.working import surface_tension
 from ringbalance.scene.uncertain import NORMAL_95
 
 _HOLES_M: Final = (2e-3, 8e-3)
@@ -67,7 +67,7 @@ class Crater:
         )
         blown = blowing_number(
             jet.at(path + depth, decay=decay),
-            tension=surface_tension(scene),
+            tension=surface_tension(scene.liquid),
             density=liquid.density,
             acceleration=np.square(scene.rotor.speed) * level,
         )

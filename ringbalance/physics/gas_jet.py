@@ -53,7 +53,7 @@ Source: Weisbach's values for air in Encyclopaedia Britannica, 11th edition, "Hy
     0.79 sharp-edged, 0.81 to 0.84 short and cylindrical, 0.92 to 0.99 rounded or conical.
 """
 DECAY: Final = 6.5
-"""K, decay of the velocity on the axis of a round turbulent jet."""
+"""Decay constant K of the velocity on the axis of a round turbulent jet."""
 DECAY_FACTOR: Final = 1.2
 """Factor on K at its 95 % limits.
 
@@ -143,8 +143,8 @@ def crater_depth(
 ) -> FloatArray:
     """Depth n of the crater in a ring without a floor, m.
 
-    Args: `distance`: x from the hole to the free surface, along the jet, m. `surface_radius`: a, m.
-        `density`: of the liquid, kg/m^3. `speed`: omega, rad/s. `decay`: K.
+    Args: `distance`: x from the hole to the free surface at the radius a, along the jet, m. `density`: of
+        the liquid, kg/m^3. `speed`: omega, rad/s. `decay`: K.
     """
     a, path = np.asarray(surface_radius), np.asarray(distance, dtype=np.float64)
     scale = 2 / (np.asarray(density) * np.square(speed))

@@ -11,6 +11,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.crater import Crater, crater_range, jet_text, largest_share
+from ringbalance.results.numbers import percent
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_model_errors
 
@@ -109,7 +110,7 @@ def test_without_a_hole_there_is_one_sentence(spindle: Scene) -> None:
     term = result.models_used[-1]
     assert (term.term, term.model, term.estimated_contribution) == ("gas jet on the ring", "left out", None)
     shares = crater_range(spindle).share
-    assert f"{100 * shares.max():.0f} % of the ring's depth" in term.why
+    assert f"{percent(float(shares.max()))} of the ring's depth" in term.why
     assert shares.min() < 0.01 < 1 < shares.max()
     assert math.isnan(float(largest_share(spindle, np.array(0.1))))
     with pytest.raises(ValueError, match="gives no gas hole"):

@@ -109,6 +109,7 @@ def test_every_description_of_a_scene_reaches_its_table() -> None:
     described = {row.quantity for row in scene_table(trial)}
     optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius", "mass"}
     optional |= {"measured factor on lambda", "geometry of a chamber"}
+    optional |= {f"{each} of the gas hole" for each in ("diameter", "radius", "direction")}
     optional |= {entry.name for entry in descriptions_of(RequirementSettings).values()}
     optional |= {entry.name for entry in descriptions_of(DesignSettings).values()}
     assert names - described <= optional

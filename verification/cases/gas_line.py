@@ -132,7 +132,7 @@ def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if scene.disc.gas_hole_diameter is None:
         built = crater_range(scene)
         ends = np.array([(each.min(), each.max()) for each in (built.share, built.blowing_number)])
-        found = [
+        judged = [
             Found(value=value, reach=(low - value, high - value))
             for (low, high), value in zip(ends.tolist(), np.sqrt(ends.prod(axis=1)).tolist(), strict=True)
         ]
@@ -146,7 +146,7 @@ def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         widths = np.sqrt(np.sum(larger(changes) ** 2, axis=0))
         # Of a hole that does not blow at the ring the numbers are upper bounds.
         bound = 0.0 if scene.disc.gas_hole_direction == "outward" else 1.0
-        found = [
+        judged = [
             Found.within(value, width).moved(-bound * value, 0.0)
             for value, width in zip(nominal.tolist(), widths.tolist(), strict=True)
         ]
@@ -157,7 +157,7 @@ def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         zip(("share_low", "share_high", "blowing_low", "blowing_high"), ends.ravel().tolist(), strict=True)
     )
     return Evidence(
-        quantities=dict(zip(names, found, strict=True)), numbers={**numbers, "ring_depth": float(depth)}
+        quantities=dict(zip(names, judged, strict=True)), numbers={**numbers, "ring_depth": float(depth)}
     )
 
 

@@ -78,6 +78,8 @@ ANSWERED: Final[Mapping[str, _Named]] = MappingProxyType(
     }
 )
 """Answers that have an uncertainty budget, in the order in which they are shown, the main ones first."""
+OF_THE_JET: Final = ("crater_depth", "crater_share", "blowing_number")
+"""Those that only a scene with a gas hole has."""
 MAIN: Final = 4
 """Number of answers that a short text shows."""
 FIELDS: Final = {"lambda": "moment_per_mass"}
@@ -126,7 +128,7 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
 
 def _status(calibration: Calibration, key: str) -> str:
     """ "ok" or the code of the finding that limits an answer."""
-    if key in ("crater_depth", "crater_share", "blowing_number"):
+    if key in OF_THE_JET:
         return "ok" if calibration.scene.disc.gas_hole_direction == "outward" else "gas_jet_bound"
     return str(calibration.chamber.moment_per_mass.status.code) if key == "lambda" else "ok"
 

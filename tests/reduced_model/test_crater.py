@@ -10,13 +10,13 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import OF_THE_JET
 from ringbalance.reduced_model.crater import Crater, crater_range, jet_text, largest_share
 from ringbalance.results.numbers import percent
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_model_errors
 
 HOLE = {"disc.gas_hole_diameter": "3 mm", "disc.gas_hole_radius": "30 mm"}
-NAMES = ("crater_depth", "crater_share", "blowing_number")
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_errors_of_the_models_move_the_crater_to_both_sides(holed: Scene) -> Non
 def test_a_calibration_has_the_crater_with_its_interval(holed: Scene) -> None:
     result = calibrate(holed)
     half, least = (Crater.of(holed, each) for each in (0.25, float(result.answers.least_fill_ratio)))
-    values = {name: result.quantities[name] for name in NAMES}
+    values = {name: result.quantities[name] for name in OF_THE_JET}
     expected = float(half.depth), float(least.share), float(half.blowing_number)
     assert [each.value for each in values.values()] == pytest.approx(expected)
     for each in values.values():
@@ -99,14 +99,14 @@ def test_a_calibration_has_the_crater_with_its_interval(holed: Scene) -> None:
 
 def test_a_hole_that_does_not_blow_at_the_ring_has_a_bound(holed: Scene) -> None:
     result = calibrate(holed.with_values({"disc.gas_hole_direction": "inward"}))
-    assert {result.quantities[name].status for name in NAMES} == {"gas_jet_bound"}
+    assert {result.quantities[name].status for name in OF_THE_JET} == {"gas_jet_bound"}
     assert [each.code for each in result.rows().findings].count("gas_jet_bound") == 1
     assert "at most" in jet_text(result.scene)
 
 
 def test_without_a_hole_there_is_one_sentence(spindle: Scene) -> None:
     result = calibrate(spindle)
-    assert not {*NAMES} & {*result.quantities}
+    assert not {*OF_THE_JET} & {*result.quantities}
     term = result.models_used[-1]
     assert (term.term, term.model, term.estimated_contribution) == ("gas jet on the ring", "left out", None)
     shares = crater_range(spindle).share

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ringbalance as rb
-from ringbalance.controller.balancer import Draws, balancer_of
+from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.liquid_ring.offers import remedies_of
 from ringbalance.reduced_model.crater import Crater
@@ -65,6 +65,16 @@ def test_remedies_are_a_larger_or_turned_hole_and_a_slower_valve(balancer: Any, 
     axial = balancer.on_scene(balancer.scene.with_values({"disc.gas_hole_direction": "axial"}))
     worst = [each.run({}, Draws.first(4)).crater.max() for each in (balancer, axial)]
     assert worst[1] < 0.5 * worst[0]
+
+
+def test_a_design_is_held_to_the_crater_too(spindle: Scene) -> None:
+    """As `design` runs it: the fastest valve at hand digs through the ring, and meets the demand no more."""
+    met = []
+    for conductance in ("0.3 l/(s*bar)", "2.3 l/(s*bar)"):
+        quick = quick_balancer(spindle.with_values({**HOLE, "gas.conductance": conductance}))
+        crater = next(each for each in quick.demands() if each.code == "crater")
+        met.append(np.mean(crater.met(quick.run({}, Draws.first(8)))))
+    assert met[0] > met[1] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,8 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
 TOLERANCE: Final = 1e-9
 """Error of a table between its nodes, over the whole volume and over the whole moment."""
 SLOPE_TOLERANCE: Final = 1e-5
-"""Error of the free surface's area and of its moment, over the largest."""
+"""Error of the free surface's area, of its moment, and of the wet share of the outer wall, over the
+largest."""
 _FIRST_NODES: Final = 9
 _EMPTY: Final = 1 - 4 * float(np.finfo(np.float64).eps)
 """Share of the outermost L that counts as empty: the square of a root falls short of it by rounding."""
@@ -182,11 +183,10 @@ def _refined(
     nodes: FloatArray, columns: FloatArray, exact: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Refined nodes, columns at the nodes, and differences in the intervals."""
-    # Slopes have a tolerance, except that of the wall's mean.
     size, volume = np.abs(columns).max(axis=1), columns[0, 0]
     moment, turning = size[1:3].max(), size[COLUMNS + 1 : COLUMNS + 3].max()
     values = TOLERANCE * np.array([size[0], moment, moment, size[3]])
-    slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, np.inf])
+    slopes = SLOPE_TOLERANCE * np.array([size[4], turning, turning, size[7]])
     allowed = np.concatenate([values, slopes])[:, None]
     error = np.full((len(columns), nodes.size - 1), np.inf)
     for _ in range(_HALVINGS):
@@ -253,7 +253,7 @@ _DRY_SHARE: Final = 1e-7
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _TiltedLiquid:
+class TiltedLiquid:
     """Integrals at each fill and each angle of gravity, shape (n, turn)."""
 
     wall_square: FloatArray
@@ -262,7 +262,7 @@ class _TiltedLiquid:
     """b^2 - G^2 or, half-way along the chamber, c^2: minus 2/omega^2 times the potential of the free surface,
     m^2."""
     moment: FloatArray
-    """First moment along x, m^4."""
+    """First moment along x, m^4; of a sector its cross-section's, m^3."""
     centroid: FloatArray
     """dU/dV', mean of x over the surface, weighted by the liquid that enters at each point, m."""
     closed: BoolArray
@@ -273,7 +273,7 @@ class _TiltedLiquid:
 @lru_cache(maxsize=16)
 def tilted_liquid(
     table: ChamberTable, *, length: float, vertical: bool, turn: int, fills: tuple[float, ...]
-) -> _TiltedLiquid:
+) -> TiltedLiquid:
     """Integrals over the liquid of given fill ratios, above zero.
 
     Args: `length`: G, m. `turn`: number of angles of gravity, equally spaced from the x axis; one on a
@@ -290,7 +290,7 @@ def tilted_liquid(
     # Liquid that leaves a part of the outer wall dry without gravity may be deeper than G.
     plain = table.level_of(fill * table.volume)
     deep = (plain > table.wall_start) & (np.sqrt(table.nodes[-1]) - np.sqrt(plain) > length)
-    return _TiltedLiquid(
+    return TiltedLiquid(
         wall_square=columns[3] / table.wall_area,
         surface_square=level - shift,
         moment=columns[1],

@@ -16,10 +16,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.chamber_table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.mesh.geometry import head_square
 from ringbalance.mesh.wall_integrals import gauss, wall_patches
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
+from ringbalance.scene.models import Disc
 
 SMOOTH: Final = np.pi / 6
 """Angle between two facets above which their edge counts as an edge of the chamber."""
@@ -57,20 +59,22 @@ class _Faceting:
     """Largest angle between two facets that are taken for one smooth wall, rad."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _DrawingError:
-    """Expanded uncertainties (95 %) by facets and table, along the fills."""
+@dataclass(frozen=True, kw_only=True)
+class DrawingShares:
+    """Relative expanded uncertainties (95 %) by facets and by the table, along the fills."""
 
     volume: float
-    """Volume of the whole chamber, m^3."""
-    moment: FloatArray
-    """First moment along x, m^4."""
+    """Uncertainty of the whole chamber's volume."""
+    wall_pressure: FloatArray
+    hydrostatic_pressure: FloatArray
+    first_moment: FloatArray
     centroid: FloatArray
-    """Mean of x over the free surface, m."""
-    wall_square: FloatArray
-    """Mean of r^2 - a^2 over the outer wall, m^2."""
-    level: FloatArray
-    """a^2 of the free surface, m^2."""
+    """Mean of x over the free surface: lambda."""
+
+    @property
+    def moment(self) -> FloatArray:
+        """Larger of the uncertainties of moment and lambda."""
+        return np.maximum(self.first_moment, self.centroid)
 
 
 @lru_cache(maxsize=8)
@@ -124,14 +128,24 @@ def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray
     return np.cross(by_u, np.einsum("nijx,ip,jp->npx", patches, at[0], slopes[1]))
 
 
-def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _DrawingError:
-    """Expanded uncertainties by facets in place of curved walls, and by the table between its nodes.
+def drawing_shares(disc: Disc, fills: FloatArray) -> DrawingShares:
+    """Uncertainties by facets in place of curved walls, and by the table between its nodes.
 
     At a fixed fill ratio the surface moves by the volume errors of the whole chamber and of the wet walls;
     each edge counts with the sign of the largest effect, to first order.
+    Args: `fills`: fill ratios above zero, shape (n,).
+    Returns: Zeros for the built-in sector.
     """
-    table, walls, x = chamber_table(geometry), faceting(geometry), fill_ratio[:, None]
-    level = table.level_of(fill_ratio * table.volume)
+    if disc.geometry is None:
+        return DrawingShares(
+            volume=0.0,
+            wall_pressure=(none := np.zeros(fills.shape)),
+            hydrostatic_pressure=none,
+            first_moment=none,
+            centroid=none,
+        )
+    table, walls, x = chamber_table(disc.geometry), faceting(disc.geometry), fills[:, None]
+    level = table.level_of(fills * table.volume)
     radius, wetness = np.sqrt(level), -table.at(level)[1][3]
     area, centroid, _ = table.surface(radius)
     wet = walls.radius > radius[:, None]
@@ -142,12 +156,13 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _Draw
     shifted = np.abs(
         [table.surface(np.sqrt(np.maximum(level + s * moved, 0.0)))[1] - centroid for s in (-1, 1)]
     )
-    return _DrawingError(
-        volume=float(missed.sum()) + TOLERANCE * table.volume,
-        moment=turned + TOLERANCE * table.columns[1, 0],
-        centroid=shifted.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
-        wall_square=wetness * (moved + SAFETY * walls.wall),
-        level=moved,
+    offset = shifted.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid
+    return DrawingShares(
+        volume=(float(missed.sum()) + TOLERANCE * table.volume) / table.volume,
+        wall_pressure=wetness * (moved + SAFETY * walls.wall) / table.at_radius(radius, 3),
+        hydrostatic_pressure=moved / head_square(disc=disc, surface_radius=radius),
+        first_moment=(turned + TOLERANCE * table.columns[1, 0]) / table.at_radius(radius, 1),
+        centroid=offset / centroid,
     )
 
 

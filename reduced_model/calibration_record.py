@@ -11,11 +11,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from ringbalance.mesh.faceting import drawing_shares
 from ringbalance.physics.tube.loss import TubeLoss
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration
 from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability, unmodelled_fractions
-from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -281,9 +281,7 @@ class Calibration(PresentedResult):
     def quantities(self) -> Mapping[str, Quantity]:
         """Main numbers by key, with intervals, computed on first use."""
         by_paper = paper.stall_pressure(
-            disc=self.scene.disc,
-            density=self.scene.liquid.density,
-            angular_velocity=self.scene.rotor.speed,
+            disc=self.scene.disc, density=self.scene.liquid.density, angular_velocity=self.scene.rotor.speed
         )
         rest = (
             ("lambda_variation", "variation of lambda over fills", "1", self.lambda_variation),

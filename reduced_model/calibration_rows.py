@@ -8,15 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
+from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, drawing_shares, faceting, inward_share
 from ringbalance.reduced_model.calibration_record import MAIN, Calibration
-from ringbalance.reduced_model.chamber.values import drawing_shares, paper_closed_forms
-from ringbalance.reduced_model.documents import (
-    PRESSURE_FACTORS,
-    RowStatus,
-    chamber_status,
-    velocity_status,
-)
+from ringbalance.reduced_model.chamber.values import paper_closed_forms
+from ringbalance.reduced_model.documents import PRESSURE_FACTORS, RowStatus, chamber_status, velocity_status
 from ringbalance.reduced_model.gas_line import line_text
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.regime import cavity_pressure

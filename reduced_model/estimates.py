@@ -116,22 +116,19 @@ def range_flow(scene: Scene) -> RangeFlow:
     )
 
 
-def range_velocities(flow: RangeFlow) -> FloatArray:
-    """Velocities from 1/4 of the slowest (full or separated) to twice the fastest, m/s; empty without
-    flow."""
-    velocities = np.concatenate([flow.siphon, flow.separated])
-    ends = np.log(velocities[(velocities > 0) & np.isfinite(velocities)])
-    if not np.any(flow.velocity > 0):
-        return np.empty(0)
-    return np.exp(np.linspace(np.min(ends) - np.log(4), np.max(ends) + np.log(2), _VELOCITY_POINTS))
-
-
-def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
+def tube_changes(scene: Scene) -> tuple[FloatArray, dict[str, float]]:
     """Largest relative change by leaving out a part of the tube's loss, or by the paper's k for the whole.
 
-    Returns: The larger change of k under the same pressure and of the head up to the siphon crest, by part of
-        the loss.
+    Returns: Velocities from 1/4 of the slowest (full or separated) to twice the fastest, m/s; the larger
+        change of k under the same pressure and of the head up to the siphon crest, by part of the loss. Both
+        empty without flow, or for a prescribed k.
     """
+    flow = range_flow(scene)
+    if scene.tube.drag_coefficient is not None or not np.any(flow.velocity > 0):
+        return np.empty(0), {}
+    velocities = np.concatenate([flow.siphon, flow.separated])
+    ends = np.log(velocities[(velocities > 0) & np.isfinite(velocities)])
+    velocity = np.exp(np.linspace(np.min(ends) - np.log(4), np.max(ends) + np.log(2), _VELOCITY_POINTS))
     drags, heads = {}, {}
     for part in ("", *_LOSS_PARTS):
         tube = scene.tube
@@ -161,4 +158,4 @@ def tube_changes(scene: Scene, velocity: FloatArray) -> dict[str, float]:
         moved = np.abs(ratios[0] ** (-1 / head_slope) - 1)
         change_of_k = np.abs(drags[part] / drags[""] - 1) + np.abs(k_slope) * moved
         changes[part] = float(np.max([change_of_k, *np.abs(ratios[1:] - 1)]))
-    return changes
+    return velocity, changes

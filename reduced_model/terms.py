@@ -156,8 +156,7 @@ def _tube_terms(scene: Scene) -> Iterator[Term]:
             f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
         )
         yield Term(name, group, model, value, text, remark, True, without)
-    velocity, free = estimates.range_velocities(flow), tube.drag_coefficient is None
-    changes = estimates.tube_changes(scene, velocity) if free and velocity.size else {}
+    free, (velocity, changes) = tube.drag_coefficient is None, estimates.tube_changes(scene)
     for part, (name, group, model) in _TUBE.items():
         value, text = changes.get(part), _NOTHING_FLOWS if free else "the scene prescribes k"
         if changes:

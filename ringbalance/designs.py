@@ -45,12 +45,12 @@ def sweep(
     Args: `vary`: by path such as "tube.bore", an array in SI, a list of values as a scene file has them, or
         a text such as "0.5mm:2mm:30"; by a tuple of paths that move together, one of these for each; by the
         name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
-        "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: drawn devices that
-        each point is run as at most, fewer where they decide. `intervals`: True to propagate uncertain
-        inputs, which takes most of the time of static answers. `check`: rows of a liquid ring to
-        calibrate, which measures what the array core leaves out; none here, while the command takes three.
+        "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: largest number
+        of drawn devices of each point, fewer where they decide. `intervals`: True to propagate uncertain
+        inputs, which takes most of the time of static answers. `check`: number of
+        rows of a liquid ring to compare with full calibrations, by default none (the command takes three).
         `executor`: any `concurrent.futures.Executor`; its answers are those of this process to
-        the last bit. `workers`: processes of its own where there is none. `store`: folder of
+        the last bit. `workers`: number of processes if there is no executor. `store`: folder of
         the answers, from which an interrupted sweep resumes. `progress`: called with the progress so far.
     Raises: SceneError: a scene or an axis that cannot be used; a point that is refused is a row with its
         finding.
@@ -83,13 +83,13 @@ def sweep(
 def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> dict[str, Any]:
     """Answer one changed scene with plain numbers, for an optimiser: the same changes give the same answer.
 
-    Args: `changes`: values in SI, or texts as a scene file has them, by path such as "tube.bore". `runs`:
-        drawn devices that it is run as at most; 0: static answers alone.
+    Args: `changes`: values in SI, or texts as in a scene file, by path such as "tube.bore". `runs`: largest
+        number of drawn devices; 0: static answers alone.
     Returns: The columns of a sweep's row in SI, None where not known: of a liquid ring `lambda`, `moment`,
         `velocity`, `usable_moment` and others; with runs `fraction` of the devices that meets all that the
         scene requires, its bounds `low` and `high` (95 %), and `settling_time`. `status` is "ok", "blocked"
         (no flow) or "point_refused", `verdict` with runs "met", "not met" or "undecided", else the status,
-        `finding` says why there is no answer. A refused value raises nothing, so that a search goes on.
+        `finding` says why there is no answer. A refused value raises nothing, so that a search can continue.
     Raises: SceneError: a path that is no key of the scene.
 
     Example:

@@ -139,7 +139,7 @@ class JudgedQuantity:
     correction: str = ""
     """Named correction after which a claim's number is reproduced."""
     against: str = ""
-    """Name of the number that a claim is compared with, where the paper does not print it."""
+    """Note on the number compared with a claim, such as "by Eq. 12", where the paper does not print it."""
 
 
 @dataclass(frozen=True, kw_only=True)

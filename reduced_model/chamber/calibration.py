@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -68,7 +68,7 @@ class FillCurve:
         return np.interp(knots, np.linspace(knots[0], knots[-1], count), np.sqrt(squares))
 
 
-CHAMBER_INPUTS: Final = (
+_INPUTS: Final = (
     "outer_radius",
     "inner_radius",
     "axial_width",
@@ -78,20 +78,6 @@ CHAMBER_INPUTS: Final = (
     "speed",
     "lambda_factor",
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _InputEffect:
-    """Expanded uncertainties (95 %) by one input at a fixed fill ratio; arrays along the fill ratio."""
-
-    wall_pressure: FloatArray
-    """Uncertainty of the wall pressure, Pa."""
-    hydrostatic_pressure: FloatArray
-    """Uncertainty of the hydrostatic pressure, Pa."""
-    moment: FloatArray
-    """Uncertainty of the moment, kg m."""
-    moment_per_mass: float
-    """Uncertainty of lambda at equal fills, m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,10 +106,6 @@ class ChamberCalibration:
     """lambda at equal fills, per transferred mass, m, shape (); half-width without the inputs."""
     moment_per_mass_numerical: float
     """Numerical part of the half-width of lambda, m."""
-    moment_per_mass_inputs: float
-    """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
-    input_effects: Mapping[str, _InputEffect]
-    """Effect of each uncertain input; empty where they were not varied."""
     status: Status
     """Status of the solves or, where these are sound, of the ring's waves over the range of fills."""
     statistics: Statistics
@@ -164,7 +146,7 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
     nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
     ring = RingValues.of(scene, fill_ratio=fills, gravity=scene.environment.gravity > 0)
-    check, effects = None, _input_effects(scene, fills) if varied else {}
+    check, inputs = None, _input_half_widths(scene, fills) if varied else {}
     if checked:
         held = gravity_shares(scene).mean > scene.tolerance
         compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
@@ -188,12 +170,11 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
         value, (excess, status) = estimate.value, checked_by(quantity)
         at_nodes, level = value[: nodes.size], quantity == "hydrostatic_pressure"
         table, missed = pressure_table(scene, nodes, at_nodes) if level else _even_table(nodes, at_nodes)
-        inputs = (getattr(each, quantity) ** 2 for each in effects.values())
         return FillCurve(
             value=value,
             numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
             unmodelled=unmodelled[share] * np.abs(value),
-            inputs=np.sqrt(sum(inputs, start=np.zeros_like(value))),
+            inputs=inputs.get(quantity, np.zeros_like(value)),
             table=table,
             interpolation=missed,
             status=status,
@@ -217,33 +198,24 @@ def calibrate_chamber(scene: Scene, *, checked: bool = True, varied: bool = True
             value=np.asarray(ratio), uncertainty=np.asarray(math.hypot(numerical, missing)), status=status
         ),
         moment_per_mass_numerical=numerical,
-        moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
-        input_effects=effects,
         status=_first(ring.status, check.status if check else Status(), waves),
         statistics=check.elements.statistics if check else Statistics(),
     )
 
 
-def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, _InputEffect]:
-    """Effects by uncertain input, "fitted" for those that were fitted together; by closed forms."""
-    points = np.append(fills, scene.disc.max_fill_ratio / 2)[:, None]
+def _input_half_widths(scene: Scene, fills: FloatArray) -> dict[str, FloatArray]:
+    """Expanded uncertainties (95 %) by the uncertain inputs together, along the fills; by closed forms."""
 
     def values(designs: Designs) -> FloatArray:
-        wall, moment, ratio = measured_closed_forms(scene=designs.scene, fill_ratio=points)
-        level = chamber_pressure(scene=designs.scene, fill_ratio=points)
-        return np.array(np.broadcast_arrays(wall, level, moment, ratio))
+        wall, moment, _ = measured_closed_forms(scene=designs.scene, fill_ratio=fills[:, None])
+        level = chamber_pressure(scene=designs.scene, fill_ratio=fills[:, None])
+        return np.array(np.broadcast_arrays(wall, level, moment))
 
-    errors = uncertainties(scene, among=CHAMBER_INPUTS, models=False, fitted_models=False)
+    errors = uncertainties(scene, among=_INPUTS, models=False, fitted_models=False)
     effects = by_group(errors, changes_of(scene, values, errors)[1])
-    return {
-        name: _InputEffect(
-            wall_pressure=each[0, :-1],
-            hydrostatic_pressure=each[1, :-1],
-            moment=each[2, :-1],
-            moment_per_mass=float(each[3, -1]),
-        )
-        for name, each in effects.items()
-    }
+    squares = sum((each**2 for each in effects.values()), start=np.zeros((3, fills.size)))
+    names = ("wall_pressure", "hydrostatic_pressure", "moment")
+    return dict(zip(names, np.sqrt(squares), strict=True))
 
 
 def _first(*statuses: Status) -> Status:

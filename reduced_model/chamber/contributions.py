@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from ringbalance.mesh.faceting import drawing_shares
 from ringbalance.mesh.geometry import (
     chamber_volume,
     half_angle,
@@ -22,12 +23,7 @@ from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL_WAVE_RATIO
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, closed_ring
-from ringbalance.reduced_model.chamber.values import (
-    chamber_closed_forms,
-    chamber_pressure,
-    drawing_shares,
-    share_across,
-)
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, chamber_pressure, share_across
 from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -235,10 +231,7 @@ def gravity_shares(scene: Scene) -> _GravityShares:
     )
     parts = (
         (ring.wall_pressure_ripple / wall, _CORIOLIS_FACTOR * np.maximum(1.0, largest)),
-        (
-            ring.moment_ripple / moment,
-            np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_ERROR,
-        ),
+        (ring.moment_ripple / moment, np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_ERROR),
     )
     return _GravityShares(
         mean=float(np.max(np.abs(np.array(changes) - 1))),

@@ -162,11 +162,7 @@ def _status(elements: RingQuantities | ImportedElements, excess: float) -> Statu
 
 
 def scene_ring(
-    scene: Scene,
-    *,
-    fill_ratio: npt.ArrayLike,
-    gravity: bool,
-    cells: Sequence[tuple[int, ...]] | None = None,
+    scene: Scene, *, fill_ratio: npt.ArrayLike, gravity: bool, cells: Sequence[tuple[int, ...]] | None = None
 ) -> RingQuantities:
     """Totals of one chamber's liquid; without gravity every fill must be solved.
 

@@ -9,13 +9,13 @@ the outer wall runs dry.  An imported chamber is integrated over its walls inste
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.chamber_table import tilted_liquid
+from ringbalance.mesh.chamber_table import TiltedLiquid, tilted_liquid
 from ringbalance.mesh.geometry import (
     half_angle,
     imported_table,
@@ -84,39 +84,21 @@ class TiltedRing:
             samples = turn if shaft == "horizontal" else 0
             fills = tuple(float(x) for x in fill_ratio)
             liquid = tilted_liquid(table, length=length, vertical=samples == 0, turn=samples, fills=fills)
-            turned = _Turned(
-                wall_pressure=liquid.wall_square.copy(),
-                surface_square=liquid.surface_square.copy(),
-                moment=liquid.moment / disc.axial_width,
-                moment_per_volume=liquid.centroid.copy(),
-                closed=liquid.closed,
-            )
+            turned = replace(liquid, moment=liquid.moment / disc.axial_width)
         elif shaft == "vertical":
             turned = _on_vertical_shaft(disc, length, fill_ratio)
         else:
             turned = _on_horizontal_shaft(disc, length, fill_ratio, turn)
         scale = density * square / 2
         return cls(
-            wall_pressure=scale * turned.wall_pressure.mean(axis=1),
+            wall_pressure=scale * turned.wall_square.mean(axis=1),
             hydrostatic_pressure=scale * (disc.outer_radius**2 - turned.surface_square.mean(axis=1)),
             moment=density * disc.axial_width * turned.moment.mean(axis=1),
-            moment_per_volume=density * turned.moment_per_volume.mean(axis=1),
-            wall_pressure_ripple=scale * _first_harmonic(turned.wall_pressure),
+            moment_per_volume=density * turned.centroid.mean(axis=1),
+            wall_pressure_ripple=scale * _first_harmonic(turned.wall_square),
             moment_ripple=density * disc.axial_width * _first_harmonic(turned.moment),
             closed=np.all(turned.closed, axis=1),
         )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Turned:
-    """Quantities at every angle of gravity, shape (n, turn)."""
-
-    wall_pressure: FloatArray
-    surface_square: FloatArray
-    """b^2 - G^2 or c^2, m^2."""
-    moment: FloatArray
-    moment_per_volume: FloatArray
-    closed: BoolArray
 
 
 def turn_samples(scene: Scene) -> int:
@@ -141,7 +123,7 @@ def _held(disc: Disc, radius: FloatArray) -> FloatArray:
     return np.asarray(np.clip(radius, disc.plate_thickness * 1.001 + 1e-12, disc.outer_radius))
 
 
-def _on_vertical_shaft(disc: Disc, length: float, fills: FloatArray) -> _Turned:
+def _on_vertical_shaft(disc: Disc, length: float, fills: FloatArray) -> TiltedLiquid:
     abscissa, weights = _rule(POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills) ** 2
     rise, weight = length * disc.axial_width * abscissa[None, :], weights[None, :] / 2
@@ -156,16 +138,16 @@ def _on_vertical_shaft(disc: Disc, length: float, fills: FloatArray) -> _Turned:
     level = square[:, None] + rise
     moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
     centroid = np.sum(weight * radius * np.sin(alpha), axis=1) / np.sum(weight * alpha, axis=1)
-    return _Turned(
-        wall_pressure=np.sum(weight * (outer**2 - level), axis=1)[:, None],
+    return TiltedLiquid(
+        wall_square=np.sum(weight * (outer**2 - level), axis=1)[:, None],
         surface_square=square[:, None],
         moment=moment[:, None],
-        moment_per_volume=centroid[:, None],
+        centroid=centroid[:, None],
         closed=np.all(level < outer**2, axis=1)[:, None],
     )
 
 
-def _on_horizontal_shaft(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
+def _on_horizontal_shaft(disc: Disc, length: float, fills: FloatArray, turn: int) -> TiltedLiquid:
     abscissa, weights = _rule(POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills)[:, None]
     psi = (2 * np.pi * np.arange(turn) / turn)[None, :, None]
@@ -197,11 +179,11 @@ def _on_horizontal_shaft(disc: Disc, length: float, fills: FloatArray, turn: int
     alpha = half_angle(disc=disc, radius=r)
     levers = middle * radial_weights * r**2 * np.cos(eta[..., None] * alpha) * alpha
     moment_on_rays = 2 * np.sum(levers, axis=-1)
-    return _Turned(
-        wall_pressure=np.sum(weight * depth, axis=2),
+    return TiltedLiquid(
+        wall_square=np.sum(weight * depth, axis=2),
         surface_square=square - length**2,
         moment=np.sum(weight * moment_on_rays, axis=2),
-        moment_per_volume=np.sum(share * radius * np.cos(eta * half), axis=2) / np.sum(share, axis=2),
+        centroid=np.sum(share * radius * np.cos(eta * half), axis=2) / np.sum(share, axis=2),
         closed=np.all(depth > 0, axis=2),
     )
 

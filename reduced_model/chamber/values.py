@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.chamber_table import chamber_table
-from ringbalance.mesh.faceting import drawing_error
 from ringbalance.mesh.geometry import (
     chamber_volume,
     half_angle,
@@ -194,32 +193,6 @@ def _spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
     else:
         innermost = a - delta * np.hypot(np.cos(alpha) - np.sin(alpha) / alpha, np.sin(alpha))
     return np.asarray(innermost < disc.inner_radius * (1 - 1e-9))
-
-
-@dataclass(frozen=True, kw_only=True)
-class _DrawingShares:
-    """Relative expanded uncertainties (95 %) by facets for curved walls, and by integration."""
-
-    volume: float
-    wall_pressure: FloatArray
-    hydrostatic_pressure: FloatArray
-    moment: FloatArray
-    """Larger of the uncertainties of moment and lambda."""
-
-
-def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
-    """Uncertainties by faceting at fill ratios above zero; zeros for the built-in sector."""
-    if disc.geometry is None:
-        none = np.zeros(fills.shape)
-        return _DrawingShares(volume=0.0, wall_pressure=none, hydrostatic_pressure=none, moment=none)
-    table, error = chamber_table(disc.geometry), drawing_error(disc.geometry, fill_ratio=fills)
-    a = np.sqrt(table.level_of(fills * table.volume))
-    return _DrawingShares(
-        volume=error.volume / table.volume,
-        wall_pressure=error.wall_square / table.at_radius(a, 3),
-        hydrostatic_pressure=error.level / head_square(disc=disc, surface_radius=a),
-        moment=np.maximum(error.moment / table.at_radius(a, 1), error.centroid / table.surface(a)[1]),
-    )
 
 
 def share_across(disc: Disc, fills: FloatArray) -> FloatArray:

@@ -142,11 +142,7 @@ def _clearing_slope(plant: Record, spill: float) -> float:
 
 @inlined
 def _crest_margin(
-    plant: Record,
-    at: Four,
-    direction: int,
-    primed: bool,
-    log_speed: float,
+    plant: Record, at: Four, direction: int, primed: bool, log_speed: float
 ) -> tuple[float, float, float]:
     """Pressure p that drives a separated column, Pa; fraction c of the gas over the crest that is carried
     out; dp/dg - (1 - c), g the margin over gas."""
@@ -165,13 +161,7 @@ def _crest_margin(
 
 
 @in_place
-def _directed(
-    plant: Record,
-    at: Four,
-    direction: int,
-    primed: bool,
-    log_speed: float,
-) -> tuple[float, bool]:
+def _directed(plant: Record, at: Four, direction: int, primed: bool, log_speed: float) -> tuple[float, bool]:
     """Velocity of flow in one direction, and true if the column is separated."""
     if not can_flow(plant, at, primed):
         return 0.0, False
@@ -230,13 +220,7 @@ def clearance(plant: Record, at: Four, direction: int, log_speed: float) -> floa
 
 
 @in_place
-def _fills(
-    plant: Record,
-    at: Four,
-    direction: int,
-    primed: bool,
-    log_speed: float,
-) -> bool:
+def _fills(plant: Record, at: Four, direction: int, primed: bool, log_speed: float) -> bool:
     """True if a column that flows is continuous: gas carried out, no cavity open to the port."""
     if not plant.crest:
         return True
@@ -252,12 +236,7 @@ def _fills(
 
 @inlined
 def accelerations(
-    plant: Record,
-    at: Four,
-    speed: float,
-    direction: int,
-    primed: bool,
-    log_speed: float,
+    plant: Record, at: Four, speed: float, direction: int, primed: bool, log_speed: float
 ) -> tuple[float, float, float, float, float, float]:
     """Accelerations of the full column and of the separated one along their direction, m/s^2.
 

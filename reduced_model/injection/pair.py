@@ -20,14 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from ringbalance.reduced_model.injection.dynamics import (
-    EVENTS,
-    MOTION,
-    WORKSPACE,
-    Dynamics,
-    Event,
-    Record,
-)
+from ringbalance.reduced_model.injection.dynamics import EVENTS, MOTION, WORKSPACE, Dynamics, Event, Record
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import stands
 from ringbalance.reduced_model.injection.march import advance
@@ -99,10 +92,7 @@ class Injections:
     ) -> Injections:
         """Make injections into one chamber of a pair, from its fill ratio."""
         flow = model.flow.evaluate(
-            fill_ratio=fill,
-            opposite_fill_ratio=total - fill,
-            gas_pressure=dynamics.gas_pressure,
-            primed=True,
+            fill_ratio=fill, opposite_fill_ratio=total - fill, gas_pressure=dynamics.gas_pressure, primed=True
         )
         return cls(
             dynamics=replace(dynamics, valve_lag=0.0, relative_error=_RELATIVE_ERROR),

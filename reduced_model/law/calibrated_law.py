@@ -16,6 +16,7 @@ from ringbalance.reduced_model.law.flow_law import (
     Conditions,
     Flow,
     Regime,
+    checked_conditions,
     law_text,
     save_record,
 )
@@ -32,7 +33,6 @@ from ringbalance.scene.registry import registered
 
 WIDTH: Final = 3
 """Column of `CalibratedMoment.along` that holds the expanded uncertainty of U."""
-_Conditions = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
 _Answers = tuple[FloatArray, IntArray, BoolArray, FloatArray]
 _FEW_POINTS: Final = 500
 """Number of points up to which plain Python is faster than loading the compiled code."""
@@ -179,22 +179,11 @@ class CalibratedLaw:
                 uncertainty=np.zeros(()),
                 primed=np.asarray(query[point.PRIMED_AFTER] != 0.0),
             )
-        conditions = Conditions.checked(
-            max_fill_ratio=self.max_fill_ratio,
-            ambient_pressure=self.ambient_pressure,
-            fill_ratio=fill_ratio,
-            opposite_fill_ratio=opposite_fill_ratio,
-            gas_pressure=gas_pressure,
-            primed=primed,
-        )
-        shape = conditions.fill_ratio.shape
+        conditions = checked_conditions(self, fill_ratio, opposite_fill_ratio, gas_pressure, primed)
+        shape = conditions[0].shape
         # Copies: read-only arrays would be another type to compile for.
-        flat = (
-            np.array(conditions.fill_ratio).ravel(),
-            np.array(conditions.opposite_fill_ratio).ravel(),
-            np.array(conditions.gas_pressure).ravel(),
-            np.array(conditions.primed).ravel(),
-        )
+        x, y, p = (np.array(each).ravel() for each in conditions[:3])
+        flat = x, y, p, np.array(conditions[3]).ravel()
         velocity, regime, after, margin = self._answers(flat)
         width = np.zeros_like(velocity)
         if self.half_widths is not None:
@@ -227,7 +216,7 @@ class CalibratedLaw:
         answer(numbers, cells, pieces, pieces, query)
         return query
 
-    def _answers(self, conditions: _Conditions) -> _Answers:
+    def _answers(self, conditions: Conditions) -> _Answers:
         """Velocity, regime, primed afterwards and margin over the crest of n queries."""
         n = conditions[0].size
         answers = np.empty(n), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_), np.empty(n)
@@ -243,7 +232,7 @@ class CalibratedLaw:
         return answers
 
     def _widened(
-        self, conditions: _Conditions, velocity: FloatArray, regime: IntArray, margin: FloatArray
+        self, conditions: Conditions, velocity: FloatArray, regime: IntArray, margin: FloatArray
     ) -> tuple[FloatArray, IntArray]:
         """Half-widths of velocities, m/s, and regimes, undecided where the margin lies within its half-width.
 

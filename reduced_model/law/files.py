@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields, replace
+import sys
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, cast
@@ -22,35 +22,18 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.faults import Fault, SceneError
 
+_LAWS: Final = (CalibratedLaw, PaperLaw)
 _RECORDS: Final[Mapping[str, type]] = MappingProxyType(
     {
         record.__name__: record
-        for record in (
-            CalibratedLaw,
-            CalibratedMoment,
-            HalfWidths,
-            PaperLaw,
-            PaperMoment,
-            Table,
-            TubeHeads,
-            TubePath,
-        )
+        for record in (*_LAWS, CalibratedMoment, HalfWidths, PaperMoment, Table, TubeHeads, TubePath)
     }
 )
-_LAWS: Final = (CalibratedLaw, PaperLaw)
 _POSITIVE: Final = frozenset(
-    {
-        "density",
-        "chamber_volume",
-        "tube_area",
-        "max_fill_ratio",
-        "axial_width",
-        "central_angle",
-        "gas_factor",
-    }
+    ["density", "chamber_volume", "tube_area", "max_fill_ratio", "axial_width", "central_angle", "gas_factor"]
 )
 _NOT_NEGATIVE: Final = frozenset(
-    {"ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"}
+    ["ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"]
 )
 _LONGEST_VALUE: Final = 40
 
@@ -71,16 +54,21 @@ class _Reader:
 
     def record(self, data: object, expected: tuple[type, ...], where: str) -> Any:
         """Build a record, or note why it cannot be built and return None."""
-        names = ", ".join(t.__name__ for t in expected)
-        if not isinstance(data, dict) or data.get("type") not in {t.__name__ for t in expected}:
+        names = [kind.__name__ for kind in expected]
+        if not isinstance(data, dict) or data.get("type") not in names:
             type_name = data.get("type") if isinstance(data, dict) else data
-            self.fault(f"{where}.type", _shown(type_name), "this is no such record", names)
+            self.fault(f"{where}.type", _shown(type_name), "this is no such record", ", ".join(names))
             return None
         kind, before = _RECORDS[data["type"]], len(self.faults)
-        fields_by_name = {f.name: f for f in fields(kind)}
-        for key in sorted(set(data) - set(fields_by_name) - {"type"}):
-            self.fault(f"{where}.{key}", _shown(data[key]), "unknown key", ", ".join(fields_by_name))
-        values = {name: self.field(data, f, f"{where}.{name}") for name, f in fields_by_name.items()}
+        declared = {field.name: field for field in fields(kind)}
+        for key in sorted(set(data) - set(declared) - {"type"}):
+            self.fault(f"{where}.{key}", _shown(data[key]), "unknown key", ", ".join(declared))
+        values = {}
+        for name, field in declared.items():
+            if name in data:
+                values[name] = self.value(data[name], str(field.type), name, f"{where}.{name}")
+            elif field.default is MISSING:
+                self.fault(f"{where}.{name}", "missing", "the key is missing", str(field.type))
         if len(self.faults) > before:
             return None
         try:
@@ -88,18 +76,6 @@ class _Reader:
         except ValueError as error:
             self.fault(f"{where}.type", data["type"], str(error), "values that fit together")
             return None
-
-    def field(self, data: Mapping[str, object], field: Field[Any], where: str) -> Any:
-        if field.name not in data and field.default is not MISSING:
-            # A key that earlier files do not have.
-            return field.default
-        if field.name not in data:
-            self.fault(where, "missing", "the key is missing", str(field.type))
-            return None
-        value, optional = data[field.name], str(field.type).endswith("| None")
-        if value is None and optional:
-            return None
-        return self.value(value, str(field.type).removesuffix(" | None"), field.name, where)
 
     def law(self, content: Mapping[str, Any]) -> Any:
         """Read the law of a file, or note why it cannot be read."""
@@ -118,19 +94,28 @@ class _Reader:
         return replace(law, half_widths=version_4.half_widths(law, held, variants))
 
     def value(self, value: object, kind: str, name: str, where: str) -> Any:
-        checks: Mapping[str, tuple[Callable[[object], bool], str]] = {
-            "str": (lambda v: isinstance(v, str), "a text"),
-            "bool": (lambda v: isinstance(v, bool), "true or false"),
-            "float": (lambda v: _is_number(v) and _allowed(name, cast(float, v)), _range(name)),
-            "FloatArray": (
-                lambda v: isinstance(v, list) and all(map(_is_number, v)),
-                "a list of finite numbers",
-            ),
-        }
-        if kind not in checks:
+        """A value of a field's type, or a note on what is wrong with it."""
+        if value is None and kind.endswith("| None"):
+            return None
+        kind = kind.removesuffix(" | None")
+        if kind in _RECORDS:
             return self.record(value, (_RECORDS[kind],), where)
-        fits, allowed = checks[kind]
-        if not fits(value):
+        if kind == "FloatArray":
+            fits, allowed = (
+                isinstance(value, list) and all(map(_is_number, value)),
+                "a list of finite numbers",
+            )
+        elif kind == "float":
+            fits, allowed = _is_number(value), "a finite number"
+            if name in _POSITIVE:
+                fits, allowed = fits and value > 0, "a number above 0"  # type: ignore[operator]
+            elif name in _NOT_NEGATIVE:
+                fits, allowed = fits and value >= 0, "a number of at least 0"  # type: ignore[operator]
+        else:
+            fits, allowed = isinstance(value, str), "a text"
+            if kind == "bool":
+                fits, allowed = isinstance(value, bool), "true or false"
+        if not fits:
             self.fault(where, _shown(value), f"it is not {allowed}", allowed)
             return None
         if kind == "FloatArray":
@@ -139,22 +124,8 @@ class _Reader:
 
 
 def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, float | int):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
-
-
-def _allowed(name: str, value: float) -> bool:
-    return value > 0 if name in _POSITIVE else value >= 0 if name in _NOT_NEGATIVE else True
-
-
-def _range(name: str) -> str:
-    if name in _POSITIVE:
-        return "a number above 0"
-    return "a number of at least 0" if name in _NOT_NEGATIVE else "a finite number"
+    """True for a finite number that is a float without overflow."""
+    return type(value) in (int, float) and abs(cast(float, value)) <= sys.float_info.max
 
 
 def _shown(value: object) -> str:

@@ -115,46 +115,33 @@ class FlowLaw(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True)
-class Conditions:
-    """Arguments of a flow law, checked; arrays of one shape."""
+Conditions = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
+"""Fill ratios of the driven and of the opposite chamber, gauge pressure in the driven one, Pa, and true where
+the tube holds a continuous column beforehand; arrays of one shape."""
 
-    fill_ratio: FloatArray
-    """x of the driven chamber, within [0, max_fill_ratio]."""
-    opposite_fill_ratio: FloatArray
-    """x of the opposite chamber, within [0, max_fill_ratio]."""
-    gas_pressure: FloatArray
-    """Gauge, in the driven chamber, Pa."""
-    primed: BoolArray
-    """True if the tube holds a continuous column beforehand."""
 
-    @classmethod
-    def checked(
-        cls,
-        *,
-        max_fill_ratio: float,
-        ambient_pressure: float,
-        fill_ratio: npt.ArrayLike,
-        opposite_fill_ratio: npt.ArrayLike | None,
-        gas_pressure: npt.ArrayLike,
-        primed: npt.ArrayLike,
-    ) -> Conditions:
-        """Check and broadcast the arguments of `FlowLaw.evaluate`.
+def checked_conditions(
+    law: Any,
+    fill_ratio: npt.ArrayLike,
+    opposite_fill_ratio: npt.ArrayLike | None,
+    gas_pressure: npt.ArrayLike,
+    primed: npt.ArrayLike,
+) -> Conditions:
+    """Check and broadcast the arguments of `FlowLaw.evaluate` of a law with an ambient pressure.
 
-        Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
-        """
-        x = _within(fill_ratio, max_fill_ratio, "fill_ratio")
-        opposite = max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
-        y = _within(opposite, max_fill_ratio, "opposite_fill_ratio")
-        p = np.asarray(plain_number(gas_pressure, "Pa")[0], dtype=np.float64)
-        if not (np.isfinite(p) & (p + ambient_pressure >= 0)).all():
-            raise ValueError(
-                f"gas_pressure must be finite and at least minus the ambient {ambient_pressure:g} Pa"
-            )
-        wet = np.asarray(primed, dtype=np.bool_)
-        if not x.shape == y.shape == p.shape == wet.shape:
-            x, y, p, wet = np.broadcast_arrays(x, y, p, wet)
-        return cls(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=wet)
+    Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
+    """
+    largest, ambient = law.max_fill_ratio, law.ambient_pressure
+    x = _within(fill_ratio, largest, "fill_ratio")
+    opposite = largest - x if opposite_fill_ratio is None else opposite_fill_ratio
+    y = _within(opposite, largest, "opposite_fill_ratio")
+    p = np.asarray(plain_number(gas_pressure, "Pa")[0], dtype=np.float64)
+    if not (np.isfinite(p) & (p + ambient >= 0)).all():
+        raise ValueError(f"gas_pressure must be finite and at least minus the ambient {ambient:g} Pa")
+    wet = np.asarray(primed, dtype=np.bool_)
+    if not x.shape == y.shape == p.shape == wet.shape:
+        x, y, p, wet = np.broadcast_arrays(x, y, p, wet)
+    return x, y, p, wet
 
 
 def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:

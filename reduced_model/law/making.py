@@ -18,12 +18,7 @@ from ringbalance.reduced_model.chamber.values import (
     chamber_pressure,
     share_across,
 )
-from ringbalance.reduced_model.law.calibrated_law import (
-    WIDTH,
-    CalibratedLaw,
-    CalibratedMoment,
-    constants_of,
-)
+from ringbalance.reduced_model.law.calibrated_law import WIDTH, CalibratedLaw, CalibratedMoment, constants_of
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.reduced_model.law.sides import half_width_table
 from ringbalance.reduced_model.pieces.table import Table, smooth_table, smooth_tables
@@ -158,11 +153,7 @@ def _nominal(
 
 
 def _assembled_law(
-    scene: Scene,
-    *,
-    heads: TubeHeads,
-    levels: Table,
-    moment: CalibratedMoment,
+    scene: Scene, *, heads: TubeHeads, levels: Table, moment: CalibratedMoment
 ) -> CalibratedLaw:
     return CalibratedLaw(
         name=CALIBRATED,

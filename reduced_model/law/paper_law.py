@@ -13,9 +13,9 @@ import numpy.typing as npt
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import (
     BalancerModel,
-    Conditions,
     Flow,
     Regime,
+    checked_conditions,
     law_text,
     save_record,
 )
@@ -114,21 +114,16 @@ class PaperLaw:
         primed: npt.ArrayLike = False,
     ) -> Flow:
         """Flow by Eq. 19; blocked or reverse up to the stall pressure and with the gas off."""
-        conditions = Conditions.checked(
-            max_fill_ratio=self.max_fill_ratio,
-            ambient_pressure=self.ambient_pressure,
-            fill_ratio=fill_ratio,
-            opposite_fill_ratio=opposite_fill_ratio,
-            gas_pressure=gas_pressure,
-            primed=primed,
+        fill, opposite_fill, gas, _ = checked_conditions(
+            self, fill_ratio, opposite_fill_ratio, gas_pressure, primed
         )
-        level = self.pressure_per_fill_difference * (conditions.fill_ratio - conditions.opposite_fill_ratio)
-        squared = self.velocity_squared_per_pressure * (conditions.gas_pressure + level)
-        flows = (squared > 0) & (conditions.gas_pressure > 0)
+        level = self.pressure_per_fill_difference * (fill - opposite_fill)
+        squared = self.velocity_squared_per_pressure * (gas + level)
+        flows = (squared > 0) & (gas > 0)
         # The opposite chamber's liquid passes the crest against the driven one's gas.
         crest = math.inf if self.return_pressure is None else self.return_pressure
-        opposite = self.pressure_per_fill_difference * conditions.opposite_fill_ratio
-        returns = (squared < 0) & (opposite - crest > conditions.gas_pressure)
+        opposite = self.pressure_per_fill_difference * opposite_fill
+        returns = (squared < 0) & (opposite - crest > gas)
         velocity = np.where(flows | returns, np.sign(squared) * np.sqrt(np.abs(squared)), 0.0)
         regime = np.where(flows, Regime.SIPHON, np.where(returns, Regime.REVERSE, Regime.BLOCKED))
         return Flow(

@@ -38,9 +38,7 @@ class LawRows:
     def of(cls, ways: int, edge: float = _EDGE, *, stack: tuple[int, ...] = ()) -> LawRows:
         """Make rows for the whole tube and the ways to a crest, without pieces; `stack`: (laws,) of many."""
         return cls(
-            ways=np.zeros((*stack, ways, WIDTH_OF_ROW)),
-            edge=edge,
-            numbers=[np.zeros((*stack, point.PLACES))],
+            ways=np.zeros((*stack, ways, WIDTH_OF_ROW)), edge=edge, numbers=[np.zeros((*stack, point.PLACES))]
         )
 
     def add(self, *columns: FloatArray) -> None:

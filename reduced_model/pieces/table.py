@@ -91,12 +91,6 @@ class Table:
         c = self.quintics[:, piece]
         return np.asarray(c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5])))))
 
-    def quintic_slope(self, x: npt.ArrayLike) -> FloatArray:
-        """Slope of the first column at any x; beyond the ends that at the ends."""
-        piece, t = self.locate(x)
-        c = self.quintics[:, piece]
-        return np.asarray(c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5])))))
-
     def cubic(self, x: npt.ArrayLike, number: int) -> FloatArray:
         """Column followed by its slopes, at any x, constant beyond the ends."""
         piece, t = self.locate(x)

@@ -41,7 +41,7 @@ MAX_DEVICES: Final = 64
 _DIFFERENCE_LEVEL: Final = 0.05 / 3
 """Significance level of each of the tests after 16, 32 and 64 devices; 0.05 for all three together."""
 _TRACED_DEVICES: Final = 4
-"""Devices whose largest vibration on the way is recorded."""
+"""Number of devices whose largest vibration is recorded."""
 _DEVICE_NUMBERS: Final = (
     ("time_s", "settling_time", "time", "time to the limit, of those that settle", "s"),
     ("residual_ratio", "residual_ratio", "residual_ratio", "left over, ratio", "1"),
@@ -64,7 +64,7 @@ class Side:
     residual_ratio: FloatArray
     """Final amplitude over the one before balancing, by device."""
     worst_amplitude: float
-    """Median of the largest amplitude on the way of the traced devices, m zero-to-peak."""
+    """Median of the largest amplitudes of the traced devices, m zero-to-peak."""
     status: str
     """Status of the first traced run that did not settle, else of the first traced run."""
     energy_kind: str

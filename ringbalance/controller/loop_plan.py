@@ -36,7 +36,7 @@ SAMPLES_AT_FIRST: Final = 256
 ALLOWED: Final = 0.01
 """Fraction of the samples in the watch time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
-"""Commands in a row without movement, beyond one for each chamber, with which a run ends as idle."""
+"""Last commands without movement, beyond one for each chamber, with which a run out of time is idle."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

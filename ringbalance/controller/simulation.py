@@ -284,7 +284,7 @@ class Simulation(PresentedResult):
 
     @property
     def unusable(self) -> int:
-        """Number of samples that no algorithm can use."""
+        """Number of samples that the run's algorithm could not use."""
         return sum(sample.command.reason == NO_SAMPLE for sample in self.samples)
 
     @cached_property

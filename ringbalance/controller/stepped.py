@@ -60,7 +60,7 @@ class Stepped:
 
 
 def scene_controller(scene: Scene, *, flow_law: CompleteLaw | None = None) -> Stepped:
-    """The algorithm of a scene with its settings, for one of your own to wrap.
+    """The algorithm of a scene with its settings, to use within an algorithm of your own.
 
     Args: `flow_law`: law that the law-based algorithm assumes; default the calibrated law.
 

@@ -121,9 +121,10 @@ def check_fit(scene: Scene, model: BalancerModel) -> None:
 
 
 def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
-    """Dead time, s, at equal fills of an injection that corrects the limit: gas fills, liquid rises.
+    """Dead time, s, at equal fills of an injection that corrects an amplitude at the limit.
 
-    At least the valve's lag and its shortest opening.
+    Gas fills the chamber and the liquid rises over the crest; at least the valve's lag and its shortest
+    opening.
     """
     modelled, total = run_terms(scene=scene, model=model), 2 * scene.disc.initial_fill
     least = max(scene.gas.valve_lag or 0.0, scene.controller.minimum_gas_time)

@@ -360,7 +360,7 @@ def _checked(path: str, value: Any, reader: ValueReader) -> Any:
 
 
 def _reader(scene: SceneFile, path: str) -> ValueReader:
-    """Reader of a key. Raises: SceneError: no such key in this kind of scene, or a table of this name."""
+    """Reader of a key. Raises: SceneError: no such key in this kind of scene, or a key that holds a table."""
     schema: Schema = scene_kind(scene.balancer).schema
     table, _, key = str(path).partition(".")
     declared = schema.tables[table].keys.get(key) if table in schema.tables else None

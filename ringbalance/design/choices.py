@@ -39,8 +39,9 @@ class Choices:
 
 
 def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
-    """Read a CSV file as spreadsheets write it, with commas, semicolons or tabs; lines with # are comments.
+    """Read a CSV file as spreadsheets write it, with commas, semicolons or tabs.
 
+    Lines that begin with # are comments.
     A column head is a key, or a key with the unit of the numbers below, such as "conductance [l/(s*bar)]".
     Args: `table`: name of a table of the scene. `keys`: its keys by name.
     Raises: SceneError: every error of the file, with line and column.

@@ -103,7 +103,7 @@ class Block:
 
     @property
     def size(self) -> int:
-        """Size of the constants, bytes."""
+        """Size of constants and tables, bytes."""
         return 8 * len(self.constants) + (0 if self.tables is None else self.tables.size)
 
     def outputs(self, row: list[float]) -> dict[str, float]:

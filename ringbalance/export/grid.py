@@ -60,10 +60,9 @@ def csv_files(law: CompactLaw, name: str, *, points: int, highest: float) -> dic
         "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse",
         "status: 0 ok, 1 extrapolated, 2 blocked, 4 invalid",
         f"opposite fill ratio: {law.max_fill_ratio!r} less the fill ratio",
-        "bilinear interpolation, looked at in the middle of cells whose corners have one regime: at most "
+        "error of bilinear interpolation in the middle of cells whose corners have one regime: at most "
         f"{largest:.2g} m/s, 95 % below {most:.2g} m/s",
-        "cells with more than one regime, where interpolation is worth nothing: "
-        f"{100 * (mixed / len(cells)):.1f} %",
+        f"cells with more than one regime, of no use for interpolation: {100 * (mixed / len(cells)):.1f} %",
     )
     lines = [*(f"# {line.strip()}" for line in head), ",".join(COLUMNS)]
     x, p, wet = (np.array(column) for column in zip(*answers, strict=True))

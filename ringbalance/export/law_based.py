@@ -94,23 +94,23 @@ SHORTEST_PART, SLOWEST_FALL = 1e-9, 1e-12
 
 
 def settings(c: Law) -> int:
-    """Place of the first setting."""
+    """Index of the first setting."""
     d = int(c[BLOCK])
     return d + DIRECTIONS + 2 * int(c[d + PAIRS])
 
 
 def memory(c: Law) -> int:
-    """Place of the first number of the algorithm's memory."""
+    """Index of the first number of the algorithm's memory."""
     return FIRST_PAIR + PER_PAIR * int(c[int(c[BLOCK]) + PAIRS])
 
 
 def host_row(c: Law) -> int:
-    """Place of the first number that a host sees besides the vibration."""
+    """Index of the first number that a host sees besides the vibration."""
     return change_of(memory(c), int(c[int(c[BLOCK]) + PAIRS]))
 
 
 def chamber_of(c: Law, chamber: int) -> int:
-    """Place of a chamber's numbers."""
+    """Index of the first of a chamber's numbers."""
     return host_row(c) + FIRST_CHAMBER + PER_CHAMBER * chamber
 
 

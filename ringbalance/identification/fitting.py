@@ -40,7 +40,7 @@ two, the error of rms amplitudes stated as zero to peak."""
 _MAX_PULL_SIGMAS: Final = 3.0
 """Standard deviations by which the data may disagree with the prior."""
 _MOVABLE_FRACTION: Final = 0.1
-"""Smallest shift of a value by data that can disagree, over the prior standard deviation."""
+"""Smallest standard deviation of a value's shift by data that can disagree, over that of the prior."""
 _LITTLE: Final = 1e-4
 """Change of a quantity in a test for its effect: relative, or in SI units if it is zero."""
 Source = Literal["[uncertainty]", "geometry"]

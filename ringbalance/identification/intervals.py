@@ -170,14 +170,12 @@ class Joint:
 
     names: tuple[str, ...]
     """Names of the parameters, then of the held inputs, in the order of the fit."""
-    values: FloatArray
-    """Values, SI; errors of models in standard deviations."""
     covariance: FloatArray
-    """Covariance of the values, shape (n, n)."""
+    """Covariance, SI, of errors of models in standard deviations, shape (n, n)."""
 
     @property
     def deviations(self) -> FloatArray:
-        """Standard deviations of the values, shape (n,)."""
+        """Standard deviations, as in the covariance, shape (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
@@ -232,11 +230,9 @@ def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
     inverse = covariance(np.concatenate([data / student[problem.group][:, None], priors, weak]))
     columns = np.r_[:count, count + free : count + free + len(held)]
     slopes = [p.slope(inner) for p, inner in zip(parameters, t.tolist(), strict=True)]
-    values = [p.value(inner) for p, inner in zip(parameters, t.tolist(), strict=True)]
     scale = np.concatenate([slopes, list(held.values())])
     return Joint(
         names=(*(p.name for p in parameters), *held),
-        values=np.concatenate([values, best.residuals.linear_values(t)[1]]),
         covariance=inverse[np.ix_(columns, columns)] * np.outer(scale, scale),
     )
 

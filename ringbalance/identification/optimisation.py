@@ -29,7 +29,7 @@ _NEARBY: Final = 1e-2
 """Difference of the sums of squares, relative or in few standard deviations, beyond which the minima of two
 starts count as different."""
 _START_DISTANCE: Final = 1.0
-"""Distance of a further start in t, in prior standard deviations; without a prior, over half of ln 2."""
+"""Largest distance of a further start in t, over the prior standard deviation or half of ln 2, if less."""
 _MAX_START_REACH: Final = 0.35
 _LEAST_GAIN: Final = 1e-8
 """Reduction of the sum of squares below which the search ends: a ten-thousandth of a standard deviation of a

@@ -22,7 +22,7 @@ from ringbalance.controller.balancer import Input, balancer_of
 from ringbalance.identification.device import ModelledDevice, Models
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.reading import KINDS
-from ringbalance.reduced_model.chamber.values import drawing_shares
+from ringbalance.mesh.faceting import drawing_shares
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.errors import Uncertainty, model_uncertainties, with_places
 from ringbalance.scene.faults import did_you_mean
@@ -34,8 +34,8 @@ from ringbalance.scene.uncertain import (
     SHAPE,
     UNCERTAIN_QUANTITIES,
     half_widths,
+    moved,
     nominal_value,
-    shifted,
     with_value,
 )
 
@@ -52,7 +52,7 @@ class FitError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One quantity that is fitted, t = ln(x + offset) or t = x/scale."""
+    """One quantity that is fitted, t = ln gain (x + offset) or t = x/scale."""
 
     name: str
     symbol: str
@@ -333,7 +333,7 @@ class _LiquidRingInputs(_SceneInputs):
     def changed(self, name: str, change: float) -> SceneFile:
         if name in self.errors:
             return self.errors[name].moved(self.scene, change)
-        return shifted(scene=self.scene, quantity=name, change=change)
+        return moved(self.scene, {name: change})
 
     def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
         error = self.errors.get(name)

@@ -45,7 +45,7 @@ _TEXTS: Final = (
 )
 """Keys of the first lines that hold text."""
 _ROUNDED: Final = 0.01
-"""Relative rounding error allowed in the fill of a full chamber."""
+"""Relative rounding error allowed in the fill of a chamber that holds all the liquid of its pair."""
 
 
 def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -> tuple[Observations, ...]:

@@ -43,8 +43,8 @@ _TOGETHER: Final = 0.5
 _FINDING_CHARACTERS: Final = 200
 _ANY_SIGN: Final = ("lag_angle", "phase")
 """Keys whose uncertainty may be larger than the value."""
-_KEPT: Final = "the uncertainty before stays, since it is that of both masses too: {} was fitted alone"
-_CUT: Final = "the interval of {} is wider than its value, which a scene cannot state: it has the value"
+_KEPT: Final = "the uncertainty stays as it was, because it applies to both masses: {} was fitted alone"
+_CUT: Final = "the interval of {} is wider than its value, which a scene cannot state: it is cut to the value"
 
 
 def save_result(

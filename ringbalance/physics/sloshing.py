@@ -80,11 +80,7 @@ def _half_widths(
 
 
 def sloshing_modes(
-    *,
-    disc: Disc,
-    fill_ratio: npt.ArrayLike,
-    modes: int = 4,
-    cells: tuple[tuple[int, int], ...] | None = None,
+    *, disc: Disc, fill_ratio: npt.ArrayLike, modes: int = 4, cells: tuple[tuple[int, int], ...] | None = None
 ) -> _SloshingModes:
     """Lowest natural frequencies of the liquid in one chamber, over the angular velocity.
 

@@ -12,7 +12,7 @@ from html import escape
 from io import StringIO
 from itertools import islice
 from os import PathLike
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Final, Literal
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
@@ -63,32 +63,16 @@ class Table:
         return [2 * sum(bool(_NUMBER.match(cell)) for cell in cells) > len(cells) for cells in filled]
 
 
-class _TermUsed(Protocol):
-    """A physical term in the list of models that a result is based on."""
-
-    @property
-    def term(self) -> str:
-        """Name of the term."""
-
-    @property
-    def model(self) -> str:
-        """Model of the term."""
-
-    @property
-    def why(self) -> str:
-        """Basis of the estimated contribution."""
-
-    @property
-    def estimated_contribution(self) -> float | None:
-        """Estimated contribution relative to the result; None: unknown."""
-
-
 _MIN_CONTRIBUTION: Final = 0.1
 """Contribution of a term over the tolerance below which the printed table omits it."""
 
 
-def models_table(models_used: Iterable[_TermUsed], *, tolerance: float) -> Table:
-    """Physical terms of a result with their models, without those far below the tolerance."""
+def models_table(models_used: Iterable[Any], *, tolerance: float) -> Table:
+    """Physical terms of a result with their models, without those far below the tolerance.
+
+    Args: `models_used`: records with `term`, `model`, `why`, and `estimated_contribution`, relative to the
+        result, None where it is unknown.
+    """
     rows = [
         (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)
         for each in models_used

@@ -18,6 +18,7 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.fields import ValueReader
+from ringbalance.scene.keys.reading import SceneInput
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.loader import CHANGED, nameless_scene, scene_of
@@ -49,12 +50,9 @@ def _changed(
     if document == checked.document:
         return scene
     changed = scene_of(
-        document,
-        file=scene.file,
+        _input(scene, checked, document, values),
         source=scene.source.removesuffix(CHANGED) + CHANGED,
-        folder=checked.folder,
         sha256=lambda: _digest(document, checked),
-        derived={} if _concerned(_OF_CHECKS, values) else checked.derived,
         before=checked,
     )
     return _with_same_mesh(scene, changed, values)
@@ -69,10 +67,16 @@ def nameless(scene: Kind, values: Mapping[str, object]) -> tuple[Kind, str]:
     """
     checked = _known(scene)
     document = _changed_document(scene, checked, values, "given")
-    derived = {} if _concerned(_OF_CHECKS, values) else checked.derived
-    changed = nameless_scene(document, file=scene.file, derived=derived, before=checked)
+    changed = nameless_scene(_input(scene, checked, document, values), checked)
     digest = scene.sha256 if document == checked.document else _digest(document, checked)
     return scene_as(type(scene), _with_same_mesh(scene, changed, values)), digest
+
+
+def _input(
+    scene: SceneFile, checked: CheckedValues, document: Mapping[str, Any], values: Iterable[str]
+) -> SceneInput:
+    derived = {} if _concerned(_OF_CHECKS, values) else checked.derived
+    return SceneInput(document=document, file=scene.file, folder=checked.folder, derived=derived)
 
 
 def _digest(document: Mapping[str, Any], checked: CheckedValues) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from functools import cache
 from importlib import resources
 from os import PathLike
@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from typing import Any, Final
 
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean
-from ringbalance.scene.keys.reading import SceneReading, TableRead
+from ringbalance.scene.keys.reading import SceneInput, SceneReading
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
@@ -71,34 +71,24 @@ def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyS
     except (ValueError, RecursionError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise SceneError.of_file(file, f"this is not TOML: {' '.join(reason.split())}") from error
+    mesh_folder = (Path(file).parent if folder is None else folder).absolute()
     return scene_of(
-        document,
-        file=file,
+        SceneInput(document=document, file=file, folder=mesh_folder),
         source=PurePath(file).name,
-        folder=(Path(file).parent if folder is None else folder).absolute(),
         sha256=lambda: hashlib.sha256(content).hexdigest(),
-        derived={},
     )
 
 
 def scene_of(
-    document: Mapping[str, Any],
-    *,
-    file: str,
-    source: str,
-    folder: Path,
-    sha256: Callable[[], str],
-    derived: Mapping[str, Any],
-    before: CheckedValues | None = None,
+    content: SceneInput, *, source: str, sha256: Callable[[], str], before: CheckedValues | None = None
 ) -> AnyScene:
-    """The scene of a document parsed from TOML.
+    """The scene of a document.
 
-    Args: `file`: name for messages. `folder`: folder of the mesh. `sha256`: called if there is no error.
-        `derived`: values by path already read from the mesh; empty: the mesh is read. `before`: checked
-        values of the scene whose document was changed.
+    Args: `sha256`: called if there is no error. `before`: checked values of the scene whose document was
+        changed.
     Raises: SceneError: all errors in the document.
     """
-    reading = _checked_reading(document, file=file, folder=folder, derived=derived, before=before)
+    reading = _checked_reading(content, before)
     decisive = {
         path: value.digest if path == "disc.geometry" else value
         for path, value in reading.values.items()
@@ -125,7 +115,7 @@ def scene_of(
         **_records(reading, before),
         "name": reading.values["name"],
         "source": source,
-        "file": file,
+        "file": content.file,
         "sha256": sha256(),
         "values_sha256": hashlib.sha256(repr(sorted(decisive.items())).encode()).hexdigest(),
         "defaulted": defaulted,
@@ -133,45 +123,35 @@ def scene_of(
     }
     of_mesh = {path: reading.values[path] for path in reading.derived}
     checked = CheckedValues(
-        document=document, folder=folder, parts=parts, derived=of_mesh, tables=reading.tables
+        document=content.document, folder=content.folder, parts=parts, derived=of_mesh, tables=reading.tables
     )
     scene: AnyScene = reading.schema.scene(**parts, checked=checked)
     return scene
 
 
-def nameless_scene(
-    document: Mapping[str, Any], *, file: str, derived: Mapping[str, Any], before: CheckedValues
-) -> AnyScene:
+def nameless_scene(content: SceneInput, before: CheckedValues) -> AnyScene:
     """Make a scene as `scene_of` does, without names, hashes and origins: several times faster."""
-    reading = _checked_reading(document, file=file, folder=before.folder, derived=derived, before=before)
+    reading = _checked_reading(content, before)
     names = dict.fromkeys(("name", "source", "sha256"), "")
-    scene: AnyScene = reading.schema.scene(**_records(reading, before), **names, file=file)
+    scene: AnyScene = reading.schema.scene(**_records(reading, before), **names, file=content.file)
     return scene
 
 
-def _checked_reading(
-    document: Mapping[str, Any],
-    *,
-    file: str,
-    folder: Path,
-    derived: Mapping[str, Any],
-    before: CheckedValues | None,
-) -> SceneReading:
+def _checked_reading(content: SceneInput, before: CheckedValues | None) -> SceneReading:
     """Checked values of a document.
 
     Raises: SceneError: errors in the order of the reference of the scene file, unknown keys last.
     """
-    kind = _kind(document)
-    tables: Mapping[str, TableRead] = before.tables if before and _kind(before.document) == kind else {}
-    reading, read_faults = scene_kind(kind).read(
-        document, file=file, folder=folder, derived=derived, before=tables
-    )
+    kind, file = _kind(content.document), content.file
+    if before and _kind(before.document) == kind:
+        content = replace(content, before=before.tables)
+    reading, read_faults = scene_kind(kind).read(content)
     schema, faults = reading.schema, list(read_faults)
     faulty = {(fault.table, fault.key) for fault in faults}
     for name in schema.tables:
-        content = reading.tables[name].content
+        table = reading.tables[name].content
         for key, origin in reading.values.get(f"{name}.{ORIGIN}", {}).items():
-            if key not in content and (name, key) not in faulty:
+            if key not in table and (name, key) not in faulty:
                 fault = Fault(
                     file=file,
                     table=name,

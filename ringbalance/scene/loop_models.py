@@ -239,9 +239,7 @@ class ControllerSettings:
     assumed_influence_coefficient: Annotated[
         Influence,
         derived(
-            "influence_coefficient of [rotor]",
-            "value used by the controller",
-            "rotor.influence_coefficient",
+            "influence_coefficient of [rotor]", "value used by the controller", "rotor.influence_coefficient"
         ),
         Shown("influence coefficient assumed", "um/(g*mm)"),
     ]
@@ -345,7 +343,7 @@ class RequirementSettings:
     ] = None
     fraction: Annotated[
         ProperFraction,
-        standard(0.9, "fraction of the devices that the scene may be which must meet every requirement"),
+        standard(0.9, "fraction of the drawn devices that must meet every requirement"),
         Shown("fraction of devices required"),
     ] = 0.9
     phase_range: Annotated[

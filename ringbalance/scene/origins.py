@@ -241,16 +241,9 @@ def with_values_at(scene: _SomeScene, values: Mapping[str, Any]) -> _SomeScene:
 
 def moved_at(scene: _SomeScene, path: str, move: Callable[[float], float]) -> _SomeScene:
     """A copy with one value changed by `move`; all of a list where the path has no index."""
-    table, key, entry = _placed(path)
-    record = getattr(scene, table)
-    value = getattr(record, key)
-    moved: Any
-    if isinstance(value, tuple):
-        moved = tuple(move(old) if entry in (None, i) else old for i, old in enumerate(value))
-    else:
-        moved = move(value)
-    changed: dict[str, Any] = {table: replace(record, **{key: moved})}
-    return replace(scene, **changed)
+    before = raw_value_at(scene, path)
+    after = tuple(map(move, before)) if isinstance(before, tuple) else move(before)
+    return with_values_at(scene, {path: after})
 
 
 def _placed(path: str) -> tuple[str, str, int | None]:

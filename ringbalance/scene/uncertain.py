@@ -98,19 +98,11 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
     return {name: width for name, width in widths.items() if np.any(np.greater(width, 0))}
 
 
-def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
-    """The scene with one of its quantities changed, within physical limits.
+def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
+    """The scene with changed quantities, SI, within physical limits; names of those that met a limit.
 
     A quantity that cannot be zero keeps at least a tenth of its value.
     """
-    value = nominal_value(scene=scene, quantity=quantity)
-    if value is None:
-        raise ValueError(f"the scene has no {quantity}")
-    return with_value(scene=scene, quantity=quantity, value=_moved_value(scene.tube, quantity, value, change))
-
-
-def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, tuple[str, ...]]:
-    """The scene with several quantities `shifted` in turn; names of those that met a physical limit."""
     tube, clipped = scene.tube, []
     values: dict[str, dict[str, float]] = {}
     for quantity, change in changes.items():
@@ -118,7 +110,7 @@ def shifted_in_turn(scene: Scene, changes: Mapping[str, float]) -> tuple[Scene, 
         if value is None:
             raise ValueError(f"the scene has no {quantity}")
         moved = _moved_value(tube, quantity, value, change)
-        if not math.isclose(moved, value + change):
+        if np.any(moved != value + change):
             clipped.append(quantity)
         if table == "tube":
             # The tube's radii limit each other.
@@ -182,10 +174,9 @@ def fitted_causes(scene: Scene) -> frozenset[str]:
 
 def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """The scene with changes of inputs, SI, and of errors of models, in standard deviations."""
-    for name, change in changes.items():
-        if not name.startswith(MODEL):
-            scene = shifted(scene=scene, quantity=name, change=change)
     errors = {name: change for name, change in changes.items() if name.startswith(MODEL)}
+    inputs = {name: change for name, change in changes.items() if name not in errors}
+    scene = shifted_in_turn(scene, inputs)[0] if inputs else scene
     return with_model_errors(scene, errors) if errors else scene
 
 

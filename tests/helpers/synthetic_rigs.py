@@ -27,7 +27,7 @@ from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted, with_model_errors
+from ringbalance.scene.uncertain import NORMAL_95, half_widths, moved, nominal_value, with_model_errors
 from scenes import with_tables
 
 SCENES: Final = ("liquid_ring_paper", "six_chamber", "perfluorinated_oil")
@@ -90,7 +90,7 @@ def _drawn(scene: Scene, random: np.random.Generator) -> Scene:
     """The device: every uncertain input and error of its models, drawn from normal distributions."""
     truth = scene
     for name, width in half_widths(scene).items():
-        truth = shifted(scene=truth, quantity=name, change=width / NORMAL_95 * random.standard_normal())
+        truth = moved(truth, {name: width / NORMAL_95 * random.standard_normal()})
     for name in MODEL_ERRORS:
         truth = with_model_errors(truth, {name: float(np.clip(random.standard_normal(), *_DRAWN))})
     return truth

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ringbalance.mesh.chamber_table import ChamberTable, _TiltedLiquid, chamber_table, tilted_liquid
+from ringbalance.mesh.chamber_table import ChamberTable, TiltedLiquid, chamber_table, tilted_liquid
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.reference.chambers import block_chamber
 
@@ -44,7 +44,7 @@ def section(level: float, centre: tuple[float, float]) -> FloatArray:
     return np.array([sum(quad(f, a, b, epsrel=1e-11)[0] for a, b in pairwise(points)) for f in functions])
 
 
-def compared(found: _TiltedLiquid, at: tuple[int, int], expected: FloatArray) -> None:
+def compared(found: TiltedLiquid, at: tuple[int, int], expected: FloatArray) -> None:
     """Pieces of 1e-12 of the volume are left alone, and the square of 1e-8 of it."""
     moment, square = WIDTH * expected[1], expected[2] / (2 * HALF)
     assert found.moment[at] == pytest.approx(moment, rel=1e-8)

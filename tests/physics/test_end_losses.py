@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.tube.local_losses import _end_table, _laminar_entrance_loss, _laminar_exit_loss
+from ringbalance.physics.tube.local_losses import _end_loss, _end_table
 from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution
 from ringbalance.verification.navier_stokes.tube import (
@@ -68,7 +68,7 @@ def entry_length(*, system: FlowSystem, solution: FlowSolution, cells: EndMesh, 
 def test_entrance_loss_and_entry_length_at_reynolds_60() -> None:
     flow = solve_end(system=_system("entrance"), reynolds=60.0, start=_creeping("entrance"))
     assert flow.status.ok
-    found = _laminar_entrance_loss(reynolds=60.0)
+    found = _end_loss("entrance", 60.0)
     assert _loss("entrance", flow) / 60 == pytest.approx(float(found.value), rel=5e-3)
     length = entry_length(system=_system("entrance"), solution=flow, cells=_cells("entrance"))
     # 0.6/(1 + 0.035 Re) + 0.056 Re: Atkinson et al., cited by Shah and London (1978), for a uniform inflow.
@@ -77,11 +77,11 @@ def test_entrance_loss_and_entry_length_at_reynolds_60() -> None:
 
 def test_exit_loss_at_reynolds_7() -> None:
     flow = solve_end(system=_system("exit"), reynolds=7.0, start=_creeping("exit"))
-    assert _loss("exit", flow) / 7 == pytest.approx(float(_laminar_exit_loss(reynolds=7.0).value), abs=5e-3)
+    assert _loss("exit", flow) / 7 == pytest.approx(float(_end_loss("exit", 7.0).value), abs=5e-3)
 
 
 def test_both_ends_cost_about_2_3_laminar_and_1_57_turbulent() -> None:
-    laminar = _laminar_entrance_loss(reynolds=1000.0).value + _laminar_exit_loss(reynolds=1000.0).value
+    laminar = _end_loss("entrance", 1000.0).value + _end_loss("exit", 1000.0).value
     assert float(laminar) == pytest.approx(2.3, abs=0.03)
     assert entrance_sharp() + exit_normal() == pytest.approx(1.57, abs=0.01)
 
@@ -95,11 +95,8 @@ def test_the_committed_table_is_whole_and_fine_enough() -> None:
     for end in ("entrance", "exit"):
         assert _end_table(end).interpolation_error < 5e-3
     reynolds = np.geomspace(1.0, 2000.0, 50)
-    assert np.all(
-        _laminar_entrance_loss(reynolds=reynolds).uncertainty
-        < 0.01 * _laminar_entrance_loss(reynolds=reynolds).value
-    )
-    assert np.all(_laminar_exit_loss(reynolds=reynolds).uncertainty < 0.003 + 0.03 / reynolds)
+    assert np.all(_end_loss("entrance", reynolds).uncertainty < 0.01 * _end_loss("entrance", reynolds).value)
+    assert np.all(_end_loss("exit", reynolds).uncertainty < 0.003 + 0.03 / reynolds)
 
 
 @pytest.mark.heavy
@@ -124,14 +121,14 @@ def test_unseen_reynolds_numbers_in_a_larger_domain(end: End, reynolds: float) -
         assert flow.status.ok
     assert flow is not None
     found = end_loss_times_reynolds(system=system, solution=flow, end=end, cells=cells) / reynolds
-    table = (_laminar_entrance_loss if end == "entrance" else _laminar_exit_loss)(reynolds=reynolds)
+    table = _end_loss(end, reynolds)
     assert found == pytest.approx(float(table.value), rel=0.01 if end == "entrance" else 0, abs=2e-3)
 
 
 @given(reynolds=st.floats(1e-3, 2000.0), growth=st.floats(1.01, 5.0))
 def test_losses_are_finite_and_the_entrance_falls_with_reynolds(reynolds: float, growth: float) -> None:
     pair = [reynolds, min(growth * reynolds, 2000.0)]
-    entrance, leaving = _laminar_entrance_loss(reynolds=pair), _laminar_exit_loss(reynolds=pair)
+    entrance, leaving = _end_loss("entrance", pair), _end_loss("exit", pair)
     assert entrance.status.ok
     assert leaving.status.ok
     assert entrance.value[0] >= entrance.value[1] - 2e-3
@@ -141,15 +138,15 @@ def test_losses_are_finite_and_the_entrance_falls_with_reynolds(reynolds: float,
 
 
 def test_above_the_table_the_answer_says_so() -> None:
-    found = _laminar_entrance_loss(reynolds=[100.0, 5000.0])
+    found = _end_loss("entrance", [100.0, 5000.0])
     assert found.status.code is StatusCode.OUT_OF_RANGE
     assert found.uncertainty[1] > 0.25 > found.uncertainty[0]
 
 
 def test_the_half_width_does_not_step_where_the_table_ends() -> None:
     """Errors of k are a share of it, and a step of k would make the head fall where the velocity grows."""
-    for loss in (_laminar_entrance_loss, _laminar_exit_loss):
+    for end in ("entrance", "exit"):
         re = np.linspace(1500, 2600, 2001)
-        width = loss(reynolds=re).uncertainty
+        width = _end_loss(end, re).uncertainty
         assert np.max(np.abs(np.diff(width))) < 1e-3
         assert width[-1] - width[0] > 0.25

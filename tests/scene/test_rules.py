@@ -48,7 +48,7 @@ BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
         ("trial_time_executed", (0.0999, 0.1, 0.2), (0.1, 0.1, 0.2)),
         ("trial_time_executed", (0.2001, 0.1, 0.2), (0.2, 0.1, 0.2)),
         ("steps_in_order", (0.1001, 0.1), (0.1, 0.1)),
-        ("above", (1e-8, 1e-8), (1.01e-8, 1e-8)),
+        ("limit_above_noise", (1e-8, 1e-8), (1.01e-8, 1e-8)),
         ("sequence_complete", (("A", "C", "B", "E"), 4), (("D", "C", "B", "A"), 4)),
     ],
 )

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.integrate import quad_vec
 from scipy.optimize import brentq, minimize_scalar
 
+from ringbalance.mesh.faceting import drawing_shares
 from ringbalance.mesh.geometry import (
     chamber_volume,
     half_angle,
@@ -22,7 +23,7 @@ from ringbalance.mesh.geometry import (
 )
 from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
 from ringbalance.mesh.wall_integrals import gauss
-from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.reduced_model.crater import Crater, crater_range
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray

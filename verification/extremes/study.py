@@ -94,8 +94,8 @@ class AxisSweep:
     def spans(self) -> list[Record]:
         """Intervals with one ending, from one end of the axis to the other.
 
-        Each has its first and last value in the unit of the axis, the ending of its points and loops, and the
-        message of its first point, the first interval that of its last point.
+        Each has its first and last value in the unit of the axis, the ending of its points and loops, and a
+        message: of the first interval that of its last point, of the others that of their first.
         """
         values, spans = self.values, []
         for _, group in groupby(range(len(values)), key=lambda i: _outcome(self.judgements[i])):

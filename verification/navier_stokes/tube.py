@@ -170,7 +170,7 @@ def solve_section(
 
 
 def section_coefficients(*, kl: float, s: float, inertia: float = 1.0) -> Coefficients:
-    """Coefficients of developed flow, velocities along (y, z) over nu/d and along x over U."""
+    """Coefficients of developed flow, velocity along (y, z, x): the first two over nu/d, the last over U."""
     rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (-2 * s, 0.0, 0.0))
     return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
 

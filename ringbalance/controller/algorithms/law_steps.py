@@ -56,9 +56,9 @@ def distance(m: Query, r: int, ux: float, uy: float) -> float:
 def see_response(m: Query, r: int, half: int, amplitude_square: float, phase_square: float) -> bool:
     """Judge if the vibration has not moved as it should, and if one pair that gave nothing explains it.
 
-    Differences that noise or a coefficient still learnt can make do not count. Any other pair with a command
-    above the noise gives liquid.
-    Returns: true if the liquid of all opened pairs is estimated as it moves.
+    Differences that noise or the present error of the influence coefficient can make do not count. Any other
+    pair whose command would show above the noise gives liquid.
+    Returns: false if an opened pair gives nothing, so that its estimated liquid has not moved.
     """
     x = m[r + SEEN_X]
     y = m[r + SEEN_Y]

@@ -50,7 +50,7 @@ def direction(c: Law, chamber: int) -> int:
 
 @both_ways
 def place_of(c: Law, chamber: int) -> int:
-    """Place of a chamber's memory, counted as for `direction`."""
+    """Index of a chamber's memory, counted as for `direction`."""
     return FIRST_CHAMBER + PER_CHAMBER * ((direction(c, chamber) - DIRECTIONS) // 3)
 
 

@@ -165,7 +165,7 @@ class EccentricMassBalancer(Balancer):
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
-        """Demands: settled in time, at the latest when the speed changes; residual vibration if stated."""
+        """Settled within the stated time, else until the speed changes; and residual vibration, if stated."""
         scene, requirement = self.scene, self.scene.requirement
         until = (scene.steady_until or scene.run.time_limit) - scene.supervisor.start
         time = until if requirement.settling_time is None else requirement.settling_time

@@ -19,7 +19,7 @@ from ringbalance.scene.platform.compiled import in_place
 SMOOTHING_TIME_S: Final = 0.05
 """Time constant of the smoothed angles and rates by which arrival is judged."""
 SLOWEST_RATE_RAD_S: Final = 1e-3
-"""Smallest rate below which a mass counts as resting, even with an exact encoder."""
+"""Lower bound of the rate below which a mass counts as resting, for an exact encoder."""
 _BREAK_AWAY_SIGMA: Final = 3.0
 """Standard deviations of the friction arm that are added to its estimate to break a resting mass away."""
 Pair = tuple[float, float]

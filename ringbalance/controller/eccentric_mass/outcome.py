@@ -36,4 +36,4 @@ OF_DRIVES: Final = frozenset(
         EccentricOutcome.FRICTION_UNCERTAIN,
     }
 )
-"""Outcomes that unstable drives may cause, or drives that give more than friction takes."""
+"""Outcomes that unstable drives, or drives that overcompensate friction, may cause."""

@@ -268,7 +268,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def targets(self) -> Targets | None:
-        """Targets for the estimated imbalance; None if the run ended before the estimate."""
+        """Targets for the estimated imbalance; None if the run never came to positioning."""
         if not self.friction_known:
             return None
         x, y = self.history["imbalance"][-1]
@@ -290,7 +290,7 @@ class EccentricRun(PresentedResult):
 
     @property
     def residual_ratio(self) -> float | None:
-        """Final amplitude over `unbalanced_amplitude`; None if the latter is zero."""
+        """Final amplitude over `unbalanced_amplitude`; None if the latter is zero but for rounding."""
         unbalanced = self.unbalanced_amplitude
         return None if unbalanced < _ROUNDING_FRACTION * self.limit else self.final_amplitude / unbalanced
 

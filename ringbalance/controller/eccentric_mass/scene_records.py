@@ -184,7 +184,7 @@ class EccentricRequirement:
     ] = None
     fraction: Annotated[
         ProperFraction,
-        standard(0.9, "fraction of the devices that the scene may be which must meet every requirement"),
+        standard(0.9, "fraction of the drawn devices that must meet every requirement"),
     ] = 0.9
     phase_range: Annotated[
         Angle,
@@ -365,10 +365,10 @@ CHECKS: tuple[Check, ...] = (
     check(_profile_in_order, "rotor.speed_profile"),
     check(_imbalance_in_rotor, "imbalance.mass", "rotor.mass"),
     check(_masses_fit_track, _ARC, _GUIDE),
-    check(_masses_apart, "masses.initial_angle", _ARC, _GUIDE, moot=(_masses_fit_track,)),
+    check(_masses_apart, "masses.initial_angle", _ARC, _GUIDE, moot=("masses_fit_track",)),
     *(check(_step_is_multiple, step, "sensor.step") for step in _STEPS),
     check(_moves_in_order, "fine_tuning.stop", "fine_tuning.step"),
-    check(limit_above_noise("position_noise", "mm"), "supervisor.limit", "sensor.position_noise"),
+    limit_above_noise("supervisor.limit", "sensor.position_noise", "mm"),
     *_width_checks(),
 )
 

@@ -158,7 +158,7 @@ def is_constant(motion: Motion) -> bool:
 def _imbalance(
     gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float, visible: bool
 ) -> None:
-    """Estimate the imbalance until it is precise relative to itself, or makes no difference to the limit."""
+    """Estimate the imbalance until its error is small, relative to itself or, as vibration, to the limit."""
     precise = memory.deviation <= gates.imbalance_gate * abs(memory.imbalance)
     little = 2 * memory.deviation * abs(_influence_of(law, motion.speed)) <= 0.1 * gates.limit
     elapsed = time - memory.entered
@@ -177,7 +177,7 @@ def _imbalance(
 
 @in_place
 def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
-    """Estimate both friction arms until they are precise relative to themselves, or make no difference."""
+    """Estimate both friction arms until their errors are small, relative to the arms or for the arrival."""
     elapsed, precise = time - memory.entered, True
     # Without the time in which the drives start.
     if elapsed >= 0.5 * gates.least_drive:

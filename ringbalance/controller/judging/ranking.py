@@ -54,7 +54,8 @@ class Deciding:
     measure: str
     """Code of the finding that says what to measure; empty: nothing can be measured."""
     middle: Proportion
-    """Fraction that meets every demand, of the devices with the input in its interquartile range."""
+    """Fraction that meets every demand, of the devices with the input in its interquartile range: about the
+    fraction if the input were known twice as well."""
 
     @property
     def decides(self) -> bool:

@@ -315,11 +315,11 @@ class LiquidRingBalancer(Balancer):
         return tuple(beyond_capacity(liquid_ring_scene(scene), self.model, ended, settings=settings))
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Quantities of its calibration."""
+        """Quantities of the scene's calibration."""
         return calibrate(self.scene).rows().quantities
 
     def rows(self, run: Simulation) -> Rows:
-        """Rows of a run, with its ends under both limits of an unknown gas line."""
+        """Rows of a run, with its results at both ends of the default range of an unstated gas line."""
         rows = run.rows()
         return replace(rows, tables=(line_runs_table(line_runs(run)), *rows.tables))
 

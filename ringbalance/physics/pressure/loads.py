@@ -121,11 +121,7 @@ class ImportedRing:
 
 
 def solved_ring(
-    *,
-    geometry: ChamberGeometry,
-    density: float,
-    angular_velocity: float,
-    surface_radius: float,
+    *, geometry: ChamberGeometry, density: float, angular_velocity: float, surface_radius: float
 ) -> ImportedRing:
     """Pressure and loads of the liquid outside a concentric free surface.
 

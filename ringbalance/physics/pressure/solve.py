@@ -161,10 +161,7 @@ def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
     # Symmetric mode halves the fill of the default ordering; a positive definite matrix needs no pivoting.
     try:
         factor = splu(
-            matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
     except RuntimeError:  # singular: the residual of zeros says so
         return np.zeros_like(right)

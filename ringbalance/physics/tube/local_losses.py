@@ -95,6 +95,17 @@ def _end_value(end: str, reynolds: npt.ArrayLike) -> FloatArray:
 
 
 def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
+    """Loss of a sharp-edged "entrance" from, or "exit" into, a large reservoir, laminar.
+
+    K_ent = 2 (p_reservoir - p_tube)/(rho U^2) and K_exit = 2 (p_mouth - p_reservoir)/(rho U^2), with the
+    developed line of p extrapolated to the end. K_ent contains the developed stream's kinetic factor 2;
+    creeping, it is 0.986 * 6 pi/Re. K_exit is about zero at high Re, where the stream leaves with the
+    pressure of the reservoir.
+    Returns: Estimate of K, the same shape; OUT_OF_RANGE above Re = 2000.
+    Raises: ValueError: a Reynolds number that is not finite and above zero.
+    Range: 0 < Re <= 2000, tube long enough for flow to develop.
+    Source: finite elements, `end_losses`.
+    """
     re, value, table = np.asarray(reynolds, dtype=np.float64), _end_value(end, reynolds), _end_table(end)
     inside = np.minimum(re, _LARGEST_REYNOLDS)
     a = np.log1p(inside / _REYNOLDS_SCALE)
@@ -120,28 +131,6 @@ def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
         ),
         status=status,
     )
-
-
-def _laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
-    """Loss of a sharp-edged entrance from a large reservoir, laminar.
-
-    K_ent = 2 (p_reservoir - p_tube)/(rho U^2) with the developed line of p extrapolated to the entrance; it
-    contains the developed stream's kinetic factor 2.  Creeping: 0.986 * 6 pi/Re.
-    Returns: Estimate of K_ent, the same shape; OUT_OF_RANGE above Re = 2000.
-    Raises: ValueError: a Reynolds number that is not finite and above zero.
-    Range: 0 < Re <= 2000, tube long enough for flow to develop.
-    Source: finite elements, `end_losses`.
-    """
-    return _end_loss("entrance", reynolds)
-
-
-def _laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
-    """Loss of a sharp-edged exit into a large reservoir, laminar and developed; otherwise as the entrance.
-
-    K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p extrapolated to the mouth; about
-    zero at high Re, where the stream leaves with the pressure of the reservoir.
-    """
-    return _end_loss("exit", reynolds)
 
 
 def kinetic_factor(
@@ -192,7 +181,7 @@ def entrance_loss(*, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.Ar
     Laminar: K_ent - 2 of a sharp entrance by finite elements, turbulent: the entrance's K, blended over the
     transition.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts.
-    Source: `_laminar_entrance_loss`; an entrance that is not sharp has the same laminar value with a
+    Source: `_end_loss`; an entrance that is not sharp has the same laminar value with a
         wider half-width.
     """
     turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
@@ -207,7 +196,7 @@ def entrance_uncertainty(
     re = np.asarray(reynolds, dtype=np.float64)
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     turbulent, half_width = _turbulent_entrance_loss(tube=tube)
-    table = _laminar_entrance_loss(reynolds=re)
+    table = _end_loss("entrance", re)
     unlike = 0.0 if tube.entrance == "sharp" else _OTHER_ENTRANCE + 0.2 * _CREEPING / re
     uncertainty_95 = (1 - turned) * (table.uncertainty + unlike) + turned * half_width
     return np.hypot(uncertainty_95, 2 * turned * (1 - turned) * (table.value - 2 - turbulent))
@@ -221,7 +210,7 @@ def exit_loss(
     In turbulent flow it is zero, because there the "+1" is the whole exit loss.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
         laminar flow, broadcasts.
-    Source: alpha of `kinetic_factor`; K_exit from `_laminar_exit_loss`, which is for the profile
+    Source: alpha of `kinetic_factor`; K_exit from `_end_loss`, which is for the profile
         without rotation.
     """
     turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
@@ -241,7 +230,7 @@ def exit_uncertainty(
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     undeveloped = np.minimum(1.0, LAMINAR_ENTRY_LENGTH * re * tube.bore / tube.length)
     blunted = ROTATING_PROFILE_UNCERTAINTY * np.minimum(1.0, (ratio - 1) / 0.1)
-    laminar = _laminar_exit_loss(reynolds=re).uncertainty + 0.3 * undeveloped + blunted
+    laminar = _end_loss("exit", re).uncertainty + 0.3 * undeveloped + blunted
     return np.hypot((1 - turned) * laminar + 0.06 * turned, 2 * turned * (1 - turned))
 
 

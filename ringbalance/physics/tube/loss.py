@@ -142,13 +142,7 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
     )
     smooth = friction_factor(reynolds=re, relative_roughness=rough)
     bends = (
-        bend_uncertainty(
-            bend=bend,
-            bore=tube.bore,
-            friction_factor=smooth,
-            critical_ratio=ratio,
-            **numbers,
-        )
+        bend_uncertainty(bend=bend, bore=tube.bore, friction_factor=smooth, critical_ratio=ratio, **numbers)
         for bend in tube.bends
     )
     development = _development_uncertainty(

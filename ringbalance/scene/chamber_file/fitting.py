@@ -41,12 +41,7 @@ class Placed:
 
 
 def placed(
-    body: Body,
-    boundaries: Mapping[str, IntArray],
-    surface: IntArray,
-    *,
-    axis: Axis,
-    middle: float | None,
+    body: Body, boundaries: Mapping[str, IntArray], surface: IntArray, *, axis: Axis, middle: float | None
 ) -> tuple[Placed, tuple[Contradiction, ...]]:
     """A body rotated so that z is the shaft and x the middle of the chamber, and errors of its position.
 

@@ -59,12 +59,7 @@ class Bounds:
 
     def __str__(self) -> str:
         """The interval in words, such as "above 0 and at most 1"."""
-        named = {
-            "above": self.above,
-            "at least": self.at_least,
-            "at most": self.at_most,
-            "below": self.below,
-        }
+        named = {"above": self.above, "at least": self.at_least, "at most": self.at_most, "below": self.below}
         return " and ".join(f"{words} {bound:g}" for words, bound in named.items() if bound is not None)
 
 
@@ -353,7 +348,6 @@ ProperFraction = Annotated[float, share(Bounds(above=0, below=1), example=0.5)]
 Gate = Annotated[float, share(Bounds(above=0, at_most=1), example=0.01)]
 Angles = Annotated[tuple[float, float], each_of(angle_of_turn(), count=2, example='["0 deg", "180 deg"]')]
 Arms = Annotated[
-    tuple[float, float],
-    each_of(quantity("length", NOT_NEGATIVE), count=2, example='["10 mm", "10 mm"]'),
+    tuple[float, float], each_of(quantity("length", NOT_NEGATIVE), count=2, example='["10 mm", "10 mm"]')
 ]
 Teeth = Annotated[tuple[int, int, int], each_of(whole(1, 100000), count=3, example="[10, 40, 400]")]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any, Literal
 
 from ringbalance.scene.faults import MISSING, Fault, closest, meant_text
@@ -44,6 +44,26 @@ class TableRead:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SceneInput:
+    """A document to be read into a scene."""
+
+    document: Mapping[str, Any]
+    """Content of a scene file, parsed from TOML."""
+    file: str
+    """Name of the file, for messages."""
+    folder: Path
+    """Folder from which a mesh is read."""
+    derived: Mapping[str, Any] = field(default_factory=dict)
+    """Values by path already read from the mesh; empty: the mesh is read."""
+    before: Mapping[str, TableRead] = field(default_factory=dict)
+    """Tables of the document from which this one was made."""
+
+    def read(self, schema: Schema) -> tuple[SceneReading, tuple[Fault, ...]]:
+        """Values by the declared keys, and an error for each value, key or table that cannot be read."""
+        return read_document(self.document, file=self.file, schema=schema, before=self.before)
+
+
+@dataclass(frozen=True, kw_only=True)
 class SceneReading:
     """Content of a scene file as read so far; paths are "table.key", or "key" at the top level."""
 
@@ -77,7 +97,7 @@ class SceneReading:
 
     def known(self, *paths: str) -> bool:
         """True when there is a value for each path, read or by default."""
-        return all(path in self.values for path in paths)
+        return self.values.keys() >= {*paths}
 
     def lacks(self, path: str) -> bool:
         """True when a value is missing; False when it is present but unreadable."""
@@ -117,14 +137,16 @@ class SceneReading:
         A key is declared after those from which its default is derived, so that their values are known first;
         a needed key is derived from values in the file.
         """
-        unnamed = self.lacks("name")
-        reading = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
+        values = dict(self.values)
+        if self.lacks("name"):
+            values["name"] = PurePath(self.file).stem or "scene"
         for path, presence in self.schema.following:
-            if path not in reading.values and reading.lacks(path) and reading.known(*presence.needs):
+            if path not in values and self.lacks(path) and values.keys() >= {*presence.needs}:
                 needs = (*presence.needs, *presence.also)
-                result = presence.value(*(reading.values.get(need) for need in needs))
-                reading = reading if result is None else reading.adding({path: result})
-        return reading
+                result = presence.value(*(values.get(need) for need in needs))
+                if result is not None:
+                    values[path] = result
+        return replace(self, values=values)
 
     def missing_faults(self) -> Iterator[Fault]:
         """One error for each missing key, defaults included; one for a whole table that is missing."""

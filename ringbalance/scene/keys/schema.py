@@ -137,18 +137,15 @@ def _half_width_of(table: str, key: Key) -> Key:
 
 _TOLERANCE = Key(
     takes=share(Bounds(above=0, below=1), example=0.01),
-    presence=standard(
-        "1 %",
-        "relative bound on discretisation, for meshes and gravity in finite elements",
-    ),
+    presence=standard("1 %", "relative bound on discretisation, for meshes and gravity in finite elements"),
 )
 _RUN = {
     "run": TableSchema.of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": TableSchema(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
     "fitted": TableSchema.of(
         Fitted,
-        "what a fit leaves uncertain, jointly: standard deviations of the values in this file, and how they "
-        "go together; `ringbalance fit --save` writes it",
+        "joint uncertainty that a fit leaves: standard deviations of the values in this file, and their "
+        "correlations; `ringbalance fit --save` writes it",
     ),
     "measured": TableSchema.of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
@@ -159,17 +156,14 @@ _RUN = {
 _VIBRATION = Key(
     takes=Entries(record=loop_models.Vibration, keys=keys_of(loop_models.Vibration), example=""),
     presence=standard(
-        {"amplitude": "10 um", "phase": "90 deg"},
-        "{ amplitude, phase } before balancing, zero-to-peak",
+        {"amplitude": "10 um", "phase": "90 deg"}, "{ amplitude, phase } before balancing, zero-to-peak"
     ),
 )
 """One key, whose entries are two fields of the rotor's record."""
 _LIQUID_RING = {
     # The dimensions of the chambers, or the mesh of one from which they follow.
     "disc": TableSchema(
-        text="the balancing disc",
-        keys={**keys_of(models.Disc), **keys_of(MeshKeys)},
-        record=models.Disc,
+        text="the balancing disc", keys={**keys_of(models.Disc), **keys_of(MeshKeys)}, record=models.Disc
     ),
     "liquid": TableSchema.of(models.Liquid, "the balancing liquid"),
     "tube": TableSchema.of(models.Tube, "the tube that connects two opposite chambers"),

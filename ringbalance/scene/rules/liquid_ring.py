@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.scene.chamber_file.record import MeshKeys
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.keys.reading import SceneReading, TableRead, read_document
+from ringbalance.scene.keys.reading import SceneInput, SceneReading
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.kinds import SceneKind, failed_checks
 from ringbalance.scene.liquids import with_liquid
@@ -19,19 +17,12 @@ from ringbalance.scene.registry import registered
 from ringbalance.scene.rules import shape, working
 
 
-def _read(
-    document: Mapping[str, Any],
-    *,
-    file: str,
-    folder: Path,
-    derived: Mapping[str, Any],
-    before: Mapping[str, TableRead],
-) -> tuple[SceneReading, tuple[Fault, ...]]:
-    reading, faults = read_document(document, file=file, schema=LIQUID_RING, before=before)
-    if derived:
-        reading = reading.following(derived)
+def _read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
+    reading, faults = content.read(LIQUID_RING)
+    if content.derived:
+        reading = reading.following(content.derived)
     elif any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
-        reading, mesh_faults = registered("function", "with_chamber")(reading, folder=folder)
+        reading, mesh_faults = registered("function", "with_chamber")(reading, folder=content.folder)
         faults = (*faults, *mesh_faults)
     reading = reading.completed()
     port_radius, hump_radius = reading.values.get("tube.port_radius"), reading.values.get("tube.hump_radius")

@@ -1,17 +1,13 @@
-"""Rules of shape for the disc and its tube.
-
-Symbols: R1, R2 radii of the chamber, t plate thickness, theta central angle, r_p and r_m radii of port and
-siphon crest, d bore, L length of the tube.
-"""
+"""Rules of shape for the disc and its tube."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from ringbalance.scene.keys.derivations import even_number_of_chambers, shortest_path, swept_area
 from ringbalance.scene.keys.reading import SceneReading
-from ringbalance.scene.kinds import Check, Contradiction, check, written
-from ringbalance.scene.models import Bend
+from ringbalance.scene.kinds import Check, Contradiction, check, condition, written
 
 _ROUNDING = 1e-9
 _NARROWEST = 1 / 2000
@@ -20,113 +16,6 @@ _SHALLOWEST = 1e-8
 """Depth over outer radius of a full ring; calibration goes down to a fortieth of its fill."""
 DRAWING_ROUNDING = 1e-5
 """Relative rounding of values in drawings: "1.5708 rad" is a right angle."""
-
-
-def _radii_in_order(inner: float, outer: float) -> Contradiction | None:
-    """R1 < R2."""
-    if inner < outer:
-        return None
-    return Contradiction(
-        problem=f"the inner radius must be smaller than outer_radius ({written(outer, 'mm')})",
-        allowed=f"above 0 mm and below {written(outer, 'mm')}",
-    )
-
-
-def _chamber_has_depth(inner: float, outer: float) -> Contradiction | None:
-    """R2 - R1 >= 1e-8 R2."""
-    least = _SHALLOWEST * outer
-    if outer - inner >= least:
-        return None
-    return Contradiction(
-        problem=f"the chamber is too shallow to be resolved: outer_radius is {written(outer, 'mm')}",
-        allowed=f"at least {_SHALLOWEST:g} of outer_radius, {written(least, 'mm')}, below outer_radius",
-    )
-
-
-def _fill_has_depth(share: float, inner: float, outer: float) -> Contradiction | None:
-    """The ring at max_fill_ratio is at least 1e-8 R2 deep: R2 - sqrt(R2^2 - x (R2^2 - R1^2)).
-
-    Geometry without plates, which at most halve the depth.
-    """
-    lowest = _SHALLOWEST * outer * (2 - _SHALLOWEST) * outer / ((outer - inner) * (outer + inner))
-    if share >= lowest:
-        return None
-    # The allowed value is rounded up, so that the value in the message passes.
-    return Contradiction(
-        problem=f"the ring would be shallower than {_SHALLOWEST:g} of outer_radius "
-        f"({written(outer, 'mm')}), too shallow to be resolved",
-        allowed=f"at least {min(1.0, 1.01 * lowest):.3g} for this disc, at most 1",
-    )
-
-
-def _chamber_wide_enough(angle: float, thickness: float, inner: float, outer: float) -> Contradiction | None:
-    """The opening between the plates is at least 1/2000 of the depth: 2 R1 (theta/2 - asin(t/R1)).
-
-    Rounding in elongated cells grows with the square of depth over opening.
-    """
-    lowest = 2 * math.asin(thickness / inner) + _NARROWEST * (outer - inner) / inner
-    if angle >= lowest:
-        return None
-    return Contradiction(
-        problem=f"the chamber's opening at inner_radius ({written(inner, 'mm')}) is below 1/2000 of its "
-        "depth, too narrow to be resolved",
-        allowed=f"at least {written(1.001 * lowest, 'deg')} for these radii and this plate_thickness",
-    )
-
-
-def _plates_leave_room(thickness: float, inner: float, angle: float) -> Contradiction | None:
-    """The plates leave an opening at the inner radius: asin(t/R1) < theta/2."""
-    limit = inner * math.sin(min(angle, math.pi) / 2)
-    if thickness < limit:
-        return None
-    return Contradiction(
-        problem=f"the plates close the chamber at inner_radius ({written(inner, 'mm')})",
-        allowed=f"at least 0 mm and below inner_radius * sin(central_angle / 2) = {written(limit, 'mm')}",
-    )
-
-
-def _chambers_fit(angle: float, chambers: int) -> Contradiction | None:
-    """n theta <= 2 pi, within the rounding of a drawing."""
-    limit = 2 * math.pi / chambers
-    if angle <= limit * (1 + DRAWING_ROUNDING):
-        return None
-    return Contradiction(
-        problem=f"{chambers} chambers of this angle do not fit into 360 deg",
-        allowed=f"above 0 deg and at most 360 deg / chambers = {written(limit, 'deg')}",
-    )
-
-
-def _chambers_even(angle: float) -> Contradiction | None:
-    """2 pi / theta is an even whole number."""
-    if even_number_of_chambers(angle) is not None:
-        return None
-    return Contradiction(
-        problem=f"360 deg / central_angle = {2 * math.pi / angle:.6g} is not an even number of chambers, at "
-        "least four",
-        allowed="90 deg, 60 deg, 45 deg, 36 deg ... (13.8462 deg for 26 chambers at the most), or at most "
-        "90 deg with chambers given as well",
-    )
-
-
-def _fills_share_the_liquid(initial: float, share: float) -> Contradiction | None:
-    """Two opposite chambers of equal fill share max_fill_ratio."""
-    if abs(2 * initial - share) <= _ROUNDING * share:
-        return None
-    return Contradiction(
-        problem=f"two opposite chambers start with equal fills that add up to max_fill_ratio ({share:g})",
-        allowed=f"{share / 2:g}, or leave the key out",
-    )
-
-
-def _port_in_chamber(port: float, inner: float, outer: float) -> Contradiction | None:
-    """R1 < r_p <= R2."""
-    if inner < port <= outer:
-        return None
-    inside = f"above inner_radius ({written(inner, 'mm')})"
-    return Contradiction(
-        problem="the port lies outside the chamber",
-        allowed=f"{inside} and at most outer_radius ({written(outer, 'mm')})",
-    )
 
 
 def _port_under_liquid(
@@ -167,28 +56,6 @@ def _inlet_above_liquid(
     )
 
 
-def _hole_fits_chamber(diameter: float, width: float, inner: float, outer: float) -> Contradiction | None:
-    """The hole is no larger than the chamber."""
-    limit = min(width, outer - inner)
-    if diameter <= limit:
-        return None
-    return Contradiction(
-        problem="the gas hole is larger than the chamber",
-        allowed=f"above 0 mm and at most {written(limit, 'mm')}, the smaller of axial_width and "
-        "outer_radius - inner_radius",
-    )
-
-
-def _hole_is_the_inlet(hole: float, inlet: float) -> Contradiction | None:
-    """Gas enters through the hole."""
-    if abs(hole - inlet) <= _ROUNDING * inlet:
-        return None
-    return Contradiction(
-        problem=f"gas enters the chambers at gas.inlet_radius ({written(inlet, 'mm')})",
-        allowed="that radius, or one of both keys alone",
-    )
-
-
 def _fraction_outside(radius: float, inner: float, outer: float, angle: float, thickness: float) -> float:
     """Fill ratio at which the free surface lies at a radius."""
     within = swept_area(
@@ -197,112 +64,49 @@ def _fraction_outside(radius: float, inner: float, outer: float, angle: float, t
     return float((within[2] - within[1]) / (within[2] - within[0]))
 
 
-def _crest_in_disc(crest: float, outer: float) -> Contradiction | None:
-    """r_m < R2, which holds for a crest inside any port."""
-    if crest < outer:
-        return None
-    most = f"which is at most outer_radius ({written(outer, 'mm')})"
-    return Contradiction(
-        problem="the siphon crest lies outside the port, and outside the chamber's outer wall too",
-        allowed=f"above 0 mm and below port_radius, {most}",
-    )
+def _shortest(values: Any, crest: float | None) -> dict[str, float]:
+    """Shortest path between ports anywhere in opposite chambers, at least pi - theta apart, m."""
+    apart = max(math.pi - values.central_angle, 0.0)
+    least = shortest_path(port_radius=values.port_radius, hump_radius=crest, separation=apart)
+    return {"least": least}
 
 
-def _crest_inside_port(crest: float, port: float) -> Contradiction | None:
-    """r_m < r_p."""
-    if crest < port:
-        return None
-    return Contradiction(
-        problem="the siphon crest lies outside the port, but it is the smallest radius on the path",
-        allowed=f"above 0 mm and below port_radius ({written(port, 'mm')}), or leave the key out",
-    )
+def _least_fill(values: Any) -> dict[str, float]:
+    """Least max_fill_ratio of a ring that is at least 1e-8 R2 deep, R2 - sqrt(R2^2 - x (R2^2 - R1^2)).
+
+    Geometry without plates, which at most halve the depth.
+    """
+    inner, outer = values.inner_radius, values.outer_radius
+    least = _SHALLOWEST * outer * (2 - _SHALLOWEST) * outer / ((outer - inner) * (outer + inner))
+    # The allowed value is rounded up, so that the value in the message passes.
+    return {"least": least, "allowed": min(1.0, 1.01 * least)}
 
 
-def _bore_fits_bends(bore: float, bends: tuple[Bend, ...]) -> Contradiction | None:
-    """The inner side of each bend is curved: d/2 <= radius of the centre line."""
-    tightest = min((bend.radius for bend in bends), default=math.inf)
-    if bore <= 2 * tightest * (1 + _ROUNDING):
-        return None
-    return Contradiction(
-        problem=f"the bore is wider than the tightest of the bends allows (radius {written(tightest, 'mm')})",
-        allowed=f"above 0 mm and at most twice that radius, {written(2 * tightest, 'mm')}",
-    )
+def _least_angle(values: Any) -> dict[str, float]:
+    """Least angle of a chamber whose opening, 2 R1 (theta/2 - asin(t/R1)), is 1/2000 of its depth.
 
-
-def _bore_fits_chamber(bore: float, width: float, inner: float, outer: float) -> Contradiction | None:
-    """Some wall of the chamber is as large as the bore."""
-    limit = max(width, outer - inner)
-    if bore <= limit:
-        return None
-    return Contradiction(
-        problem="no wall of the chamber is large enough for this bore",
-        allowed=f"above 0 mm and at most {written(limit, 'mm')}, the larger of axial_width and "
-        "outer_radius - inner_radius",
-    )
-
-
-def _roughness_fits_bore(roughness: float, bore: float) -> Contradiction | None:
-    """Roughness below d/2."""
-    if roughness < bore / 2:
-        return None
-    return Contradiction(
-        problem="a roughness of half the bore closes the tube",
-        allowed=f"at least 0 um and below bore / 2 = {written(bore / 2, 'mm')}",
-    )
-
-
-def _length_holds_bends(length: float, bends: tuple[Bend, ...]) -> Contradiction | None:
-    """L >= sum of the bends' arcs, each angle times radius."""
-    arcs = math.fsum(bend.angle * bend.radius for bend in bends)
-    if length >= arcs * (1 - _ROUNDING):
-        return None
-    return Contradiction(
-        problem="the tube is shorter than the arcs of its bends together",
-        allowed=f"at least {written(arcs, 'mm')}, the sum of angle * radius over the bends",
-    )
-
-
-def _length_reaches_over_crest(
-    length: float, angle: float, port: float, crest: float
-) -> Contradiction | None:
-    """Check that the tube's length reaches over the crest."""
-    return _length_reaches(length, angle, port, crest)
-
-
-def _length_reaches(
-    length: float, angle: float, port: float, crest: float | None = None
-) -> Contradiction | None:
-    """L >= the shortest path between ports anywhere in opposite chambers, at least pi - theta apart."""
-    separation = max(math.pi - angle, 0.0)
-    shortest = shortest_path(port_radius=port, hump_radius=crest, separation=separation)
-    if length >= shortest * (1 - _ROUNDING):
-        return None
-    over = "" if crest is None else f" over the siphon crest at {written(crest, 'mm')}"
-    return Contradiction(
-        problem=f"the tube cannot reach the opposite port{over}",
-        allowed=f"at least {written(shortest, 'mm')}, the shortest path from chamber to opposite chamber",
-    )
-
-
-def _entrance_has_radius(radius: float, entrance: str) -> Contradiction | None:
-    """Only a rounded entrance has a radius."""
-    if entrance == "rounded" or radius == 0:
-        return None
-    return Contradiction(
-        problem=f'a {entrance} entrance has no radius (entrance = "{entrance}")',
-        allowed='leave the key out, or entrance = "rounded"',
-    )
+    Rounding in elongated cells grows with the square of depth over opening.
+    """
+    inner, depth = values.inner_radius, values.outer_radius - values.inner_radius
+    least = 2 * math.asin(values.plate_thickness / inner) + _NARROWEST * depth / inner
+    return {"least": least, "allowed": 1.001 * least}
 
 
 _INNER, _OUTER, _ANGLE = "disc.inner_radius", "disc.outer_radius", "disc.central_angle"
 _PLATE, _FILL = "disc.plate_thickness", "disc.max_fill_ratio"
 _PORT, _CREST, _LENGTH, _BORE = "tube.port_radius", "tube.hump_radius", "tube.length", "tube.bore"
 _HOLE_RADIUS = "disc.gas_hole_radius"
-_NO_RING = (_radii_in_order,)
-_NO_DEPTH = (_radii_in_order, _chamber_has_depth)
+_NO_RING = ("radii_in_order",)
+_NO_DEPTH = ("radii_in_order", "chamber_has_depth")
 _CHAMBER = (_INNER, _OUTER, _ANGLE, _PLATE)
-_NO_CHAMBER = (*_NO_DEPTH, _plates_leave_room, _chamber_wide_enough, _fill_has_depth, _fills_share_the_liquid)
-_NO_PATH = (_port_in_chamber, _crest_in_disc, _crest_inside_port)
+_NO_CHAMBER = (
+    *_NO_DEPTH,
+    "plates_leave_room",
+    "chamber_wide_enough",
+    "fill_has_depth",
+    "fills_share_the_liquid",
+)
+_REACHED = "at least {least:mm}, the shortest path from chamber to opposite chamber"
 
 
 def _drawn(reading: SceneReading) -> bool:
@@ -311,45 +115,198 @@ def _drawn(reading: SceneReading) -> bool:
 
 
 SIZE_CHECKS: tuple[Check, ...] = (
-    check(_port_in_chamber, _PORT, _INNER, _OUTER, moot=_NO_RING),
-    check(_crest_in_disc, _CREST, _OUTER),
-    check(_crest_inside_port, _CREST, _PORT, moot=(_port_in_chamber, _crest_in_disc)),
-    check(_bore_fits_chamber, _BORE, "disc.axial_width", _INNER, _OUTER, moot=_NO_RING),
-    check(_length_reaches_over_crest, _LENGTH, _ANGLE, _PORT, _CREST, moot=_NO_PATH),
-    check(_length_reaches, _LENGTH, _ANGLE, _PORT, moot=(_port_in_chamber, _length_reaches_over_crest)),
+    condition(
+        "port_in_chamber",
+        *(_PORT, _INNER, _OUTER),
+        holds=lambda v: v.inner_radius < v.port_radius <= v.outer_radius,
+        problem="the port lies outside the chamber",
+        allowed="above inner_radius ({inner_radius:mm}) and at most outer_radius ({outer_radius:mm})",
+        moot=_NO_RING,
+    ),
+    # Holds for a crest inside any port.
+    condition(
+        "crest_in_disc",
+        *(_CREST, _OUTER),
+        holds=lambda v: v.hump_radius < v.outer_radius,
+        problem="the siphon crest lies outside the port, and outside the chamber's outer wall too",
+        allowed="above 0 mm and below port_radius, which is at most outer_radius ({outer_radius:mm})",
+    ),
+    condition(
+        "crest_inside_port",
+        *(_CREST, _PORT),
+        holds=lambda v: v.hump_radius < v.port_radius,
+        problem="the siphon crest lies outside the port, but it is the smallest radius on the path",
+        allowed="above 0 mm and below port_radius ({port_radius:mm}), or leave the key out",
+        moot=("port_in_chamber", "crest_in_disc"),
+    ),
+    condition(
+        "bore_fits_chamber",
+        *(_BORE, "disc.axial_width", _INNER, _OUTER),
+        more=lambda v: {"most": max(v.axial_width, v.outer_radius - v.inner_radius)},
+        holds=lambda v: v.bore <= v.most,
+        problem="no wall of the chamber is large enough for this bore",
+        allowed="above 0 mm and at most {most:mm}, the larger of axial_width and outer_radius - inner_radius",
+        moot=_NO_RING,
+    ),
+    condition(
+        "length_reaches_over_crest",
+        *(_LENGTH, _ANGLE, _PORT, _CREST),
+        more=lambda v: _shortest(v, v.hump_radius),
+        holds=lambda v: v.length >= v.least * (1 - _ROUNDING),
+        problem="the tube cannot reach the opposite port over the siphon crest at {hump_radius:mm}",
+        allowed=_REACHED,
+        moot=("port_in_chamber", "crest_in_disc", "crest_inside_port"),
+    ),
+    condition(
+        "length_reaches",
+        *(_LENGTH, _ANGLE, _PORT),
+        more=lambda v: _shortest(v, None),
+        holds=lambda v: v.length >= v.least * (1 - _ROUNDING),
+        problem="the tube cannot reach the opposite port",
+        allowed=_REACHED,
+        moot=("port_in_chamber", "length_reaches_over_crest"),
+    ),
 )
 """Checks of tube lengths that depend on the size of the chamber."""
 CHECKS: tuple[Check, ...] = (
-    check(_radii_in_order, _INNER, _OUTER),
-    check(_chamber_has_depth, _INNER, _OUTER, moot=_NO_RING),
-    check(_plates_leave_room, _PLATE, _INNER, _ANGLE),
-    check(_chamber_wide_enough, _ANGLE, _PLATE, _INNER, _OUTER, moot=(*_NO_RING, _plates_leave_room)),
-    check(_fill_has_depth, _FILL, _INNER, _OUTER, moot=_NO_DEPTH),
-    check(_chambers_fit, _ANGLE, "disc.chambers"),
-    check(_chambers_even, _ANGLE, when=lambda reading: not reading.given("disc.chambers")),
-    check(_fills_share_the_liquid, "disc.initial_fill", _FILL),
+    condition(
+        "radii_in_order",
+        *(_INNER, _OUTER),
+        holds=lambda v: v.inner_radius < v.outer_radius,
+        problem="the inner radius must be smaller than outer_radius ({outer_radius:mm})",
+        allowed="above 0 mm and below {outer_radius:mm}",
+    ),
+    condition(
+        "chamber_has_depth",
+        *(_INNER, _OUTER),
+        more=lambda v: {"least": _SHALLOWEST * v.outer_radius},
+        holds=lambda v: v.outer_radius - v.inner_radius >= v.least,
+        problem="the chamber is too shallow to be resolved: outer_radius is {outer_radius:mm}",
+        allowed=f"at least {_SHALLOWEST:g} of outer_radius, {{least:mm}}, below outer_radius",
+        moot=_NO_RING,
+    ),
+    # The opening between the plates stays above zero at R1.
+    condition(
+        "plates_leave_room",
+        *(_PLATE, _INNER, _ANGLE),
+        more=lambda v: {"most": v.inner_radius * math.sin(min(v.central_angle, math.pi) / 2)},
+        holds=lambda v: v.plate_thickness < v.most,
+        problem="the plates close the chamber at inner_radius ({inner_radius:mm})",
+        allowed="at least 0 mm and below inner_radius * sin(central_angle / 2) = {most:mm}",
+    ),
+    condition(
+        "chamber_wide_enough",
+        *(_ANGLE, _PLATE, _INNER, _OUTER),
+        more=_least_angle,
+        holds=lambda v: v.central_angle >= v.least,
+        problem="the chamber's opening at inner_radius ({inner_radius:mm}) is below 1/2000 of its depth, too "
+        "narrow to be resolved",
+        allowed="at least {allowed:deg} for these radii and this plate_thickness",
+        moot=(*_NO_RING, "plates_leave_room"),
+    ),
+    condition(
+        "fill_has_depth",
+        *(_FILL, _INNER, _OUTER),
+        more=_least_fill,
+        holds=lambda v: v.max_fill_ratio >= v.least,
+        problem=f"the ring would be shallower than {_SHALLOWEST:g} of outer_radius ({{outer_radius:mm}}), "
+        "too shallow to be resolved",
+        allowed="at least {allowed:.3g} for this disc, at most 1",
+        moot=_NO_DEPTH,
+    ),
+    condition(
+        "chambers_fit",
+        *(_ANGLE, "disc.chambers"),
+        more=lambda v: {"most": 2 * math.pi / v.chambers},
+        holds=lambda v: v.central_angle <= v.most * (1 + DRAWING_ROUNDING),
+        problem="{chambers} chambers of this angle do not fit into 360 deg",
+        allowed="above 0 deg and at most 360 deg / chambers = {most:deg}",
+    ),
+    condition(
+        "chambers_even",
+        _ANGLE,
+        more=lambda v: {"count": 2 * math.pi / v.central_angle},
+        holds=lambda v: even_number_of_chambers(v.central_angle) is not None,
+        problem="360 deg / central_angle = {count:.6g} is not an even number of chambers, at least four",
+        allowed="90 deg, 60 deg, 45 deg, 36 deg ... (13.8462 deg for 26 chambers at the most), or at most 90 "
+        "deg with chambers given as well",
+        when=lambda reading: not reading.given("disc.chambers"),
+    ),
+    condition(
+        "fills_share_the_liquid",
+        *("disc.initial_fill", _FILL),
+        more=lambda v: {"half": v.max_fill_ratio / 2},
+        holds=lambda v: abs(2 * v.initial_fill - v.max_fill_ratio) <= _ROUNDING * v.max_fill_ratio,
+        problem="two opposite chambers start with equal fills that add up to max_fill_ratio "
+        "({max_fill_ratio:g})",
+        allowed="{half:g}, or leave the key out",
+    ),
     *SIZE_CHECKS,
     check(
         _port_under_liquid,
-        _PORT,
-        "disc.initial_fill",
-        *_CHAMBER,
-        moot=(*_NO_CHAMBER, _port_in_chamber),
+        *(_PORT, "disc.initial_fill", *_CHAMBER),
+        moot=(*_NO_CHAMBER, "port_in_chamber"),
         when=_drawn,
     ),
     check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER, when=_drawn),
-    check(_hole_is_the_inlet, _HOLE_RADIUS, "gas.inlet_radius"),
+    # Gas enters through the hole.
+    condition(
+        "hole_is_the_inlet",
+        *(_HOLE_RADIUS, "gas.inlet_radius"),
+        holds=lambda v: abs(v.gas_hole_radius - v.inlet_radius) <= _ROUNDING * v.inlet_radius,
+        problem="gas enters the chambers at gas.inlet_radius ({inlet_radius:mm})",
+        allowed="that radius, or one of both keys alone",
+    ),
     check(
         _inlet_above_liquid,
         _HOLE_RADIUS,
         _FILL,
         *_CHAMBER,
-        moot=(*_NO_CHAMBER, _inlet_above_liquid, _hole_is_the_inlet),
+        moot=(*_NO_CHAMBER, "inlet_above_liquid", "hole_is_the_inlet"),
         when=_drawn,
     ),
-    check(_hole_fits_chamber, "disc.gas_hole_diameter", "disc.axial_width", _INNER, _OUTER, moot=_NO_RING),
-    check(_bore_fits_bends, _BORE, "tube.bends"),
-    check(_roughness_fits_bore, "tube.roughness", _BORE),
-    check(_length_holds_bends, _LENGTH, "tube.bends"),
-    check(_entrance_has_radius, "tube.entrance_radius", "tube.entrance"),
+    condition(
+        "hole_fits_chamber",
+        *("disc.gas_hole_diameter", "disc.axial_width", _INNER, _OUTER),
+        more=lambda v: {"most": min(v.axial_width, v.outer_radius - v.inner_radius)},
+        holds=lambda v: v.gas_hole_diameter <= v.most,
+        problem="the gas hole is larger than the chamber",
+        allowed="above 0 mm and at most {most:mm}, the smaller of its width and depth",
+        moot=_NO_RING,
+    ),
+    # The inner side of each bend is curved.
+    condition(
+        "bore_fits_bends",
+        *(_BORE, "tube.bends"),
+        more=lambda v: {
+            "radius": (r := min((each.radius for each in v.bends), default=math.inf)),
+            "most": 2 * r,
+        },
+        holds=lambda v: v.bore <= v.most * (1 + _ROUNDING),
+        problem="the bore is wider than the tightest of the bends allows (radius {radius:mm})",
+        allowed="above 0 mm and at most twice that radius, {most:mm}",
+    ),
+    condition(
+        "roughness_fits_bore",
+        *("tube.roughness", _BORE),
+        more=lambda v: {"most": v.bore / 2},
+        holds=lambda v: v.roughness < v.most,
+        problem="a roughness of half the bore closes the tube",
+        allowed="at least 0 um and below bore / 2 = {most:mm}",
+    ),
+    condition(
+        "length_holds_bends",
+        *(_LENGTH, "tube.bends"),
+        more=lambda v: {"arcs": math.fsum(each.angle * each.radius for each in v.bends)},
+        holds=lambda v: v.length >= v.arcs * (1 - _ROUNDING),
+        problem="the tube is shorter than the arcs of its bends together",
+        allowed="at least {arcs:mm}, the sum of angle * radius over the bends",
+    ),
+    condition(
+        "entrance_has_radius",
+        *("tube.entrance_radius", "tube.entrance"),
+        holds=lambda v: v.entrance == "rounded" or v.entrance_radius == 0,
+        problem='a {entrance} entrance has no radius (entrance = "{entrance}")',
+        allowed='leave the key out, or entrance = "rounded"',
+    ),
 )

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Final
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.fields import LETTERS
 from ringbalance.scene.keys.reading import SceneReading
-from ringbalance.scene.kinds import Check, Contradiction, check, limit_above_noise, written
+from ringbalance.scene.kinds import Check, condition, limit_above_noise
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
@@ -68,150 +69,128 @@ def surface_tension(liquid: Liquid) -> FloatArray:
     return np.where(np.greater(liquid.density, METAL_DENSITY_KG_M3), _METAL_TENSION_N_M, _WATER_TENSION_N_M)
 
 
-def _rim_holds(speed: float, outer: float) -> Contradiction | None:
-    """omega R2 <= 1 km/s."""
-    if speed * outer <= _LARGEST_RIM_SPEED_M_S:
-        return None
-    return Contradiction(
-        problem=f"the rim would move at {speed * outer:.4g} m/s, which no disc withstands",
-        allowed=f"above 0 rpm and at most {_rpm(_LARGEST_RIM_SPEED_M_S / outer)}, "
-        f"{_LARGEST_RIM_SPEED_M_S:g} m/s at outer_radius ({written(outer, 'mm')})",
-    )
-
-
-def _gas_column_holds(speed: float, outer: float, temperature: float) -> Contradiction | None:
-    """(omega R2)^2 <= R T/2."""
-    fastest = math.sqrt(2 * _LARGEST_EXPONENT * AIR_CONSTANT * temperature)
-    if speed * outer <= fastest:
-        return None
-    return Contradiction(
-        problem=f"the rim would move at {speed * outer:.4g} m/s, too fast to know the gas pressure on the "
-        'liquid from one on the shaft (gas.measured_at = "shaft")',
-        allowed=f"at most {_rpm(fastest / outer)}, {fastest:.3g} m/s at outer_radius with this "
-        'gas.temperature; or gas.measured_at = "chamber"',
-    )
-
-
 def _rpm(speed: float) -> str:
     return f"{_ROUNDED * speed * 30 / math.pi:.4g} rpm"
 
 
-def _on_shaft(reading: SceneReading) -> bool:
-    return bool(reading.values.get("gas.measured_at") == "shaft")
+def _fastest(values: Any, limit: float) -> dict[str, Any]:
+    """Velocity of the rim, m/s, its limit, and the speed at that limit."""
+    outer = values.outer_radius
+    return {"rim": values.speed * outer, "most": limit, "fastest": _rpm(limit / outer)}
 
 
-def _liquid_stays_liquid(vapour: float, ambient: float) -> Contradiction | None:
-    """Vapour pressure below ambient pressure, both absolute."""
-    if vapour < ambient:
-        return None
-    limit = written(ambient, "kPa")
-    return Contradiction(
-        problem=f"the liquid boils: its vapour pressure reaches ambient_pressure ({limit})",
-        allowed=f"at least 0 kPa and below {limit}, absolute",
-    )
+def _gas_limit(values: Any) -> float:
+    """Largest omega R2 of a gas column, (R T/2)^(1/2), m/s."""
+    return math.sqrt(2 * _LARGEST_EXPONENT * AIR_CONSTANT * values.temperature)
 
 
-def _temperature_below_boiling(_temperature: float, vapour: float, ambient: float) -> Contradiction | None:
-    """Vapour pressure at the given temperature below ambient pressure."""
-    if vapour < ambient:
-        return None
-    return Contradiction(
-        problem=f"the liquid boils: its vapour pressure at this temperature is {written(vapour, 'kPa')}",
-        allowed=f"a temperature at which it is below ambient_pressure ({written(ambient, 'kPa')})",
-    )
+def _letters(values: Any) -> dict[str, Any]:
+    letters = LETTERS[: values.chambers]
+    return {"letters": letters, "listed": ", ".join(letters)}
 
 
-def _gas_times_in_order(minimum: float, maximum: float) -> Contradiction | None:
-    if minimum < maximum:
-        return None
-    return Contradiction(
-        problem=f"minimum_gas_time must be shorter than maximum_gas_time ({written(maximum, 's')})",
-        allowed=f"at least 0 s and below {written(maximum, 's')}",
-    )
-
-
-def _period_covers_lag(period: float, lag: float) -> Contradiction | None:
-    """The sampling period is not shorter than the valve's lag."""
-    if period >= lag:
-        return None
-    return Contradiction(
-        problem=f"the next sample would be taken before the valve has moved (valve_lag {written(lag, 's')})",
-        allowed=f"at least {written(lag, 's')}",
-    )
-
-
-def _trial_time_executed(step: float, minimum: float, maximum: float) -> Contradiction | None:
-    """A valve-open time lies between the shortest and the longest that the valve executes."""
-    if minimum <= step <= maximum:
-        return None
-    least = f"minimum_gas_time ({written(minimum, 's')})"
-    return Contradiction(
-        problem="a valve-open time of this length is never executed",
-        allowed=f"from {least} to maximum_gas_time ({written(maximum, 's')})",
-    )
-
-
-def _steps_in_order(short: float, long: float) -> Contradiction | None:
-    if short <= long:
-        return None
-    return Contradiction(
-        problem=f"short_step must not be longer than long_step ({written(long, 's')})",
-        allowed=f"above 0 s and at most {written(long, 's')}",
-    )
-
-
-def _sequence_complete(sequence: tuple[str, ...], chambers: int) -> Contradiction | None:
-    """The sequence has every chamber once."""
-    letters = LETTERS[:chambers]
-    if sorted(sequence) == list(letters):
-        return None
-    return Contradiction(
-        problem=f"each of the {chambers} chambers must stand in it once",
-        allowed=f"the letters {', '.join(letters)} in any order",
-    )
-
-
-def _one_for_each(offsets: tuple[float, ...] | None, chambers: int) -> Contradiction | None:
-    """One time for all chambers, or one for each."""
-    if offsets is None or len(offsets) in (1, chambers):
-        return None
-    return Contradiction(
-        problem=f"a list of {len(offsets)} times for {chambers} chambers",
-        allowed=f"one time for all, or a list of {chambers} in the order of the letters",
-    )
-
-
-_RIM: Final = ("rotor.speed", "disc.outer_radius")
-_VAPOUR, _AMBIENT = "liquid.vapour_pressure", "gas.ambient_pressure"
-_GAS_TIMES = ("controller.minimum_gas_time", "controller.maximum_gas_time")
-_TRIAL_TIMES = ("controller.first_trial", "controller.long_step", "controller.short_step")
+def _executed(key: str, values: Any) -> bool:
+    return bool(values.minimum_gas_time <= getattr(values, key) <= values.maximum_gas_time)
 
 
 def _by_trial(reading: SceneReading) -> bool:
     return bool(reading.values.get("controller.kind") == "trial")
 
 
+_RIM: Final = ("rotor.speed", "disc.outer_radius")
+_VAPOUR, _AMBIENT = "liquid.vapour_pressure", "gas.ambient_pressure"
+_GAS_TIMES = ("controller.minimum_gas_time", "controller.maximum_gas_time")
+_TRIAL_TIMES = ("first_trial", "long_step", "short_step")
+
+
 CHECKS: tuple[Check, ...] = (
-    check(_liquid_stays_liquid, _VAPOUR, _AMBIENT, when=lambda reading: reading.given(_VAPOUR)),
-    check(
-        _temperature_below_boiling,
-        "liquid.temperature",
-        _VAPOUR,
-        _AMBIENT,
+    condition(
+        "liquid_stays_liquid",
+        *(_VAPOUR, _AMBIENT),
+        holds=lambda v: v.vapour_pressure < v.ambient_pressure,
+        problem="the liquid boils: its vapour pressure reaches ambient_pressure ({ambient_pressure:kPa})",
+        allowed="at least 0 kPa and below {ambient_pressure:kPa}, absolute",
+        when=lambda reading: reading.given(_VAPOUR),
+    ),
+    condition(
+        "temperature_below_boiling",
+        *("liquid.temperature", _VAPOUR, _AMBIENT),
+        holds=lambda v: v.vapour_pressure < v.ambient_pressure,
+        problem="the liquid boils: its vapour pressure at this temperature is {vapour_pressure:kPa}",
+        allowed="a temperature at which it is below ambient_pressure ({ambient_pressure:kPa})",
         when=lambda reading: not reading.given(_VAPOUR),
     ),
-    check(_gas_times_in_order, *_GAS_TIMES),
-    check(_period_covers_lag, "controller.period", "gas.valve_lag"),
-    check(limit_above_noise("amplitude_noise", "um"), "controller.limit", "sensor.amplitude_noise"),
-    *(
-        check(_trial_time_executed, path, *_GAS_TIMES, when=_by_trial, moot=(_gas_times_in_order,))
-        for path in _TRIAL_TIMES
+    condition(
+        "gas_times_in_order",
+        *_GAS_TIMES,
+        holds=lambda v: v.minimum_gas_time < v.maximum_gas_time,
+        problem="minimum_gas_time must be shorter than maximum_gas_time ({maximum_gas_time:s})",
+        allowed="at least 0 s and below {maximum_gas_time:s}",
     ),
-    check(_steps_in_order, "controller.short_step", "controller.long_step", when=_by_trial),
-    check(_sequence_complete, "controller.sequence", "disc.chambers"),
-    check(_one_for_each, "controller.gas_time_offset", "disc.chambers"),
-    check(_rim_holds, *_RIM),
-    check(_gas_column_holds, *_RIM, "gas.temperature", when=_on_shaft, moot=(_rim_holds,)),
+    condition(
+        "period_covers_lag",
+        *("controller.period", "gas.valve_lag"),
+        holds=lambda v: v.period >= v.valve_lag,
+        problem="the next sample would be taken before the valve has moved (valve_lag {valve_lag:s})",
+        allowed="at least {valve_lag:s}",
+    ),
+    limit_above_noise("controller.limit", "sensor.amplitude_noise", "um"),
+    *(
+        condition(
+            "trial_time_executed",
+            *(f"controller.{key}", *_GAS_TIMES),
+            holds=partial(_executed, key),
+            problem="a valve-open time of this length is never executed",
+            allowed="from minimum_gas_time ({minimum_gas_time:s}) to maximum_gas_time ({maximum_gas_time:s})",
+            when=_by_trial,
+            moot=("gas_times_in_order",),
+        )
+        for key in _TRIAL_TIMES
+    ),
+    condition(
+        "steps_in_order",
+        *("controller.short_step", "controller.long_step"),
+        holds=lambda v: v.short_step <= v.long_step,
+        problem="short_step must not be longer than long_step ({long_step:s})",
+        allowed="above 0 s and at most {long_step:s}",
+        when=_by_trial,
+    ),
+    condition(
+        "sequence_complete",
+        *("controller.sequence", "disc.chambers"),
+        more=_letters,
+        holds=lambda v: sorted(v.sequence) == list(v.letters),
+        problem="each of the {chambers} chambers must stand in it once",
+        allowed="the letters {listed} in any order",
+    ),
+    condition(
+        "one_for_each",
+        *("controller.gas_time_offset", "disc.chambers"),
+        more=lambda v: {"count": len(v.gas_time_offset or (0.0,))},
+        holds=lambda v: v.count in (1, v.chambers),
+        problem="a list of {count} times for {chambers} chambers",
+        allowed="one time for all, or a list of {chambers} in the order of the letters",
+    ),
+    condition(
+        "rim_holds",
+        *_RIM,
+        more=lambda v: _fastest(v, _LARGEST_RIM_SPEED_M_S),
+        holds=lambda v: v.rim <= v.most,
+        problem="the rim would move at {rim:.4g} m/s, which no disc withstands",
+        allowed="above 0 rpm and at most {fastest}, {most:g} m/s at outer_radius ({outer_radius:mm})",
+    ),
+    condition(
+        "gas_column_holds",
+        *(*_RIM, "gas.temperature"),
+        more=lambda v: _fastest(v, _gas_limit(v)),
+        holds=lambda v: v.rim <= v.most,
+        problem="the rim would move at {rim:.4g} m/s, too fast to know the gas pressure on the liquid from "
+        'one on the shaft (gas.measured_at = "shaft")',
+        allowed="at most {fastest}, {most:.3g} m/s at outer_radius with this gas.temperature; or "
+        'gas.measured_at = "chamber"',
+        when=lambda reading: reading.values.get("gas.measured_at") == "shaft",
+        moot=("rim_holds",),
+    ),
 )
 
 

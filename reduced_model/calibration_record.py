@@ -79,7 +79,7 @@ ANSWERED: Final[Mapping[str, _Named]] = MappingProxyType(
 )
 """Answers that have an uncertainty budget, in the order in which they are shown, the main ones first."""
 OF_THE_JET: Final = ("crater_depth", "crater_share", "blowing_number")
-"""Those that only a scene with a gas hole has."""
+"""Answers that only a scene with a gas hole has."""
 MAIN: Final = 4
 """Number of answers that a short text shows."""
 FIELDS: Final = {"lambda": "moment_per_mass"}

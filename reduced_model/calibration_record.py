@@ -65,10 +65,15 @@ ANSWERED: Final[Mapping[str, tuple[str, str, str]]] = MappingProxyType(
         "usable_volume": ("usable volume of a pair", "", "m^3"),
         "residual_depth": ("liquid over the port as gas enters", "", "m"),
         "largest_fill_ratio": ("largest usable fill ratio", "", "1"),
+        "crater_depth": ("crater of the gas jet, equal fills", "", "m"),
+        "crater_share": ("crater over the ring, smallest fill", "", "1"),
+        "blowing_number": ("blowing number, equal fills", "", "1"),
     }
 )
 """Name, symbol and unit of the answers that have an uncertainty budget, in the order in which they are shown,
 the main ones first."""
+OF_THE_JET: Final = ("crater_depth", "crater_share", "blowing_number")
+"""Answers that only a scene with a gas hole has."""
 MAIN: Final = 4
 """Number of answers that a short text shows."""
 FIELDS: Final = {"lambda": "moment_per_mass"}
@@ -114,8 +119,15 @@ def _budgets(calibration: Calibration) -> Iterator[Quantity]:
             upper=high,
             parts=parts,
             causes=causes,
-            status=str(calibration.chamber.moment_per_mass.status.code) if key == "lambda" else "ok",
+            status=_status(calibration, key),
         )
+
+
+def _status(calibration: Calibration, key: str) -> str:
+    """ "ok" or the code of the finding that limits an answer."""
+    if key in OF_THE_JET:
+        return "ok" if calibration.scene.disc.gas_hole_direction == "outward" else "gas_jet_bound"
+    return str(calibration.chamber.moment_per_mass.status.code) if key == "lambda" else "ok"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -65,6 +65,8 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
         yield calibration.holding.finding
     if calibration.instability is not None and calibration.instability.finding is not None:
         yield calibration.instability.finding
+    if scene.disc.gas_hole_direction in ("axial", "inward"):
+        yield Finding(code="gas_jet_bound", values={"direction": scene.disc.gas_hole_direction})
     yield from _direction(calibration)
     if not scene.uncertainty:
         yield Finding(code="uncertainty_unstated")

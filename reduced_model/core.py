@@ -14,6 +14,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.reduced_model.chamber.values import measured_closed_forms
+from ringbalance.reduced_model.crater import Crater
 from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow, Waves
@@ -88,6 +89,12 @@ class Answers:
     with six, as a chamber that has nothing to give leaves its share to other pairs.
     Source: elementary geometry (a sum of segments is a zonotope).
     """
+    crater_depth: FloatArray
+    """Depth of the gas jet's crater at equal fills, m; NaN where the scene gives no gas hole, as below."""
+    crater_share: FloatArray
+    """Depth of that crater over the ring's at `least_fill_ratio`."""
+    blowing_number: FloatArray
+    """Blowing number of the gas jet at equal fills; droplets from about 1 on."""
     loop_factor: FloatArray
     """Change of the vibration per valve-open time at equal fills, kappa lambda rho S u, times the scene's
     proportional gain."""
@@ -143,6 +150,9 @@ class Answers:
         depth = scene.tube.port_radius - surface_radius(disc=scene.disc, fill_ratio=residual)
         rate = scene.rotor.influence_coefficient * ratio[0] * rho * scene.tube.area * running
         crest, nothing = tube.path.crest, np.full(designs.size, np.nan)
+        craters = np.full((3, 2, designs.size), np.nan)
+        if scene.disc.gas_hole_diameter is not None:
+            craters[:] = list(vars(Crater.of(scene, np.array([top / 2, least]))).values())
         separated = np.where(flow.separated, Regime.SEPARATED, Regime.SIPHON)
         lowest = _lowest(tube, flow, equal) if crest else (nothing, nothing)
         priming = (nothing, nothing)
@@ -170,6 +180,9 @@ class Answers:
             usable_volume=(top - 2 * least) * volume,
             usable_moment=usable,
             reach=usable / np.tan(np.pi / np.asarray(scene.disc.chambers)),
+            crater_depth=craters[0, 0],
+            crater_share=craters[1, 1],
+            blowing_number=craters[2, 0],
             loop_factor=scene.controller.proportional * rate,
         )
 

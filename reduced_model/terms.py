@@ -29,6 +29,7 @@ from ringbalance.reduced_model.chamber.contributions import (
     wall_layers,
 )
 from ringbalance.reduced_model.chamber.values import chamber_pressure
+from ringbalance.reduced_model.crater import Crater, jet_text
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
@@ -85,6 +86,8 @@ def terms_of(scene: Scene, *, injections_only: bool = False) -> Iterator[Term]:
         yield from _tube_terms(scene)
     yield from _injection_terms(scene)
     yield _lifted_liquid(scene)
+    if not injections_only:
+        yield _gas_jet(scene)
 
 
 def _chamber_terms(scene: Scene) -> Iterator[Term]:
@@ -227,6 +230,15 @@ def _lifted_liquid(scene: Scene) -> Term:
         )
     model = "lifted from the level to the crest unless the tube is primed, in injections"
     return Term(HELD, "l/(u T)", model, value, text)
+
+
+def _gas_jet(scene: Scene) -> Term:
+    """Crater of the gas jet in the ring as a valve opens, over the ring's depth, at equal fills."""
+    name, group = "gas jet on the ring", "q/(rho omega^2 a (R2 - a))"
+    if scene.disc.gas_hole_diameter is None:
+        return Term(name, group, "", None, "n/(R2 - a)", unknown=jet_text(scene))
+    share = Crater.of(scene, scene.disc.max_fill_ratio / 2).share
+    return Term(name, group, "", float(share), "n/(R2 - a)", jet_text(scene))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,7 @@ CAUSES: Final[Mapping[str, str]] = MappingProxyType(
         "gas_pressure": "gas pressure not raised with the density",
         "two_masses": "transferred mass taken for the difference of two",
         "gravity": "surface at rest left out",
+        "gas_hole": "hole of the gas not given",
         "eccentric_masses": "own mass of the eccentric masses left out",
         "friction": "friction left to the regulator",
         "force": "force of the turning masses left out",

@@ -27,7 +27,7 @@ from ringbalance.reduced_model.chamber.values import chamber_closed_forms, chamb
 from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY_KG_M3, bulk_modulus
+from ringbalance.scene.rules.working import LARGEST_COMPRESSION, bulk_modulus, surface_tension
 
 
 def percent(fraction: float) -> str:
@@ -36,11 +36,6 @@ def percent(fraction: float) -> str:
     return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"
 
 
-_WATER_TENSION_N_M: Final = 0.073
-"""Surface tension of water at 20 degC against air: taken for every ordinary liquid, as an upper bound.
-Source: IAPWS R1-76(2014)."""
-_METAL_TENSION_N_M: Final = 0.72
-"""Surface tension of gallium near its melting point: taken above `METAL_DENSITY_KG_M3`."""
 _MODES: Final = 24
 """Number of modes of a chamber: the part of gravity's tilt in a mode falls with the mode's number squared."""
 _SWING_ERROR: Final = 0.2
@@ -61,8 +56,7 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]
     a = surface_radius(disc=disc, fill_ratio=fills)
     alpha = half_angle(disc=disc, radius=a)
     pressure = density * square * (disc.outer_radius**2 - a**2) / 2
-    # No scene gives a surface tension.
-    tension = _METAL_TENSION_N_M if density > METAL_DENSITY_KG_M3 else _WATER_TENSION_N_M
+    tension = surface_tension(scene.liquid)
     jump = tension * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
     # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
     length = np.sqrt(tension / (density * square * a))

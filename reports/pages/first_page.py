@@ -63,6 +63,7 @@ _RESTS: Final = {
         "sensor.amplitude_noise",
     ),
     "correction_moment": ("tube.bore", "tube.hump_radius", "disc.plate_thickness"),
+    "crater": ("disc.gas_hole_diameter", "disc.gas_hole_radius", "gas.conductance"),
 }
 """Inputs that a requirement rests on, by its code."""
 _RUN: Final = (

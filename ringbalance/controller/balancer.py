@@ -132,6 +132,8 @@ class RunResult:
     """Unbalance of its rotor, kg m."""
     ended: str
     """Code of the finding on the end of the run."""
+    crater: float = math.nan
+    """Deepest crater of the gas jet at an injection, over the ring's depth there; NaN: no gas hole."""
     run: Any = None
     """The `Run`; None: it was not traced."""
     worst_amplitude: float = math.nan
@@ -160,6 +162,8 @@ class Outcomes:
     clipped: Mapping[str, int] = field(default_factory=dict)
     """Number of devices, by input, that cannot have its drawn value."""
     traced: tuple[RunResult, ...] = ()
+    crater: FloatArray = field(default_factory=lambda: np.empty(0))
+    """Crater of the gas jet, see `RunResult`; empty, or NaN, without a gas hole."""
 
     @property
     def settled(self) -> BoolArray:
@@ -202,7 +206,7 @@ class Outcomes:
         )
 
 
-ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
+ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance", "crater")
 """Names of the arrays of `Outcomes`."""
 
 

@@ -115,6 +115,7 @@ def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: 
     run.amplitude = abs(run.vibration)
     run.initial_amplitude, run.first_seen, run.last_seen = run.amplitude, math.nan, math.nan
     run.last_phase, run.held_since, run.held = math.nan, math.inf, math.inf
+    run.least_driven = math.inf
     run.since = 0.0 if run.amplitude <= loop.limit else math.inf
     keep_instant(loop, run, instants, 0.0)
 

@@ -226,6 +226,7 @@ def keep_injections(
         motion, fill = motions[pair], _driven_fill(plant, run, pair)
         if run.drives[pair] == 0.0:
             forget(motion, fill)
+        run.least_driven = min(run.least_driven, motion.fill_before)
         moved = abs(fill - motion.fill_before) > NOTICEABLE_CHANGE
         filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
         leaked = plant.leak_to_ambient * run.asked[pair]

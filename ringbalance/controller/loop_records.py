@@ -110,6 +110,7 @@ _RUN_REALS: Final = (
     "before_time",  # s, of the last sample; target vector: of the last above the limit, infinite for none
     "before_amplitude",  # m
     "before_phase",  # law-based: rad
+    "least_driven",  # least fill of a chamber whose valve opened; infinite where none did
     "gas",  # p V above ambient that vented chambers have released, Pa m^3
 )
 _RUN_INTEGERS: Final = (

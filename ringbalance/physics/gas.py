@@ -67,6 +67,14 @@ def flow_shape(ratio: float, critical_ratio: float) -> float:
     return ellipse if ratio == held else ellipse * (1.0 - ratio) / (1.0 - held)
 
 
+def flow_shapes(ratio: FloatArray, critical_ratio: npt.ArrayLike) -> FloatArray:
+    """`flow_shape` of arrays."""
+    b = np.asarray(critical_ratio)
+    held = np.minimum(ratio, np.maximum(LAMINAR_RATIO, b))
+    ellipse = np.sqrt(np.maximum(1.0 - (np.maximum(held - b, 0.0) / (1.0 - b)) ** 2, 0.0))
+    return np.asarray(ellipse * np.minimum((1.0 - ratio) / (1.0 - held), 1.0))
+
+
 def flow_shape_slope(ratio: float, critical_ratio: float, shape: float) -> float:
     """Slope dphi/dr of `flow_shape`, from phi(r)."""
     if ratio <= critical_ratio:

@@ -30,7 +30,7 @@ from ringbalance.scene.units import DIMENSIONS, plain_number, written_like
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")
 """Paths on which reading a mesh, or meshing a solid, depends."""
-_OF_CHECKS: Final = (*_OF_MESH, "tube.port_radius", "gas.inlet_radius")
+_OF_CHECKS: Final = (*_OF_MESH, "tube.port_radius", "gas.inlet_radius", "disc.gas_hole_radius")
 """Paths whose values a mesh is checked against when it is read."""
 
 

@@ -17,7 +17,15 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, CREST_ERROR, MODEL, START_ERROR
+from ringbalance.scene.fitted import (
+    CAVITY_ERROR,
+    CLEARING_ERROR,
+    CREST_ERROR,
+    HOLE_ERROR,
+    JET_ERROR,
+    MODEL,
+    START_ERROR,
+)
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (
@@ -90,6 +98,10 @@ def _has_arc(scene: Scene) -> bool:
     return _has_crest(scene) and scene.tube.hump_shape == "arc"
 
 
+def _has_gas_hole(scene: Scene) -> bool:
+    return scene.disc.gas_hole_diameter is not None
+
+
 def _has_dissolved_gas(scene: Scene) -> bool:
     return _has_crest(scene) and scene.liquid.dissolved_gas == "saturated"
 
@@ -110,6 +122,10 @@ MODEL_KINDS: Final[Mapping[str, ModelKind]] = MappingProxyType(
             acts_on="pressure over the crest", distribution="uniform", applies=_has_dissolved_gas
         ),
         CREST_ERROR: ModelKind(acts_on="loss up to the crest", distribution="uniform", applies=_has_arc),
+        HOLE_ERROR: ModelKind(
+            acts_on="flow through the gas hole", distribution="uniform", applies=_has_gas_hole
+        ),
+        JET_ERROR: ModelKind(acts_on="velocity on the axis of the gas jet", applies=_has_gas_hole),
         "friction correlation": _of_loss("friction of the tube"),
         "rotation model": _of_loss("friction that rotation adds"),
         "rotation entry": _of_loss("friction that rotation adds near the inlet"),
@@ -124,9 +140,10 @@ MODEL_KINDS: Final[Mapping[str, ModelKind]] = MappingProxyType(
 """Model errors by `ErrorCause`. Each error of k is a random function of Re with a range of its own and two
 parts, see `physics.tube.loss.with_errors`; "as built" frees the shape of k(u).  The flow that clears the
 crest and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`, the end
-of the crest's arc within that of `reduced_model.tube.path`.  The start of the flow has no measurements to
-compare with: it depends on the column's inertia, on a valve that does not open as fast as it closes, and
-on the side to which liquid on the crest runs when the gas is shut, up to half of the tube.  Its expanded
+of the crest's arc within that of `reduced_model.tube.path`, discharge and decay of the gas jet within those
+of `physics.gas_jet`.  The start of the flow has no measurements to compare with: it depends on the column's
+inertia, on a valve that does not open as fast as it closes, and on the side to which liquid on the crest
+runs when the gas is shut, up to half of the tube.  Its expanded
 uncertainty (95 %) is taken as the time L/2u in which the flow passes that half."""
 MODEL_ERRORS: Final[Mapping[str, str]] = MappingProxyType(
     {name: cause for cause, kind in MODEL_KINDS.items() for name in kind.names(cause)}

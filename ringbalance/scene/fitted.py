@@ -108,6 +108,8 @@ CLEARING_ERROR: Final = "clearing of the crest"
 CAVITY_ERROR: Final = "pressure of the cavity"
 START_ERROR: Final = "start of the flow"
 CREST_ERROR: Final = "end of the crest"
+HOLE_ERROR: Final = "discharge of the gas hole"
+JET_ERROR: Final = "decay of the gas jet"
 """Causes of `ModelError` other than errors of k."""
 ErrorCause = Literal[
     "friction correlation",
@@ -123,6 +125,8 @@ ErrorCause = Literal[
     "pressure of the cavity",
     "start of the flow",
     "end of the crest",
+    "discharge of the gas hole",
+    "decay of the gas jet",
 ]
 """Cause of an error of a model: the keys of `scene.errors.MODEL_KINDS`."""
 ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")

@@ -19,6 +19,7 @@ from ringbalance.scene.keys.fields import (
     Length,
     PositiveLength,
     PositiveMass,
+    PositiveShare,
     PositiveTime,
     PositiveUnbalance,
     ProperFraction,
@@ -357,6 +358,13 @@ class RequirementSettings:
         PositiveUnbalance | None,
         unused("none is required", "largest unbalance that must be corrected"),
         Shown("unbalance to be corrected", "g*mm"),
+    ] = None
+    crater: Annotated[
+        PositiveShare | None,
+        unused(
+            "none is required", "largest part of the ring's depth that the gas jet may dig; 1: to the wall"
+        ),
+        Shown("crater of the gas jet allowed", note="part of the ring's depth"),
     ] = None
     fraction: Annotated[
         ProperFraction,

@@ -23,7 +23,12 @@ from ringbalance.scene.keys.declaration import (
     standard,
     unused,
 )
-from ringbalance.scene.keys.derivations import angle_of_chambers, even_number_of_chambers
+from ringbalance.scene.keys.derivations import (
+    angle_of_chambers,
+    direction_of_gas_hole,
+    even_number_of_chambers,
+    radius_of_gas_hole,
+)
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -60,6 +65,7 @@ DissolvedGas = Literal["none", "saturated"]
 PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 GasProcess = Literal["isothermal", "adiabatic"]
+GasHoleDirection = Literal["outward", "axial", "inward"]
 _OUTRIGHT = derived(
     "that of the known liquid", "wins when given; its uncertainty is then 0 unless [uncertainty] has one"
 )
@@ -141,6 +147,37 @@ class Disc:
         ),
         UNKNOWN,
         Shown("measured factor on lambda"),
+    ] = None
+    gas_hole_diameter: Annotated[
+        PositiveLength | None,
+        unused(
+            "nothing is said of the gas jet on the ring but its range",
+            "diameter of the hole through which gas enters a chamber",
+        ),
+        UNCERTAIN,
+        Shown("diameter of the gas hole", "mm"),
+    ] = None
+    gas_hole_radius: Annotated[
+        PositiveLength | None,
+        derived(
+            "gas.inlet_radius; one of both is needed with gas_hole_diameter",
+            "distance of that hole from the axis; never under liquid",
+            "disc.gas_hole_diameter",
+            also=("gas.inlet_radius",),
+            rule=radius_of_gas_hole,
+        ),
+        UNCERTAIN,
+        Shown("radius of the gas hole", "mm"),
+    ] = None
+    gas_hole_direction: Annotated[
+        GasHoleDirection | None,
+        derived(
+            '"outward" with gas_hole_diameter',
+            "where the hole blows: at the ring, along the shaft, or at the inner wall",
+            "disc.gas_hole_diameter",
+            rule=direction_of_gas_hole,
+        ),
+        Shown("direction of the gas hole"),
     ] = None
     geometry: Annotated[ChamberGeometry | None, Shown("geometry of a chamber")] = None
     """Chamber read from a mesh file, no key; None for the sector between plates that the keys describe."""

@@ -18,7 +18,7 @@ from scipy.stats import binom
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.calibration_record import ANSWERED, FIELDS
+from ringbalance.reduced_model.calibration_record import ANSWERED, FIELDS, OF_THE_JET
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import log_heads
@@ -192,7 +192,7 @@ def test_the_intervals_hold_exact_answers_at_drawn_inputs(table_1_scene: Scene, 
     count = 150
     uncertain = _uncertain(with_value(scene=scene, quantity="bore", value=bore), STATED)
     errors = _coverage(uncertain, count=count, seed=15)
-    assert set(ANSWERED) < set(errors)
+    assert {*ANSWERED} - {*OF_THE_JET} < set(errors)
     inside, within_half = ({name: np.mean(e <= part) for name, e in errors.items()} for part in (1.0, 0.5))
     # True fractions of 0.93 and of 0.80 (a half of 2.58 standard deviations, which hold 0.99): one
     # draw in 400 fails by chance.
@@ -270,7 +270,7 @@ def test_a_scene_with_exact_inputs_leaves_numerics_and_models(table_1_scene: Sce
         scene, dict.fromkeys(("density", "kinematic_viscosity", "roughness", "draw_down_factor"), 0.0)
     )
     known = calibrate(exact).quantities
-    for key in ANSWERED:
+    for key in {*ANSWERED} - {*OF_THE_JET}:
         parts = parts_of(known[key])
         assert parts.input == 0
         assert parts.total == math.hypot(parts.numerical, parts.model) > 0

@@ -24,9 +24,12 @@ from ringbalance.mesh.geometry import (
 from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
 from ringbalance.mesh.wall_integrals import gauss
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms
+from ringbalance.reduced_model.crater import Crater, crater_range
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.designs import Designs, changes_of
+from ringbalance.scene.errors import larger, uncertainties
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.evidence import (
@@ -120,6 +123,42 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "between_margin": safe["turning"] - safe["stopped"],
         },
         series=(over_radius,),
+    )
+
+
+def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Crater and blowing number of the gas jet at equal fills: of the scene's hole, or over those that are
+    built."""
+    fill = scene.disc.max_fill_ratio / 2
+    if scene.disc.gas_hole_diameter is None:
+        built = crater_range(scene)
+        ends = np.array([(each.min(), each.max()) for each in (built.share, built.blowing_number)])
+        judged = [
+            Found(value=value, reach=(low - value, high - value))
+            for (low, high), value in zip(ends.tolist(), np.sqrt(ends.prod(axis=1)).tolist(), strict=True)
+        ]
+    else:
+
+        def values(designs: Designs) -> FloatArray:
+            crater = Crater.of(designs.scene, np.full(designs.size, fill))
+            return np.array([crater.share, crater.blowing_number])
+
+        nominal, changes = changes_of(scene, values, uncertainties(scene))
+        widths = np.sqrt(np.sum(larger(changes) ** 2, axis=0))
+        # Of a hole that does not blow at the ring the numbers are upper bounds.
+        bound = 0.0 if scene.disc.gas_hole_direction == "outward" else 1.0
+        judged = [
+            Found.within(value, width).moved(-bound * value, 0.0)
+            for value, width in zip(nominal.tolist(), widths.tolist(), strict=True)
+        ]
+        ends = np.array([np.maximum((1 - bound) * nominal - widths, 0.0), nominal + widths]).T
+    names = ("crater_share", "blowing_number")
+    depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fill)
+    numbers = dict(
+        zip(("share_low", "share_high", "blowing_low", "blowing_high"), ends.ravel().tolist(), strict=True)
+    )
+    return Evidence(
+        quantities=dict(zip(names, judged, strict=True)), numbers={**numbers, "ring_depth": float(depth)}
     )
 
 

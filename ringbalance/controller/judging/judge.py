@@ -98,6 +98,12 @@ class Judgement:
         return None if count is None else finite(float(amplitudes[count - 1]))
 
     @property
+    def crater_reached(self) -> float | None:
+        """Part of the ring's depth that the gas jet digs at most in nine tenths of the devices, or None."""
+        craters = self.outcomes.crater[~np.isnan(self.outcomes.crater)]
+        return float(np.quantile(craters, 0.9)) if craters.size else None
+
+    @property
     def causes(self) -> list[str]:
         """The most frequent ways in which devices missed a demand, each with its count."""
         missed = {demand.code: ~demand.met(self.outcomes) for demand in self.demands}

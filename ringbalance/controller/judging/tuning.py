@@ -198,6 +198,10 @@ class Tuning(Result):
                 ("fraction_rotor", "devices whose rotor is within the limit at the end", self._of_rotor),
             ):
                 yield Quantity.of_fraction(self.recommended.fraction_of(demand), key=key, name=name)
+        crater = self.recommended.crater_reached
+        if crater is not None:
+            name = "crater over the ring in nine tenths at most"
+            yield Quantity(key="crater_reached", name=name, value=crater, origin="simulated", digits=2)
         times = self.recommended.settling_times
         for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
             yield Quantity(

@@ -48,6 +48,7 @@ from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import DrawnInput, Information, Trials
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.crater import largest_share
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import (
@@ -59,7 +60,7 @@ from ringbalance.reduced_model.law.flow_law import (
 )
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.results.requirements import AT_LEAST
+from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.draws import BLOCK, run_noise
@@ -172,24 +173,22 @@ class LiquidRingBalancer(Balancer):
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
-        """Settled in time by the reading, the amplitude of the rotor, and the unbalance to be corrected."""
+        """Settled in time by the reading, amplitude of the rotor itself, unbalance to be corrected, crater."""
         requirement = self.scene.requirement
         time = self.span() if requirement.settling_time is None else requirement.settling_time
         stated, allowed = requirement.settling_time is not None, self.scene.required_amplitude
         demands = [settles_within(time, stated=stated, amplitude=allowed)]
         if allowed is not None and self.scene.sensor.runout_amplitude is not None:
             demands.append(rotor_within(allowed, stated=True))
-        if requirement.correction_moment is None:
-            return tuple(demands)
-        moment = Demand(
-            code="correction_moment",
-            outcome="usable_moment",
-            sense=AT_LEAST,
-            required=requirement.correction_moment,
-            unit="kg m",
-            stated=True,
+        further = (
+            ("correction_moment", "usable_moment", AT_LEAST, requirement.correction_moment, "kg m"),
+            ("crater", "crater", AT_MOST, requirement.crater, "1"),
         )
-        return (*demands, moment)
+        return *demands, *(
+            Demand(code=code, outcome=outcome, sense=sense, required=required, unit=unit, stated=True)
+            for code, outcome, sense, required, unit in further
+            if required is not None
+        )
 
     def reported(self) -> tuple[Demand, ...]:
         """The rotor's own vibration against a limit of the readings, where they differ."""
@@ -269,6 +268,7 @@ class LiquidRingBalancer(Balancer):
             ended=run.outcome.value,
             usable_moment=moment * run.usable_moment,
             unbalance=moment * abs(scene.rotor.initial_unbalance),
+            crater=float(largest_share(scene, np.array(run.state["least_driven"]))),
         )
 
     def rotor(self, number: int | None = None) -> CommonRotor:

@@ -29,6 +29,7 @@ from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import applied_pressure, chamber_pressures, compression_work, vented_pressure
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.crater import largest_share
 from ringbalance.reduced_model.injection.dynamics import empty_plants, gives_forces
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
 from ringbalance.reduced_model.injection.moment import tabulate_moment
@@ -337,6 +338,7 @@ class _Under:
         least = np.abs(self.unreachable - np.abs(self.runout))
         numbers[0], numbers[1], numbers[2] = math.inf, least[rows], math.nan
         numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
+        numbers[5] = math.nan
         carried = complete | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
         if not carried.any():
             return numbers, ends
@@ -357,6 +359,7 @@ class _Under:
         seeps = group.plants["leak_from_supply"] * group.plants["supply_pressure"]
         seeped = group.scenes[0].disc.chambers * seeps[rows] * runs["time"]
         numbers[2][:, carried] = (runs["gas"] + seeped) * self.work[rows]
+        numbers[5][:, carried] = self._crater(runs["least_driven"], rows)
         shown = (
             settled,
             self.beyond_disc[rows] > limit,
@@ -369,6 +372,20 @@ class _Under:
         )
         ends[:, carried] = np.argmax([np.broadcast_to(each, settled.shape) for each in shown], axis=0)
         return numbers, ends
+
+    def _crater(self, fills: FloatArray, rows: IntArray) -> FloatArray:
+        """Part of the ring's depth that the gas jet digs, zero where no valve opened, NaN without a hole.
+
+        Args: `fills`: of the driven chambers, shape (settings, rows).
+        """
+        largest = np.full((len(fills), len(self.group.devices)), math.inf)
+        largest[:, rows] = fills
+        shares = [
+            largest_share(Designs.of(kind, {"gas.pressure": self.changed["gas_pressure"][each]}).scene, part)
+            for each, kind in self.group.kinds
+            for part in (largest[:, each],)
+        ]
+        return np.concatenate(shares, axis=1)[:, rows]
 
 
 def _group(number: int) -> range:

@@ -40,7 +40,7 @@ def _spare_part(run: Simulation) -> float:
 
     def cancels(lost: float) -> bool:
         plant = replace(run.plant, total=(1.0 - lost) * run.plant.total)
-        return plant.unreachable_vibration(rotor=run.scene.rotor) <= run.limit
+        return plant.unreachable_vibration(rotor=run.scene.rotor_as_read) <= run.limit
 
     low, high = 0.0, 1.0
     if not cancels(low):

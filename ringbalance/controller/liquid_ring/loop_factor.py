@@ -35,6 +35,7 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import Information
 from ringbalance.physics.gas import applied_pressure
+from ringbalance.reduced_model.crater import jet_text
 from ringbalance.reduced_model.gas_line import line_document, line_text
 from ringbalance.reduced_model.injection.dynamics import empty_plants
 from ringbalance.reduced_model.injection.line_answers import line_answers
@@ -312,6 +313,7 @@ def loop_information(scene: Scene, model: BalancerModel) -> Information:
             ("algorithm", settings.kind.replace("_", " ")),
             ("gas line", line_text(lines)),
             ("neglected", neglected.text),
+            ("gas jet", jet_text(scene)),
         ],
         document=document,
     )

@@ -129,7 +129,9 @@ _WIDER_BORES: Final = (1.4, 2.0)
 _SLOW_FRACTION: Final = 0.25
 """Fraction of a run's time that valves open for the initial vibration, above which wider bores are tried."""
 _FASTER: Final = (2.0, 4.0)
-"""Factors on the valve's conductance, and divisors of its lag."""
+"""Factors on the valve's conductance, and divisors of its lag; of a slower one, divisors of the former."""
+_LARGER_HOLES: Final = (1.5, 2.0, 3.0)
+"""Factors on the diameter of the gas hole."""
 _LIMITS: Final = (2.0, 4.0, 6.0)
 _CRESTS: Final = (1.0, 0.96, 0.92)
 """Factors on the largest radius of a crest that holds the liquid."""
@@ -158,6 +160,7 @@ def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
         *_of_crest(scene, model),
         *_of_bore(scene, model),
         *_of_valve(scene),
+        *_of_jet(scene),
         Remedy(code="period", changes={"controller.period": scene.controller.period / 2}),
         *_of_limit(scene),
     )
@@ -219,6 +222,22 @@ def _of_valve(scene: Scene) -> Iterator[Remedy]:
             changes["gas.valve_lag"] = gas.valve_lag / factor
         if changes:
             yield Remedy(code="faster_valve", changes=changes)
+
+
+def _of_jet(scene: Scene) -> Iterator[Remedy]:
+    """Milder gas jets, where the scene limits the crater: a larger or turned hole, a slower valve."""
+    disc, gas = scene.disc, scene.gas
+    if scene.requirement.crater is None or disc.gas_hole_diameter is None:
+        return
+    for factor in _LARGER_HOLES:
+        changes = {"disc.gas_hole_diameter": factor * disc.gas_hole_diameter}
+        yield Remedy(code="gas_hole", changes=changes, continuous=True)
+    if disc.gas_hole_direction != "axial":
+        yield Remedy(code="turned_gas_hole", changes={"disc.gas_hole_direction": "axial"})
+    if gas.conductance is not None:
+        for factor in _FASTER:
+            changes = {"gas.conductance": gas.conductance / factor}
+            yield Remedy(code="slower_valve", changes=changes, continuous=True)
 
 
 def _of_limit(scene: Scene) -> Iterator[Remedy]:

@@ -185,7 +185,11 @@ def unfitting(
             span = f"from {written(low, 'mm')} to {written(high, 'mm')}"
             problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {span}'
             yield Contradiction(problem=problem, allowed="a radius on the port, or no port_radius")
-    radii = {"port_radius": port or mesh_port, "inlet_radius": reading.values.get("gas.inlet_radius")}
+    radii = {
+        "port_radius": port or mesh_port,
+        "inlet_radius": reading.values.get("gas.inlet_radius"),
+        "gas_hole_radius": reading.values.get("disc.gas_hole_radius"),
+    }
     yield from _covered_findings(
         body,
         points,
@@ -237,8 +241,8 @@ def _covered_findings(
 ) -> Iterator[Contradiction]:
     """Errors of a port that the liquid leaves free at the start, and of a gas inlet that it covers when most.
 
-    Args: `radii`: of "port_radius" and "inlet_radius", as far as known. `fill`: greatest fill ratio of a
-        chamber, of which one holds half at the start.
+    Args: `radii`: of "port_radius", "inlet_radius" and "gas_hole_radius", as far as known. `fill`: greatest
+        fill ratio of a chamber, of which one holds half at the start.
     """
     at = np.hypot(points[:, 0], points[:, 1])[body.cells]
     low, high = at.min(axis=1), at.max(axis=1)
@@ -250,7 +254,7 @@ def _covered_findings(
             problem = f"at the start (fill {fill / 2:.3g}) the liquid does not cover {name}, "
             problem += f"{written(radius, 'mm')}: {100 * outside:.3g} % of the chamber lies outside it"
             yield Contradiction(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
-        if name == "inlet_radius" and outside < fill:
+        if name != "port_radius" and outside < fill:
             problem = f"at max_fill_ratio ({fill:.3g}) the liquid covers {name}, {written(radius, 'mm')}: "
             problem += f"{100 * outside:.3g} % of the chamber lies outside it"
             yield Contradiction(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")

@@ -44,13 +44,20 @@ def _read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
         missing.append(reading.missing("tube.entrance_radius", "a rounded entrance needs its radius"))
     if not reading.lacks("requirement.grade") and reading.lacks("rotor.mass"):
         missing.append(reading.missing("rotor.mass", "requirement.grade asks for nothing without it"))
-    pair = ("gas.conductance", "gas.critical_ratio")
-    for present, absent in (pair, pair[::-1]):
+    for present, absent in _TOGETHER:
         if not reading.lacks(present) and reading.lacks(absent):
             missing.append(reading.missing(absent, f"{present.split('.')[1]} has no meaning without it"))
     return reading, (*faults, *missing, *liquid_faults, *failed, *working.uncertainty_faults(reading))
 
 
+_HOLE: Final = "disc.gas_hole_diameter"
+_TOGETHER: Final = (
+    ("gas.conductance", "gas.critical_ratio"),
+    ("gas.critical_ratio", "gas.conductance"),
+    (_HOLE, "disc.gas_hole_radius"),
+    *((path, _HOLE) for path in ("disc.gas_hole_radius", "disc.gas_hole_direction", "requirement.crater")),
+)
+"""Pairs of keys of which the first has no meaning without the second."""
 KIND: Final = SceneKind(
     schema=LIQUID_RING,
     read=_read,

@@ -95,6 +95,7 @@ def _least_angle(values: Any) -> dict[str, float]:
 _INNER, _OUTER, _ANGLE = "disc.inner_radius", "disc.outer_radius", "disc.central_angle"
 _PLATE, _FILL = "disc.plate_thickness", "disc.max_fill_ratio"
 _PORT, _CREST, _LENGTH, _BORE = "tube.port_radius", "tube.hump_radius", "tube.length", "tube.bore"
+_HOLE_RADIUS = "disc.gas_hole_radius"
 _NO_RING = ("radii_in_order",)
 _NO_DEPTH = ("radii_in_order", "chamber_has_depth")
 _CHAMBER = (_INNER, _OUTER, _ANGLE, _PLATE)
@@ -248,6 +249,31 @@ CHECKS: tuple[Check, ...] = (
         when=_drawn,
     ),
     check(_inlet_above_liquid, "gas.inlet_radius", _FILL, *_CHAMBER, moot=_NO_CHAMBER, when=_drawn),
+    # Gas enters through the hole.
+    condition(
+        "hole_is_the_inlet",
+        *(_HOLE_RADIUS, "gas.inlet_radius"),
+        holds=lambda v: abs(v.gas_hole_radius - v.inlet_radius) <= _ROUNDING * v.inlet_radius,
+        problem="gas enters the chambers at gas.inlet_radius ({inlet_radius:mm})",
+        allowed="that radius, or one of both keys alone",
+    ),
+    check(
+        _inlet_above_liquid,
+        _HOLE_RADIUS,
+        _FILL,
+        *_CHAMBER,
+        moot=(*_NO_CHAMBER, "inlet_above_liquid", "hole_is_the_inlet"),
+        when=_drawn,
+    ),
+    condition(
+        "hole_fits_chamber",
+        *("disc.gas_hole_diameter", "disc.axial_width", _INNER, _OUTER),
+        more=lambda v: {"most": min(v.axial_width, v.outer_radius - v.inner_radius)},
+        holds=lambda v: v.gas_hole_diameter <= v.most,
+        problem="the gas hole is larger than the chamber",
+        allowed="above 0 mm and at most {most:mm}, the smaller of its width and depth",
+        moot=_NO_RING,
+    ),
     # The inner side of each bend is curved.
     condition(
         "bore_fits_bends",

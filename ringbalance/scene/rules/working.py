@@ -24,6 +24,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any, Final
 
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.fields import LETTERS
 from ringbalance.scene.keys.reading import SceneReading
@@ -41,6 +44,7 @@ LARGEST_COMPRESSION: Final = 0.02
 METAL_DENSITY_KG_M3: Final = 3000.0
 """Density above which a liquid is taken for a liquid metal, kg/m^3."""
 _WATER, _METAL, _OTHER = 2.0e9, 25e9, 0.8e9
+_WATER_TENSION_N_M, _METAL_TENSION_N_M = 0.073, 0.72
 _ROUNDED: Final = 1 - 5e-4
 """Factor that covers the rounding of a number to four digits."""
 
@@ -55,6 +59,14 @@ def bulk_modulus(liquid: Liquid) -> float:
     if liquid.density > METAL_DENSITY_KG_M3:
         return _METAL
     return _WATER if liquid.name.casefold() == "water" else _OTHER
+
+
+def surface_tension(liquid: Liquid) -> FloatArray:
+    """Surface tension sigma, N/m, an upper bound: of water at 20 degC, or of gallium for a liquid metal.
+
+    Source: IAPWS R1-76(2014); `data/fluid_properties.csv`.
+    """
+    return np.where(np.greater(liquid.density, METAL_DENSITY_KG_M3), _METAL_TENSION_N_M, _WATER_TENSION_N_M)
 
 
 def _rpm(speed: float) -> str:

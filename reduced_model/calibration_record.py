@@ -66,13 +66,13 @@ ANSWERED: Final[Mapping[str, tuple[str, str, str]]] = MappingProxyType(
         "residual_depth": ("liquid over the port as gas enters", "", "m"),
         "largest_fill_ratio": ("largest usable fill ratio", "", "1"),
         "crater_depth": ("crater of the gas jet, equal fills", "", "m"),
-        "crater_share": ("crater over the ring, smallest fill", "", "1"),
+        "crater_ratio": ("crater over the ring, smallest fill", "", "1"),
         "blowing_number": ("blowing number, equal fills", "", "1"),
     }
 )
 """Name, symbol and unit of the answers that have an uncertainty budget, in the order in which they are shown,
 the main ones first."""
-OF_THE_JET: Final = ("crater_depth", "crater_share", "blowing_number")
+OF_THE_JET: Final = ("crater_depth", "crater_ratio", "blowing_number")
 """Answers that only a scene with a gas hole has."""
 MAIN: Final = 4
 """Number of answers that a short text shows."""

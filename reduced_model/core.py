@@ -91,7 +91,7 @@ class Answers:
     """
     crater_depth: FloatArray
     """Depth of the gas jet's crater at equal fills, m; NaN where the scene gives no gas hole, as below."""
-    crater_share: FloatArray
+    crater_ratio: FloatArray
     """Depth of that crater over the ring's at `least_fill_ratio`."""
     blowing_number: FloatArray
     """Blowing number of the gas jet at equal fills; droplets from about 1 on."""
@@ -181,7 +181,7 @@ class Answers:
             usable_moment=usable,
             reach=usable / np.tan(np.pi / np.asarray(scene.disc.chambers)),
             crater_depth=craters[0, 0],
-            crater_share=craters[1, 1],
+            crater_ratio=craters[1, 1],
             blowing_number=craters[2, 0],
             loop_factor=scene.controller.proportional * rate,
         )

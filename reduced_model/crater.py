@@ -41,7 +41,7 @@ class Crater:
 
     depth: FloatArray
     """Depth in a ring without a floor, m; of a hole that does not blow at the ring an upper bound."""
-    share: FloatArray
+    ratio: FloatArray
     """Depth over that of the ring; from 1 on the jet reaches the outer wall."""
     blowing_number: FloatArray
     """Gas velocity squared over that at which the surface breaks into droplets; a lower bound, since
@@ -72,10 +72,10 @@ class Crater:
             acceleration=np.square(scene.rotor.speed) * level,
         )
         ring = np.maximum(disc.outer_radius - level, 1e-12)
-        return cls(depth=depth, share=depth / ring, blowing_number=blown)
+        return cls(depth=depth, ratio=depth / ring, blowing_number=blown)
 
 
-def largest_share(scene: Scene, least_fill: FloatArray) -> FloatArray:
+def largest_ratio(scene: Scene, least_fill: FloatArray) -> FloatArray:
     """Largest part of the ring's depth that the jet digs where no injection begins at less than a fill.
 
     The ring is the shallower, and its crater the larger part of it, the less a chamber holds.
@@ -84,7 +84,7 @@ def largest_share(scene: Scene, least_fill: FloatArray) -> FloatArray:
     if scene.disc.gas_hole_diameter is None:
         return np.full(least_fill.shape, math.nan)
     injected = np.isfinite(least_fill)
-    return np.where(injected, Crater.of(scene, np.where(injected, least_fill, 1.0)).share, 0.0)
+    return np.where(injected, Crater.of(scene, np.where(injected, least_fill, 1.0)).ratio, 0.0)
 
 
 def _jet(scene: Scene) -> Jet:
@@ -151,10 +151,10 @@ def jet_text(scene: Scene) -> str:
     """Crater at equal fills in one phrase; where the scene gives no hole, its range."""
     hole = scene.disc.gas_hole_diameter
     if hole is None:
-        shares, sizes = crater_range(scene).share, [format_given(size, "m", digits=2) for size in _HOLES_M]
+        ratios, sizes = crater_range(scene).ratio, [format_given(size, "m", digits=2) for size in _HOLES_M]
         return (
             f"not in the scene: a hole of {' to '.join(sizes)} between the inner wall and the fullest ring "
-            f"would dig {percent(float(shares.min()))} to {percent(float(shares.max()))} of the ring's depth "
+            f"would dig {percent(float(ratios.min()))} to {percent(float(ratios.max()))} of the ring's depth "
             "at equal fills; state disc.gas_hole_diameter"
         )
     crater = Crater.of(scene, scene.disc.max_fill_ratio / 2)
@@ -163,6 +163,6 @@ def jet_text(scene: Scene) -> str:
     depth, size = (format_given(each, "m", digits=2) for each in (float(crater.depth), hole))
     return (
         f"{scene.disc.gas_hole_direction} from a hole of {size}{line}, it digs {most}{depth}, "
-        f"{percent(float(crater.share))} of the ring's depth, at equal fills; blowing number {most}"
+        f"{percent(float(crater.ratio))} of the ring's depth, at equal fills; blowing number {most}"
         f"{float(crater.blowing_number):.2g}, droplets from about 1 on"
     )

@@ -237,8 +237,8 @@ def _gas_jet(scene: Scene) -> Term:
     name, group = "gas jet on the ring", "q/(rho omega^2 a (R2 - a))"
     if scene.disc.gas_hole_diameter is None:
         return Term(name, group, "", None, "n/(R2 - a)", unknown=jet_text(scene))
-    share = Crater.of(scene, scene.disc.max_fill_ratio / 2).share
-    return Term(name, group, "", float(share), "n/(R2 - a)", jet_text(scene))
+    ratio = Crater.of(scene, scene.disc.max_fill_ratio / 2).ratio
+    return Term(name, group, "", float(ratio), "n/(R2 - a)", jet_text(scene))
 
 
 @dataclass(frozen=True, kw_only=True)

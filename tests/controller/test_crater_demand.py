@@ -35,7 +35,7 @@ def test_every_device_is_judged_at_the_lowest_fill_of_its_injections(balancer: A
     assert traced.crater == pytest.approx(together.crater, rel=1e-4)
     for place, result in enumerate(traced.traced):
         fill = min(injection.fill_before for injection in result.run.injections)
-        assert traced.crater[place] == float(Crater.of(result.run.scene, fill).share)
+        assert traced.crater[place] == float(Crater.of(result.run.scene, fill).ratio)
     assert np.ptp(together.crater) > 0.1
 
 

@@ -11,7 +11,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import OF_THE_JET
-from ringbalance.reduced_model.crater import Crater, crater_range, jet_text, largest_share
+from ringbalance.reduced_model.crater import Crater, crater_range, jet_text, largest_ratio
 from ringbalance.results.numbers import percent
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_model_errors
@@ -46,16 +46,16 @@ def test_the_crater_balances_the_jet(holed: Scene) -> None:
     pressure = min(core, 2 * 6.5**2 * momentum / (math.pi * (level - 30e-3 + n) ** 2))
     square = holed.rotor.speed**2 * holed.liquid.density / 2 * ((level + n) ** 2 - level**2)
     assert square == pytest.approx(pressure, rel=2e-3)
-    assert float(crater.share) == pytest.approx(n / (44.5e-3 - level), rel=2e-3)
+    assert float(crater.ratio) == pytest.approx(n / (44.5e-3 - level), rel=2e-3)
 
 
 def test_the_shallower_the_ring_the_larger_the_part(holed: Scene) -> None:
     for direction in ("outward", "axial", "inward"):
         fills = np.linspace(0.01, 0.5, 50)
-        shares = Crater.of(holed.with_values({"disc.gas_hole_direction": direction}), fills).share
-        assert np.all(np.diff(shares) < 0)
+        ratios = Crater.of(holed.with_values({"disc.gas_hole_direction": direction}), fills).ratio
+        assert np.all(np.diff(ratios) < 0)
     least = np.array([0.1, math.inf])
-    assert largest_share(holed, least).tolist() == [float(Crater.of(holed, 0.1).share), 0.0]
+    assert largest_ratio(holed, least).tolist() == [float(Crater.of(holed, 0.1).ratio), 0.0]
 
 
 def test_a_turned_hole_digs_less(holed: Scene) -> None:
@@ -86,14 +86,14 @@ def test_a_calibration_has_the_crater_with_its_interval(holed: Scene) -> None:
     result = calibrate(holed)
     half, least = (Crater.of(holed, each) for each in (0.25, float(result.answers.least_fill_ratio)))
     values = {name: result.quantities[name] for name in OF_THE_JET}
-    expected = float(half.depth), float(least.share), float(half.blowing_number)
+    expected = float(half.depth), float(least.ratio), float(half.blowing_number)
     assert [each.value for each in values.values()] == pytest.approx(expected)
     for each in values.values():
         assert each.status == "ok"
         assert each.lower < each.value < each.upper  # type: ignore[operator]
         assert "model: discharge of the gas hole" in each.causes
     term = result.models_used[-1]
-    assert term.estimated_contribution == pytest.approx(float(half.share))
+    assert term.estimated_contribution == pytest.approx(float(half.ratio))
     assert term.model == "not modelled in this version"
 
 
@@ -109,9 +109,9 @@ def test_without_a_hole_there_is_one_sentence(spindle: Scene) -> None:
     assert not {*OF_THE_JET} & {*result.quantities}
     term = result.models_used[-1]
     assert (term.term, term.model, term.estimated_contribution) == ("gas jet on the ring", "left out", None)
-    shares = crater_range(spindle).share
-    assert f"{percent(float(shares.max()))} of the ring's depth" in term.why
-    assert shares.min() < 0.01 < 1 < shares.max()
-    assert math.isnan(float(largest_share(spindle, np.array(0.1))))
+    ratios = crater_range(spindle).ratio
+    assert f"{percent(float(ratios.max()))} of the ring's depth" in term.why
+    assert ratios.min() < 0.01 < 1 < ratios.max()
+    assert math.isnan(float(largest_ratio(spindle, np.array(0.1))))
     with pytest.raises(ValueError, match="gives no gas hole"):
         Crater.of(spindle, 0.25)

@@ -132,7 +132,7 @@ def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     fill = scene.disc.max_fill_ratio / 2
     if scene.disc.gas_hole_diameter is None:
         built = crater_range(scene)
-        ends = np.array([(each.min(), each.max()) for each in (built.share, built.blowing_number)])
+        ends = np.array([(each.min(), each.max()) for each in (built.ratio, built.blowing_number)])
         judged = [
             Found(value=value, reach=(low - value, high - value))
             for (low, high), value in zip(ends.tolist(), np.sqrt(ends.prod(axis=1)).tolist(), strict=True)
@@ -141,7 +141,7 @@ def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
         def values(designs: Designs) -> FloatArray:
             crater = Crater.of(designs.scene, np.full(designs.size, fill))
-            return np.array([crater.share, crater.blowing_number])
+            return np.array([crater.ratio, crater.blowing_number])
 
         nominal, changes = changes_of(scene, values, uncertainties(scene))
         widths = np.sqrt(np.sum(larger(changes) ** 2, axis=0))
@@ -152,7 +152,7 @@ def gas_jet(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             for value, width in zip(nominal.tolist(), widths.tolist(), strict=True)
         ]
         ends = np.array([np.maximum((1 - bound) * nominal - widths, 0.0), nominal + widths]).T
-    names = ("crater_share", "blowing_number")
+    names = ("crater_ratio", "blowing_number")
     depth = scene.disc.outer_radius - surface_radius(disc=scene.disc, fill_ratio=fill)
     numbers = dict(
         zip(("share_low", "share_high", "blowing_low", "blowing_high"), ends.ravel().tolist(), strict=True)

@@ -48,7 +48,7 @@ from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import DrawnInput, Information, Trials
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
-from ringbalance.reduced_model.crater import largest_share
+from ringbalance.reduced_model.crater import largest_ratio
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import (
@@ -173,7 +173,7 @@ class LiquidRingBalancer(Balancer):
         return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
-        """Settled in time by the reading, amplitude of the rotor itself, unbalance to be corrected, crater."""
+        """Settled in time by the reading, amplitude of the rotor itself, unbalance to correct, crater."""
         requirement = self.scene.requirement
         time = self.span() if requirement.settling_time is None else requirement.settling_time
         stated, allowed = requirement.settling_time is not None, self.scene.required_amplitude
@@ -268,7 +268,7 @@ class LiquidRingBalancer(Balancer):
             ended=run.outcome.value,
             usable_moment=moment * run.usable_moment,
             unbalance=moment * abs(scene.rotor.initial_unbalance),
-            crater=float(largest_share(scene, np.array(run.state["least_driven"]))),
+            crater=float(largest_ratio(scene, np.array(run.state["least_driven"]))),
         )
 
     def rotor(self, number: int | None = None) -> CommonRotor:

@@ -29,7 +29,7 @@ from ringbalance.controller.terms import dynamics_of, run_terms
 from ringbalance.physics.gas import applied_pressure, chamber_pressures, compression_work, vented_pressure
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
-from ringbalance.reduced_model.crater import largest_share
+from ringbalance.reduced_model.crater import largest_ratio
 from ringbalance.reduced_model.injection.dynamics import empty_plants, gives_forces
 from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
 from ringbalance.reduced_model.injection.moment import tabulate_moment
@@ -380,12 +380,12 @@ class _Under:
         """
         largest = np.full((len(fills), len(self.group.devices)), math.inf)
         largest[:, rows] = fills
-        shares = [
-            largest_share(Designs.of(kind, {"gas.pressure": self.changed["gas_pressure"][each]}).scene, part)
+        ratios = [
+            largest_ratio(Designs.of(kind, {"gas.pressure": self.changed["gas_pressure"][each]}).scene, part)
             for each, kind in self.group.kinds
             for part in (largest[:, each],)
         ]
-        return np.concatenate(shares, axis=1)[:, rows]
+        return np.concatenate(ratios, axis=1)[:, rows]
 
 
 def _group(number: int) -> range:

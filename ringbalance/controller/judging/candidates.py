@@ -118,12 +118,14 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
     share = _SETTLED * best[0].fraction
     fastest = min(each.time(share) for each in best)
     plateau = [each for each in every if each.count >= most - 1 and each.time(share) <= _AS_FAST**2 * fastest]
-
-    def amid(each: Tried) -> int:
-        return sum(each.candidate.is_beside(other.candidate) for other in plateau)
-
     fast = [each for each in best if each.time(share) <= _AS_FAST * fastest]
-    return max(fast, key=lambda each: (amid(each), -each.time(share)))
+    return max(
+        fast,
+        key=lambda each: (
+            sum(each.candidate.is_beside(other.candidate) for other in plateau),
+            -each.time(share),
+        ),
+    )
 
 
 def is_worse(each: Tried, best: BoolArray) -> bool:

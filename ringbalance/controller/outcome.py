@@ -178,7 +178,6 @@ def _pressures(run: Simulation) -> dict[str, Value]:
             law=law,
             fill=fill,
             opposite_fill=min(total - fill, law.max_fill_ratio),
-            primed=False,
             above=max(plant.gas_pressure, LEAST_PRESSURE_PA),
         )
 

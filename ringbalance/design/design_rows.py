@@ -82,11 +82,14 @@ def design_document(design: Design) -> dict[str, Any]:
         "front": [
             {
                 "changes": plain_settings(each.point),
-                "settings": plain_settings(each.race.settings),
+                "settings": plain_settings(each.race.judgement.settings),
                 "size_m3": each.size,
-                "fraction": each.race.fraction,
-                "devices": int(each.race.meets.size),
-                "settling_time_s": {"p50": finite(each.race.time(0.5)), "p90": finite(each.race.time(0.9))},
+                "fraction": each.race.judgement.fraction.value,
+                "devices": int(each.race.judgement.meets.size),
+                "settling_time_s": {
+                    "p50": finite(each.race.judgement.time(0.5)),
+                    "p90": finite(each.race.judgement.time(0.9)),
+                },
                 "energy_J": finite(each.race.gas),
             }
             for each in design.front
@@ -244,11 +247,12 @@ def _effects_table(design: Design) -> Table:
 
 def _front_table(design: Design) -> Table:
     required_fraction = REQUIRED_FRACTION if design.judgement is None else design.judgement.required_fraction
-    paths = [path for path in design.space.paths if path not in design.space.valve_paths]
+    by_valve = [path for axis in design.space.axes if any(axis.names) for path in axis.paths]
+    paths = [path for path in design.space.paths if path not in by_valve]
     rows = [
         (
             format_given(each.size, "m^3", digits=4),
-            format_given(finite(each.race.time(required_fraction)), "s", digits=3),
+            format_given(finite(each.race.judgement.time(required_fraction)), "s", digits=3),
             format_given(finite(each.race.gas), "J", digits=3),
             *([design.space.valve(each.point)] if design.space.valves else []),
             *(setting_text(path, each.point.get(path)) for path in paths),

@@ -14,7 +14,7 @@ from typing import Final
 from xml.etree import ElementTree as ET
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from ringbalance.export.blocks import Block, Variable, declared_units
+from ringbalance.export.blocks import Block, Variable, declared
 from ringbalance.export.hosts import block_c_files, filled
 from ringbalance.export.libraries import Version, every_library, local_library
 from ringbalance.export.reference import reference_files
@@ -143,7 +143,7 @@ def _heads(variable: Variable, number: int) -> dict[str, str]:
 def _add_units(root: ET.Element, block: Block) -> None:
     units = ET.SubElement(root, "UnitDefinitions")
     used = {each.range.get("unit") for each in block.variables}
-    for name, base in declared_units().items():
+    for name, base in declared()["units"].items():
         if name in used:
             ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", dict(base))
 

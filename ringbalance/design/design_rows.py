@@ -136,15 +136,26 @@ def _findings(design: Design) -> Iterator[Finding]:
     yield Finding(code="design_looked", values=counted)
     yield from _refusals(static.refusals, static.points)
     if design.succeeded:
-        yield from _sharpness(design)
+        if design.smaller is not None:
+            size, share = design.smaller
+            values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
+            yield Finding(code="design_smaller", values=values)
+        if design.doubt is not None:
+            yield Finding(code="design_doubt", values={"doubt": design.doubt})
     else:
         yield from _misses(design, judgement)
-    for path, end, wider in _edges(design):
-        code, default = _EDGES[design.succeeded]
-        if wider is None:
-            yield Finding(code=code, values={"path": path, "end": end})
-        else:
-            yield Finding(code=default, values={"path": path, "end": end, "vary": wider})
+    # Keys at an end of their range, and `vary` with a wider range if the end is a default.
+    code, default = _EDGES[design.succeeded]
+    for path, ends in (pair for axis in design.space.axes for pair in axis.ranges.items()):
+        value = float(design.point[path])
+        for low, end in ((True, ends.low), (False, ends.high)):
+            if abs(value - end) <= _EDGE_FRACTION * abs(end):
+                values = {"path": path, "end": setting_text(path, end)}
+                if (wider := design.space.wider(path, low=low)) is None:
+                    yield Finding(code=code, values=values)
+                else:
+                    yield Finding(code=default, values=values | {"vary": wider})
+                break
 
 
 def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
@@ -155,16 +166,6 @@ def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
         values = {"count": len(texts), "points": points, "reasons": len(set(reasons)), "most": most}
         text = texts[reasons.index(reason)]
         yield Finding(code="design_refused", values={**values, "text": text})
-
-
-def _sharpness(design: Design) -> Iterator[Finding]:
-    """Findings on the uncertainty of the smallest size."""
-    if design.smaller is not None:
-        size, share = design.smaller
-        values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
-        yield Finding(code="design_smaller", values=values)
-    if design.doubt is not None:
-        yield Finding(code="design_doubt", values={"doubt": design.doubt})
 
 
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
@@ -191,17 +192,6 @@ def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:
     values = np.sort(getattr(judgement.outcomes, demand.outcome))
     count = max(math.ceil(fraction * values.size), 1)
     return float(values[-count] if demand.sense == AT_LEAST else values[count - 1])
-
-
-def _edges(design: Design) -> Iterator[tuple[str, str, str | None]]:
-    """Keys at an end of their range, with that end, and `vary` with a wider range if the end is a default."""
-    for axis in design.space.axes:
-        for path, ends in axis.ranges.items():
-            value = float(design.point[path])
-            if abs(value - ends.low) <= _EDGE_FRACTION * abs(ends.low):
-                yield path, setting_text(path, ends.low), design.space.wider(path, low=True)
-            elif abs(value - ends.high) <= _EDGE_FRACTION * abs(ends.high):
-                yield path, setting_text(path, ends.high), design.space.wider(path, low=False)
 
 
 def _keys_table(design: Design, judgement: Judgement) -> Table:

@@ -358,7 +358,8 @@ class EccentricRun(PresentedResult):
         unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
         # The Euler transition is the cause to remove first.
         by_euler = keys.discretisation == "euler" and (unlike or keys.step > _euler_limit(self))
-        stalls = _stalled_fraction(self) > _NOTICEABLE_STALL_FRACTION and not self.friction_known
+        stalled = float(numbers["stalled_fraction"])
+        stalls = stalled > _NOTICEABLE_STALL_FRACTION and not self.friction_known
         due = {
             "strategy_not_finished": settled and self.stage not in {REST, FAILED},
             "strategy_failed": settled and self.stage == FAILED,
@@ -409,10 +410,6 @@ def _unstable(scene: EccentricScene) -> Iterator[Finding]:
             )
 
 
-def _stalled_fraction(run: EccentricRun) -> float:
-    return int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1)
-
-
 def _numbers(run: EccentricRun) -> dict[str, Value]:
     """Numbers that sentences refer to by name."""
     scene, worst = run.scene, run.left
@@ -438,7 +435,7 @@ def _numbers(run: EccentricRun) -> dict[str, Value]:
         "stage": STAGE_NAMES[run.stage],
         "turns": run.run_away,
         "cause": CAUSE_NAMES[int(run.history["cause"][-1])].replace("_", " "),
-        "stalled_fraction": _stalled_fraction(run),
+        "stalled_fraction": int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1),
         "saturation": run.saturation,
         "euler_limit": _euler_limit(run),
         "innovation": run.innovation,

@@ -255,7 +255,7 @@ def line_runs(nominal: Simulation) -> dict[str, Simulation]:
     for end in ends:
         conductance, ratio = end.line.conductance, end.line.critical_ratio
         gas = replace(scene.gas, conductance=conductance, critical_ratio=ratio, valve_lag=end.valve_lag)
-        runs[end.name] = nominal.again(replace(scene, gas=gas), terms)
+        runs[end.name] = nominal.again(replace(scene, gas=gas), modelled=terms)
     return runs
 
 

@@ -226,8 +226,8 @@ class Simulation(PresentedResult):
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: the flow law alone."""
-    again: Callable[[Scene, Sequence[str]], Simulation]
-    """Runs another scene under the same law, with the named terms modelled."""
+    again: Callable[..., Simulation]
+    """Runs another scene under the same law; `modelled`: names of the terms to model."""
 
     @property
     def status(self) -> str:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Final
 
 import numpy as np
@@ -184,7 +184,7 @@ def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> 
     """Orders and finest errors of the manufactured flow on ever finer meshes."""
     around = _AROUND[level]
     conditions = [
-        Dirichlet(boundary=name, component=c, value=lambda at, c=c: velocity(at)[c])
+        Dirichlet(boundary=name, component=c, value=partial(_component, c))
         for name in ("symmetry", "wall")
         for c in range(3)
     ]
@@ -226,6 +226,10 @@ def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> 
         series=(order_figure(studies),),
         convergence=tuple(studies.values()),
     )
+
+
+def _component(component: int, points: FloatArray) -> FloatArray:
+    return np.asarray(velocity(points)[component])
 
 
 def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

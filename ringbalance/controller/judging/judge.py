@@ -145,21 +145,6 @@ class Judgement:
         ]
 
 
-def judged(
-    balancer: Balancer,
-    settings: Settings,
-    *,
-    most: int | None = None,
-    start: int = FIRST_VERDICT_DEVICE,
-    watch_time: float = WATCH_TIME_S,
-    progress: Callable[[str], None] | None = None,
-) -> Judgement:
-    """Judge one choice of settings; see `judged_all`."""
-    return judged_all(balancer, [settings], most=most, start=start, watch_time=watch_time, progress=progress)[
-        0
-    ]
-
-
 def best_of(
     balancer: Balancer, settings: Sequence[Settings], *, progress: Callable[[str], None] | None = None
 ) -> Settings:

@@ -150,11 +150,11 @@ def _findings(design: Design) -> Iterator[Finding]:
         value = float(design.point[path])
         for low, end in ((True, ends.low), (False, ends.high)):
             if abs(value - end) <= _EDGE_FRACTION * abs(end):
-                values = {"path": path, "end": setting_text(path, end)}
+                edge: dict[str, Value] = {"path": path, "end": setting_text(path, end)}
                 if (wider := design.space.wider(path, low=low)) is None:
-                    yield Finding(code=code, values=values)
+                    yield Finding(code=code, values=edge)
                 else:
-                    yield Finding(code=default, values=values | {"vary": wider})
+                    yield Finding(code=default, values=edge | {"vary": wider})
                 break
 
 

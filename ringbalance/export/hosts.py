@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from string import Template
 from typing import Any, Final
@@ -146,7 +146,8 @@ def _st_array(kind: str, rows: Sequence[Any]) -> str:
 
 def _declared(block: Block, language: str) -> Iterator[str]:
     """Declarations of all tables."""
-    for kind, rows in zip(_NUMBERS, block.tables or (), strict=False):
+    tables: Iterable[tuple[str, Sequence[Any]]] = zip(_NUMBERS, block.tables or (), strict=False)
+    for kind, rows in tables:
         if kind == "Cells":
             text, width = _lines([str(row) for row in rows], per_line=20), ""
         else:

@@ -358,12 +358,11 @@ class EccentricRun(PresentedResult):
         unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
         # The Euler transition is the cause to remove first.
         by_euler = keys.discretisation == "euler" and (unlike or keys.step > _euler_limit(self))
-        stalled = float(numbers["stalled_fraction"])
-        stalls = stalled > _NOTICEABLE_STALL_FRACTION and not self.friction_known
+        stalled = int(self.memory["stalled"]) > _NOTICEABLE_STALL_FRACTION * int(self.memory["driven"])
         due = {
             "strategy_not_finished": settled and self.stage not in {REST, FAILED},
             "strategy_failed": settled and self.stage == FAILED,
-            "drive_nearly_stalled": stalls,
+            "drive_nearly_stalled": stalled and not self.friction_known,
             "voltage_at_limit": self.saturation > 0,
             "euler_too_coarse": by_euler,
             "innovations_unlike_model": unlike and not by_euler,

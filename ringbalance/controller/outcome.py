@@ -136,8 +136,8 @@ def _causes(run: Simulation) -> Iterator[Finding]:
         lost = None if held.likely_speed is not None else held.finding
         yield lost or Finding(code="tube_runs_back")
     if outcome in _BY_SETTINGS:
-        own = run.controller != scene.controller.kind
-        code = "own_overshoots" if own else "overshoots"
+        foreign = run.controller != scene.controller.kind
+        code = "own_overshoots" if foreign else "overshoots"
         yield Finding(code=code, values={"overshoots": run.overshoots})
 
 

@@ -109,9 +109,9 @@ def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
             required_fraction=threshold(required_fraction),
             settings=True,
         )
-        if first is None or first.fraction < required_fraction - NEAR:
+        if first is None or first.judgement.fraction.value < required_fraction - NEAR:
             continue
-        judgement = judged_design(space.hasty, point, settings=first.settings, search=True)
+        judgement = judged_design(space.hasty, point, settings=first.judgement.settings, search=True)
         if judgement is not None and judgement.verdict == MET:
             yield point, float(np.nanmedian(judgement.outcomes.energy))
 

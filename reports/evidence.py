@@ -28,7 +28,7 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.pictures.fields import chamber_field
-from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
+from ringbalance.reports.saved import keep_cases, kept_cases, provenance, versions
 from ringbalance.reports.section import Record, Work, ring_of
 from ringbalance.reports.sections import sections_of
 from ringbalance.results.numbers import format_given, short, with_unit
@@ -95,7 +95,7 @@ def collect_evidence(
     new = {
         name: {"date": date_today, "record": case}
         for name, case in ran.items()
-        if level == "light" and looks_at_no_scene(case) and not case["broken"]
+        if level == case["cost"] == "light" and case["judged_on"] == "paper" and not case["broken"]
     }
     if new:
         keep_cases({**stored, **new})

@@ -9,10 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import WATCH_TIME_S, Balancer, Draws, Outcomes, Settings
-from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all, plain_settings
-from ringbalance.controller.judging.ranking import ranked
-from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
-from ringbalance.controller.judging.search import searched
+from ringbalance.controller.judging.judge import Judgement, judged_all, plain_settings
+from ringbalance.controller.judging.remedies import tried_choices
 from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning
 from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
@@ -27,19 +25,6 @@ from ringbalance.scene.units import shortest, shortest_quantity
 _COARSE_DEVICES: Final = 16
 """Number of devices on which settings for purchase options are chosen."""
 _MAX_CURVE_POINTS: Final = 50
-
-
-def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
-    """Judge the scene's own settings, with remedies and measurements where these settings do not suffice."""
-    (judgement,) = judged_all(balancer, [{}], first=first, most=most)
-    suffices = judgement.verdict == MET or bool(judgement.meets.all())
-    measures = () if suffices else tuple(ranked(balancer, judgement).findings())
-    remedies = () if suffices else tried_remedies(balancer, judgement, search=searched)
-    return {
-        "own": judgement_record(judgement),
-        "remedies": [each.document() for each in remedies],
-        "measures": [each.document() for each in measures],
-    }
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:

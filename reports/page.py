@@ -241,7 +241,7 @@ def _environment() -> jinja2.Environment:
         **QUANTITY_FILTERS,
     }
     environment.globals |= {"table_of": table_of, "listing_of": listing_of, "deciding": deciding}
-    environment.tests |= {"verdict": summary.is_verdict}
+    environment.tests |= {"verdict": summary.TONES.__contains__}
     return environment
 
 

@@ -115,11 +115,6 @@ def _case_problem(case: Any, name: str) -> str:
 _PREFIX: Final = "cases-"
 
 
-def looks_at_no_scene(case: Mapping[str, Any]) -> bool:
-    """True if a case's record is the same for every scene, and the case is cheap enough to run unasked."""
-    return bool(case["judged_on"] == "paper" and case["cost"] == "light")
-
-
 def kept_cases() -> dict[str, Record]:
     """Light cases that depend on no scene, by id, each with its `record` and the `date` of its run."""
     path = _kept_file()

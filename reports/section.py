@@ -49,11 +49,6 @@ def _nothing(_work: Work) -> None:
     """Collect no evidence."""
 
 
-def _everything(_own: Record, _evidence: Record) -> Record:
-    """Add nothing to the content that every template sees."""
-    return {}
-
-
 @dataclass(frozen=True, kw_only=True)
 class Section:
     """One section of the page."""
@@ -69,7 +64,7 @@ class Section:
     section's name; None: nothing to report."""
     parts: tuple[Job, ...] = ()
     """Jobs; each takes the work, then the answers that it needs."""
-    show: Callable[[Record, Record], Record | None] = _everything
+    show: Callable[[Record, Record], Record | None] = lambda _own, _evidence: {}
     """Function of the section's and the whole evidence: texts and drawings for the template, or None."""
     always: bool = False
     """True if the section is shown even without evidence, then with an empty record."""

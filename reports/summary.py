@@ -11,7 +11,7 @@ from ringbalance.results.requirements import MET, MISSED, OPEN, UNASKED
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
 CHECK_VERDICTS: Final = ("passed", "failed", "inconclusive", "not run")
-_TONES: Final = {
+TONES: Final = {
     "confirmed": "good",
     "passed": "good",
     "confirmed with correction": "fair",
@@ -26,14 +26,9 @@ _TONES: Final = {
 }
 
 
-def is_verdict(text: str) -> bool:
-    """True if a table's cell is a verdict, which has a colour."""
-    return text in _TONES
-
-
 def tone(verdict: str) -> str:
     """Colour group of a verdict."""
-    return _TONES.get(verdict, "open")
+    return TONES.get(verdict, "open")
 
 
 def claims(evidence: Record) -> list[Record]:

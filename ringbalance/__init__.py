@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
-    from ringbalance.fitting import Fit as Fit
     from ringbalance.fitting import fit as fit
+    from ringbalance.identification.documents import Fit as Fit
     from ringbalance.identification.influence import InfluenceTable as InfluenceTable
     from ringbalance.identification.influence import read_influence as read_influence
     from ringbalance.reduced_model.calibration_record import Calibration as Calibration
@@ -121,6 +121,7 @@ _NAMES = {
         "simulate",
         "tune",
     ),
+    "identification.documents": ("Fit",),
     "identification.influence": ("InfluenceTable", "read_influence"),
     "reduced_model.calibration_record": ("Calibration",),
     "reduced_model.law.files": ("load_law",),
@@ -139,7 +140,7 @@ _NAMES = {
         "load_scene",
     ),
     "search": ("find_design",),
-    "fitting": ("Fit", "fit"),
+    "fitting": ("fit",),
     "reporting": ("plot", "write_report"),
     "studies": ("extremes", "run_cases", "trade"),
     "verification.extremes.study": ("Extremes",),

@@ -298,6 +298,8 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         """,
         _options("scene json out level tolerance", out=_PATH, level=ShellOption(_EFFORT, "heavy")),
         "SCENE --level light",
+        begin="models ...",
+        headline=False,
     ),
     "extremes": ShellCommand(
         """Limits of validity: where results stop, what is reported beyond, and whether the invariants hold

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from os import PathLike
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.identification.criticism import Review
-from ringbalance.identification.documents import fit_document, fit_rows
-from ringbalance.identification.fitting import FitResult, FittedParameter, Loss, problem_of
+from ringbalance.identification.documents import Fit
+from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
-from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
+from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import read_observations
 from ringbalance.identification.reading import template as template_of
 from ringbalance.identification.saving import save_result
 from ringbalance.interface import checked, print_result
-from ringbalance.results.result import Result, Rows
 from ringbalance.scene import AnyScene, SceneError, load_scene
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.platform.files import check_file
@@ -31,48 +28,6 @@ _USAGE: Final = (
     "ringbalance fit SCENE DATA.csv [DATA.csv ...], for example ringbalance fit my_disc.toml injections.csv; "
     "ringbalance fit --template KIND prints an empty file of measurements"
 )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Fit(Result):
-    """A fit with the tests of its residuals and the measurement that would help most.
-
-    Example:
-        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
-        >>> data = rb.bundled_scene("liquid_ring_paper").parent / "measurements" / "trial_weight.csv"
-        >>> print(rb.fit(scene, data))
-        Pan's liquid-ring disc (liquid_ring_paper.toml), fitted to 7 measurements
-          influence_coefficient (0.011226 ± 0.000060) um/(g mm)
-          lag_angle (19.25 ± 0.31)°
-          nothing in the residuals speaks against the fit (4 tests, 5 % level)
-    """
-
-    result: FitResult
-    data: tuple[Observations, ...]
-    review: Review
-    next_measurement: NextMeasurement
-
-    @property
-    def parameters(self) -> tuple[FittedParameter, ...]:
-        """Parameters with value and interval (95 %), SI, and whether the data identify them."""
-        return self.result.parameters
-
-    @property
-    def succeeded(self) -> bool:
-        """True if the fit describes the data."""
-        return self.review.describes
-
-    def to_dict(self) -> dict[str, Any]:
-        """Document that `ringbalance fit --json` prints."""
-        return fit_document(
-            self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
-        )
-
-    def rows(self) -> Rows:
-        """Parameters, tests of the fit, and further findings."""
-        return fit_rows(
-            self.result, data=self.data, review=self.review, next_measurement=self.next_measurement
-        )
 
 
 @checked

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from inspect import signature
+from json import dumps
 from types import SimpleNamespace
 from typing import Any, Final
 
-from ringbalance.commands import COMMANDS, ShellOption
+from ringbalance.commands import COMMANDS
 from ringbalance.interface import SCENES, law_for, opened, print_result
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.faults import SceneError
@@ -27,7 +27,7 @@ TARGETS: Final = {
     "fit": "ringbalance.fitting:fit_files",
     "verify": "ringbalance.verification.command:verify",
     "compare": "ringbalance.face:compare_under",
-    "trade": "ringbalance.studies:trade_file",
+    "trade": "ringbalance.studies:trade",
     "extremes": "ringbalance.studies:extremes_file",
     "plot": "ringbalance.reporting:plot_file",
     "doctor": "ringbalance.doctor:doctor",
@@ -39,7 +39,21 @@ def run_command(name: str, /, **settings: Any) -> int:
     """Run a command; options without a setting have their defaults. Returns: Exit code."""
     command = COMMANDS[name]
     options = {key: each.default for key, each in command.options.items()} | settings
-    _check_options(command.options, options)
+    for key, option in command.options.items():
+        value, limits = options[key], option.limits
+        if value is None:
+            continue
+        if limits and not limits.least <= value <= limits.most:
+            raise SceneError.of_option(
+                option=f"--{key}", value=value, problem=limits.problem, allowed=limits.allowed
+            )
+        if option.ending is None:
+            continue
+        if not value.name.lower().endswith(option.ending):
+            problem = "this name does not say what is written"
+            allowed = f"a file name that ends in {option.ending}"
+            raise SceneError.of_option(option=f"--{key}", value=str(value), problem=problem, allowed=allowed)
+        check_file(value, apart_from=options.get("scene"))
     target = imported(TARGETS[name])
     if not command.begin:
         return int(target(SimpleNamespace(**options)))
@@ -48,6 +62,9 @@ def run_command(name: str, /, **settings: Any) -> int:
         options["workers"] = os.cpu_count() or 1
     if "law" in options and "scene" in options:
         options["flow_law"] = law_for(options["scene"], options["law"])
+    file = options["out"] / f"{name}.json" if options.get("out") else None
+    if file is not None:
+        check_file(file)
     # No second check: the scene was read just now, and only its tolerance may differ from the file's.
     work = getattr(target, "__wrapped__", target)
     with activity(name, command.begin) as shown:
@@ -60,27 +77,9 @@ def run_command(name: str, /, **settings: Any) -> int:
         # A search that could judge no design has nothing to save.
         write_whole(save, file_text(result.recommended_scene, to=save.parent))
     print_result(result, json=options["json"], headline=command.headline)
+    if file is not None:
+        write_whole(file, dumps(result.to_dict(), allow_nan=False) + "\n")
+        print_message(f"written to {file}")
     if save and law:
         print_message(f"law written to {save}")
     return 0 if getattr(result, "succeeded", True) else 1
-
-
-def _check_options(declared: Mapping[str, ShellOption], options: Mapping[str, Any]) -> None:
-    """Raises: SceneError: a value that is not allowed. OSError: a file that cannot be written."""
-    for key, option in declared.items():
-        value, limits = options[key], option.limits
-        if value is None:
-            continue
-        if limits and not limits.least <= value <= limits.most:
-            raise SceneError.of_option(
-                option=f"--{key}", value=value, problem=limits.problem, allowed=limits.allowed
-            )
-        if option.ending is None:
-            continue
-        if not value.name.lower().endswith(option.ending):
-            problem, allowed = (
-                "this name does not say what is written",
-                f"a file name that ends in {option.ending}",
-            )
-            raise SceneError.of_option(option=f"--{key}", value=str(value), problem=problem, allowed=allowed)
-        check_file(value, apart_from=options.get("scene"))

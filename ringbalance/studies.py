@@ -9,10 +9,10 @@ from json import dumps
 from types import SimpleNamespace
 from typing import Final
 
-from ringbalance.interface import checked, opened, print_result
+from ringbalance.interface import checked, print_result
 from ringbalance.scene import AnyScene, load_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.platform.files import check_file, staged, write_whole
+from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.study import SIZES, Extremes, check_sector, find_extremes
@@ -39,21 +39,6 @@ def trade(
         True
     """
     return trade_study(liquid_ring_scene(scene), level=level, progress=progress)
-
-
-def trade_file(options: SimpleNamespace) -> int:
-    """Run the command `trade`."""
-    scene = liquid_ring_scene(opened(options.scene, options.tolerance))
-    file = options.out and options.out / "trade.json"
-    if file is not None:
-        check_file(file)
-    with activity("trade", "models ...") as shown:
-        study = trade_study(scene, level=options.level, progress=lambda title: shown.show(f"{title} ..."))
-    print_result(study, json=options.json, headline=False)
-    if file is not None:
-        write_whole(file, dumps(study.to_dict(), allow_nan=False) + "\n")
-        print_message(f"written to {file}")
-    return 0
 
 
 @checked

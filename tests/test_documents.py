@@ -19,7 +19,7 @@ from ringbalance.controller.balancer import Draws
 from ringbalance.controller.judging import remedies as remedies_module
 from ringbalance.controller.judging import search as search_module
 from ringbalance.controller.judging import tune as tune_module
-from ringbalance.controller.judging.judge import judged, judged_all
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
@@ -160,7 +160,6 @@ def few_devices() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tune_module, "judged_all", partial(judged_all, first=8, most=8))
         patch.setattr(tune_module, "BLOCK", 8)
-        patch.setattr(remedies_module, "judged", partial(judged, most=8))
         patch.setattr(remedies_module, "_FIRST_DEVICES", 4)
         patch.setattr(tune_module, "searched", lambda *_, **__: {"controller.gas_time_offset": (1e-3,)})
         patch.setattr(search_module, "_HEATS", ((0, 4),))

@@ -168,8 +168,22 @@ def trade_study(
     report_progress("velocity")
     driven = scene.disc.max_fill_ratio * np.array(_FLOW_FILLS_OF_MAX)
     flow = law.evaluate(fill_ratio=driven, gas_pressure=scene.gas.pressure)
+
+    def velocity(law: Callable[[], FlowLaw]) -> tuple[FloatArray, ...]:
+        return (law().evaluate(fill_ratio=driven, gas_pressure=scene.gas.pressure).velocity,)
+
+    constant = replace(scene, tube=replace(scene.tube, drag_coefficient=PAPER_DRAG_COEFFICIENT))
+    laws: dict[str, Callable[[], FlowLaw]] = {
+        "the paper's law": lambda: paper_law(scene),
+        f"k = {PAPER_DRAG_COEFFICIENT:g}, regimes over the crest": lambda: nominal_law(
+            constant, gravity=False
+        ),
+        "correlations and finite-element tables, few nodes": lambda: nominal_law(scene, gravity=False),
+        "the same with gravity to all orders": lambda: nominal_law(scene, gravity=True),
+        "the same with uncertainties, checked by finite elements": lambda: chamber_and_law(scene)[1],
+    }
     measured += _measured(
-        _flow_models(scene, driven),
+        {name: partial(velocity, law) for name, law in laws.items()},
         {"velocity": "velocity in the tube, m/s"},
         driven,
         half_widths=[float(np.max(_relative(flow.uncertainty, flow.velocity)))],
@@ -260,22 +274,3 @@ def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[st
             named = " x ".join(map(str, cells))
             models[f"{len(cells)}-D finite elements, {named} cells"] = partial(elements, cells)
     return models | {f"{walls}, gravity to all orders": partial(closed, True)}
-
-
-def _flow_models(scene: Scene, fills: FloatArray) -> dict[str, Solve]:
-    """Models of the velocity under the scene's gas; the finest tabulates the loss to rounding."""
-
-    def velocity(law: Callable[[], FlowLaw]) -> tuple[FloatArray, ...]:
-        return (law().evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure).velocity,)
-
-    constant = replace(scene, tube=replace(scene.tube, drag_coefficient=PAPER_DRAG_COEFFICIENT))
-    laws: dict[str, Callable[[], FlowLaw]] = {
-        "the paper's law": lambda: paper_law(scene),
-        f"k = {PAPER_DRAG_COEFFICIENT:g}, regimes over the crest": lambda: nominal_law(
-            constant, gravity=False
-        ),
-        "correlations and finite-element tables, few nodes": lambda: nominal_law(scene, gravity=False),
-        "the same with gravity to all orders": lambda: nominal_law(scene, gravity=True),
-        "the same with uncertainties, checked by finite elements": lambda: chamber_and_law(scene)[1],
-    }
-    return {name: partial(velocity, law) for name, law in laws.items()}

@@ -106,11 +106,6 @@ def _loops(_own: Record, evidence: Record) -> Record:
     }
 
 
-def _claims(_own: Record, evidence: Record) -> Record:
-    cases = summary.claims(evidence)
-    return {"counts": summary.verdict_counts(cases, summary.CLAIM_VERDICTS)}
-
-
 BALANCER: Final = "eccentric_mass"
 SECTIONS: Final = (
     Section(
@@ -141,7 +136,9 @@ SECTIONS: Final = (
         title="Claims of the eccentric-mass paper",
         document="report",
         of_paper=True,
-        show=_claims,
+        show=lambda _own, evidence: {
+            "counts": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS)
+        },
         template="masses_claims.html",
     ),
     CREDIBILITY,

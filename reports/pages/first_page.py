@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
@@ -158,9 +158,9 @@ def _other_reading(work: Work) -> Record | None:
         other = liquid_ring_scene(load_scene(bundled_scene(_OTHER_READING)))
     except SceneError:
         return None
-    judgement = judgement_record(judged(balancer_of(other), {}, most=BLOCK))
+    (judgement,) = judged_all(balancer_of(other), [{}], most=BLOCK)
     k = calibration_of(other).quantities["drag_coefficient"].value
-    return {"bore_m": other.tube.bore, "k": k, "fraction": judgement["fraction"]}
+    return {"bore_m": other.tube.bore, "k": k, "fraction": judgement_record(judgement)["fraction"]}
 
 
 def _view(record: Record, evidence: Record) -> Record:

@@ -14,7 +14,7 @@ from matplotlib.patches import Wedge
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.figure import (
@@ -262,7 +262,7 @@ def _loop_gain(scene: Scene, model: BalancerModel) -> _LoopGain | None:
 def _consequences(work: Work) -> Record:
     """Gains of both laws, and the paper's law judged on the devices of the calibrated one in the summary."""
     gains = [_loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
-    paper = judged(balancer_of(work.ring, flow_law="paper"), {})
+    (paper,) = judged_all(balancer_of(work.ring, flow_law="paper"), [{}])
     return {
         "gain": [asdict(each) for each in gains if each is not None],
         "paper": judgement_record(paper),

@@ -6,10 +6,15 @@ from collections import Counter
 from typing import Final
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.reports.judged import advice_view, own_record, settings_lines
+from ringbalance.controller.judging.judge import judged_all
+from ringbalance.controller.judging.ranking import ranked
+from ringbalance.controller.judging.remedies import tried_remedies
+from ringbalance.controller.judging.search import searched
+from ringbalance.reports.judged import advice_view, judgement_record, settings_lines
 from ringbalance.reports.pages.standing import DOCUMENT
 from ringbalance.reports.run_figures import run_amplitude
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.requirements import MET
 from ringbalance.scene.faults import SceneError
 
 _FIGURE_KEYS: Final = {"time_s", "amplitude_m", "limit_m"}
@@ -25,9 +30,16 @@ def decision(work: Work) -> Record:
         limit = balancer.rotor().limit
     except SceneError:
         limit = None
+    (judgement,) = judged_all(balancer, [{}], first=_MIN_DEVICES, most=_MAX_DEVICES)
+    # Remedies and measurements are of use where these settings do not suffice.
+    suffices = judgement.verdict == MET or bool(judgement.meets.all())
+    measures = () if suffices else tuple(ranked(balancer, judgement).findings())
+    remedies = () if suffices else tried_remedies(balancer, judgement, search=searched)
     return {
         "limit_m": limit,
-        **own_record(balancer, first=_MIN_DEVICES, most=_MAX_DEVICES),
+        "own": judgement_record(judgement),
+        "remedies": [each.document() for each in remedies],
+        "measures": [each.document() for each in measures],
         "recommended": None,
         "settings": settings_lines(work.scene, paths),
     }

@@ -21,8 +21,7 @@ from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.pressure.solve import RotatingLiquid, quadratic_basis, solve_on, solve_pressure
 from ringbalance.reduced_model import paper
-from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.files import draft_folder, write_whole
 
@@ -144,19 +143,11 @@ def _write_vtu(path: Path, *, mesh: Any, fields: Mapping[str, npt.ArrayLike] | N
     stored = to_meshio(mesh, nodal)
     # VTK has no points in the plane; meshio would say so on the console.
     stored.points = np.pad(stored.points, ((0, 0), (0, 3 - stored.points.shape[1])))
-    return _written(path, stored)
+    return write_mesh(path, stored)
 
 
-def write_cells(path: Path, *, kind: CellKind, points: FloatArray, cells: IntArray) -> Path:
-    """Write cells of one kind in metres to a VTU file, whole or not at all.
-
-    Args: `cells`: in meshio's order.
-    Raises: OSError: the file cannot be written.
-    """
-    return _written(path, meshio.Mesh(points, {str(kind): cells}))
-
-
-def _written(path: Path, stored: meshio.Mesh) -> Path:
+def write_mesh(path: Path, stored: meshio.Mesh) -> Path:
+    """Write a mesh in metres to a VTU file, whole or not at all. Raises: OSError: it cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with draft_folder(path.parent) as folder:
         draft = folder / path.name

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import meshio
+
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_cells
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill, write_mesh
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.scene import Scene
 
@@ -90,8 +92,8 @@ def _write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     geometry = scene.disc.geometry
     if geometry is not None:
         path = folder / _FIELDS / "chamber.vtu"
-        cells = write_cells(path, kind=geometry.kind, points=geometry.points, cells=geometry.cells)
-        written["chamber"] = cells
+        cells = meshio.Mesh(geometry.points, {str(geometry.kind): geometry.cells})
+        written["chamber"] = write_mesh(path, cells)
     return written
 
 

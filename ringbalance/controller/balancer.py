@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol, Self
 import numpy as np
 
 from ringbalance.controller.rotor import CommonRotor, Rotors
-from ringbalance.controller.trials import DrawnInput, Information, Trials, drawn_key
+from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput, Information, Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
@@ -347,8 +347,10 @@ class Balancer(ABC):
         return ()
 
     def drawn_input(self, name: str) -> DrawnInput:
-        """Kind of an input of `Outcomes.inputs`."""
-        return drawn_key(self.scene, name)
+        """Kind of an input of `Outcomes.inputs`: a key of the scene can be measured itself."""
+        table, _, key = name.split("[")[0].partition(".")
+        declared = scene_kind(self.scene.balancer).schema.key_at((table, key))
+        return DrawnInput(common=declared.common, measure=MEASURE_INPUT, path=name)
 
     @abstractmethod
     def on_scene(self, scene: SceneFile) -> Self:

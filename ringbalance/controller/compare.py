@@ -29,7 +29,7 @@ from ringbalance.controller.rotor import (
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Cells, Result, Rows, Table
-from ringbalance.results.rows import Finding, Quantity, Value
+from ringbalance.results.rows import Finding, Quantity, Value, text_of
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
@@ -184,7 +184,7 @@ class Comparison(Result):
             "spread": [{key: side.ends(name) for key, name in numbers} for side in sides],
             "worst_amplitude_m": [side.worst_amplitude for side in sides],
             "settings": [plain_settings(side.settings) for side in sides],
-            "energy_kind": [_energy_finding(side).text for side in sides],
+            "energy_kind": [text_of(side.energy_kind, source=side.scene.source) for side in sides],
             "sampling_time_s": [side.sampling_time for side in sides],
             "span_s": self.span,
             "status": [side.status for side in sides],
@@ -231,7 +231,8 @@ class Comparison(Result):
             values |= {"share": share.value, "low": share.low, "high": share.high, "of": share.of}
             code = "side_settled" if share.count == share.of else "side_not_settled"
             findings.append(Finding(code=code, values=values))
-        findings += [_energy_finding(side) for side in sides]
+        kinds = [(side.energy_kind, {"source": side.scene.source}) for side in sides]
+        findings += [Finding(code=code, values=values) for code, values in kinds]
 
         heads = [side.scene.name for side in sides]
         if len(set(heads)) == 1:
@@ -253,10 +254,6 @@ class Comparison(Result):
             findings=tuple(findings),
             tables=(Table(heads=("", *heads), rows=cells, note=note),),
         )
-
-
-def _energy_finding(side: Side) -> Finding:
-    return Finding(code=side.energy_kind, values={"source": side.scene.source})
 
 
 def compare(

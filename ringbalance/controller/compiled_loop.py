@@ -82,13 +82,35 @@ def continue_runs(
             _begin(loop, plant, run, motions[i], instants)
         while run.cause == NONE and run.samples < until:
             if loop.sensed == 0:
-                _sense(loop, run, noise[run.plant, run.samples, 0], noise[run.plant, run.samples, 1])
+                # A noisy sample; an amplitude that noise would make negative is folded back.
+                deviates = noise[run.plant, run.samples]
+                run.seen_amplitude = abs(run.amplitude + loop.amplitude_noise * deviates[0])
+                direction = math.atan2(run.vibration.imag, run.vibration.real)
+                run.seen_phase = direction + loop.phase_noise * deviates[1]
+                run.usable = USABLE
             run.samples += 1
             if loop.algorithm != OWN:
                 decide(loop, assumed, run, liquid[i], notes[0], w)
-            _watch(loop, run)
+            # Overshoots, rises in a row and misadjustments; a sample without an amplitude is skipped.
+            if run.usable >= NO_PHASE:
+                if run.samples == 1:
+                    run.first_seen = run.seen_amplitude
+                if run.operated > 0 and not math.isnan(run.last_seen):
+                    higher = run.seen_amplitude - run.last_seen > run.noise_floor
+                    run.rises = run.rises + 1 if higher else 0
+                    run.misadjustments += 1 if higher else 0
+                run.last_seen, run.operated = run.seen_amplitude, 0
+            if run.usable == USABLE:
+                if run.seen_amplitude > loop.limit and not math.isnan(run.last_phase):
+                    run.overshoots += 1 if math.cos(run.seen_phase - run.last_phase) < 0.0 else 0
+                run.last_phase = run.seen_phase
             run.cause = _cause(loop, plant, run, motions[i])
-            _keep_sample(loop, run, samples)
+            if run.samples <= samples.size:
+                row = samples[run.samples - 1]
+                row.time, row.resting, row.reason = run.time, run.resting, run.reason
+                row.amplitude, row.phase = run.seen_amplitude, run.seen_phase
+                for pair in range(loop.chambers // 2):
+                    row.asked[pair], row.side[pair] = run.asked[pair], run.side[pair]
             if run.cause == NONE:
                 _act(loop, plant, run, motions[i], instants, injections, notes, w)
                 run.cause = SAMPLES if run.samples >= loop.most_samples else NONE
@@ -121,14 +143,6 @@ def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: 
 
 
 @in_place
-def _sense(loop: Record, run: Record, amplitude_noise: float, phase_noise: float) -> None:
-    """Write a noisy sample; an amplitude that noise would make negative is folded back."""
-    run.seen_amplitude = abs(run.amplitude + loop.amplitude_noise * amplitude_noise)
-    run.seen_phase = math.atan2(run.vibration.imag, run.vibration.real) + loop.phase_noise * phase_noise
-    run.usable = USABLE
-
-
-@in_place
 def decide(
     loop: Record, assumed: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
 ) -> None:
@@ -149,23 +163,6 @@ def decide(
     for i in range(half):
         opened = opened or run.asked[i] > 0.0
     run.reason = 0 if opened or run.resting > 0 else TOO_SHORT
-
-
-@in_place
-def _watch(loop: Record, run: Record) -> None:
-    """Count overshoots, rises in a row and misadjustments; a sample without an amplitude is skipped."""
-    if run.usable >= NO_PHASE:
-        if run.samples == 1:
-            run.first_seen = run.seen_amplitude
-        if run.operated > 0 and not math.isnan(run.last_seen):
-            higher = run.seen_amplitude - run.last_seen > run.noise_floor
-            run.rises = run.rises + 1 if higher else 0
-            run.misadjustments += 1 if higher else 0
-        run.last_seen, run.operated = run.seen_amplitude, 0
-    if run.usable == USABLE:
-        if run.seen_amplitude > loop.limit and not math.isnan(run.last_phase):
-            run.overshoots += 1 if math.cos(run.seen_phase - run.last_phase) < 0.0 else 0
-        run.last_phase = run.seen_phase
 
 
 @in_place
@@ -243,13 +240,3 @@ def _act(
         run.operated = 1
         moved = keep_injections(loop, plant, run, motions, start, injections)
         run.idle = 0 if moved or abs(run.vibration - before) > loop.limit else run.idle + 1
-
-
-@in_place
-def _keep_sample(loop: Record, run: Record, samples: Record) -> None:
-    if run.samples <= samples.size:
-        row = samples[run.samples - 1]
-        row.time, row.resting, row.reason = run.time, run.resting, run.reason
-        row.amplitude, row.phase = run.seen_amplitude, run.seen_phase
-        for i in range(loop.chambers // 2):
-            row.asked[i], row.side[i] = run.asked[i], run.side[i]

@@ -75,7 +75,13 @@ def move(
     if guarded and not _keeps_residual(loop, plant, run, motions, w):
         for i in range(half):
             motions[i] = motions[half + i]
-        _shorten(loop, plant, run, motions, w)
+        # Shorter times that drive liquid, so that the residual fill remains.
+        for i in range(half):
+            if run.drives[i] > 0.0:
+                driving, side, lowest = run.drives[i], run.side[i], run.lowest[i]
+                time = opening_within(plant, motions, i, 2 * half, side, driving, lowest, w)
+                if time != driving:
+                    _gas_in_port(loop, run, i, time)
         drift = _pass(loop, plant, run, motions, notes, w)
     run.drift = max(run.drift, drift)
 
@@ -95,18 +101,6 @@ def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w
             run.lowest[i] = least_later(plant, motions, spare, w)
             keeps = keeps and run.lowest[i] >= run.residual_fill
     return keeps
-
-
-@in_place
-def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> None:
-    """Shorten the times that drive liquid so that the residual fill remains."""
-    half = loop.chambers // 2
-    for i in range(half):
-        if run.drives[i] > 0.0:
-            driving, side, lowest = run.drives[i], run.side[i], run.lowest[i]
-            time = opening_within(plant, motions, i, 2 * half, side, driving, lowest, w)
-            if time != driving:
-                _gas_in_port(loop, run, i, time)
 
 
 @in_place

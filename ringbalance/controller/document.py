@@ -258,7 +258,7 @@ def line_runs(nominal: Simulation) -> dict[str, Simulation]:
     for end in ends:
         conductance, ratio = end.line.conductance, end.line.critical_ratio
         gas = replace(scene.gas, conductance=conductance, critical_ratio=ratio, valve_lag=end.valve_lag)
-        runs[end.name] = nominal.again(replace(scene, gas=gas), terms)
+        runs[end.name] = nominal.again(replace(scene, gas=gas), modelled=terms)
     return runs
 
 
@@ -313,16 +313,17 @@ def conventions(run: Simulation) -> tuple[Quantity, ...]:
     """
     return tuple(
         Quantity(key=key, name=name, value=value, unit=unit, origin="simulated", status=status, digits=3)
-        for key, name, value, unit, status in (*_vibration_rows(run), *_loop_and_gas_rows(run))
+        for key, name, value, unit, status in _convention_rows(run)
     )
 
 
-_Row = tuple[str, str, float | None, str, str]
-"""Key, name, value, unit and status of a quantity."""
+def _convention_rows(run: Simulation) -> Iterator[tuple[str, str, float | None, str, str]]:
+    """Key, name, value, unit and status of each quantity.
 
-
-def _vibration_rows(run: Simulation) -> Iterator[_Row]:
-    """Unbalances and vibrations, before and at the end."""
+    Down to the lowest speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: to the
+    first at any pressure of a cavity over the crest, to the second at the pressure that runs assume.  Below
+    them it runs back as the speed falls, until at two further speeds the column holds full at equal fills.
+    """
     scene, before, after = run.scene, float(run.amplitude[0]), float(run.amplitude[-1])
     rotor, grade = scene.rotor, scene.requirement.grade
     influence = rotor.influence_coefficient
@@ -341,16 +342,7 @@ def _vibration_rows(run: Simulation) -> Iterator[_Row]:
         velocity = balancing.rms_velocity(amplitude=amplitude, speed=rotor.speed)
         yield f"{key}_peak_to_peak", f"vibration {when}, peak to peak", 2 * amplitude, "m", "ok"
         yield f"{key}_velocity", f"vibration {when}, velocity, rms", velocity, "m/s", "ok"
-
-
-def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
-    """Peak sensitivity of a stable loop with a gain, gas used, and lowest speeds for a lasting correction.
-
-    Down to these speeds the fullest chamber keeps its liquid with the gas off, by hydrostatics: to the first
-    at any pressure of a cavity over the crest, to the second at the pressure that runs assume.  Below them
-    it runs back as the speed falls, until at two further speeds the column holds full at equal fills, too.
-    """
-    factor, controller = run.loop.value, run.scene.controller
+    factor, controller = run.loop.value, scene.controller
     if run.loop.fixed and factor is not None and factor < run.loop.limit:
         peak = balancing.peak_sensitivity(
             loop_factor=factor,
@@ -391,9 +383,9 @@ def _loop_and_gas_rows(run: Simulation) -> Iterator[_Row]:
         name = f"correction lasts without gas, {how_sure} down to"
         yield key, name, speed, "rad/s", "ok" if speed is not None else status
     level = Holding.of(run.scene, fill_ratio=run.scene.disc.initial_fill)
-    for key, how_sure, before, speed in (
+    for key, how_sure, lasting, speed in (
         ("levelled_speed", "perhaps", held.sure_speed, level.sure_speed),
         ("likely_levelled_speed", "as runs assume", held.likely_speed, level.likely_speed),
     ):
         name = f"opposite chambers level after a slow run-down, {how_sure}, to"
-        yield key, name, None if before is None else speed, "rad/s", "ok" if before is not None else status
+        yield key, name, None if lasting is None else speed, "rad/s", "ok" if lasting is not None else status

@@ -23,7 +23,7 @@ from ringbalance.controller.terms import check_fit, dynamics_of, run_models, ter
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
 from ringbalance.reduced_model.injection.moment import tabulate_moment
-from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.results.result import Presentation
 from ringbalance.scene.models import Scene
@@ -37,9 +37,8 @@ MAX_SAMPLES: Final = 10_000
 
 def simulate(
     scene: Scene,
-    model: BalancerModel | None = None,
+    model: BalancerModel,
     *,
-    flow_law: CompleteLaw | None = None,
     controller: Controller[Any] | BuiltIn | None = None,
     sensor: Sensor | None = None,
     progress: Progress | None = None,
@@ -56,7 +55,6 @@ def simulate(
     samples, for a minute more, nothing can change any more, the run cannot succeed, or the time is up.
     `to_time_limit`: a run that has settled continues, with the same answer, to its time limit.
     Args:
-        flow_law: in place of `model`, a law that carries its own moments and volumes.
         sensor: default the scene's noise from the scene's seed.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
             default all that the scene gives numbers for.
@@ -65,29 +63,24 @@ def simulate(
         speed: factor on the law's velocity.
         noise: random numbers of the scene's sensor; default those of the scene's seed.
     Raises: SceneError: a rotor too slow to form a ring, or a model made for another disc.
-    Raises: ValueError: both a model and a flow law, or neither; terms to model that the scene or the law
-        gives no numbers for; gas into both chambers of a pair at once.
+    Raises: ValueError: terms to model that the scene or the law gives no numbers for; gas into both chambers
+        of a pair at once.
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_ring(scene)
-    balancer = model if flow_law is None else BalancerModel.of(flow_law)
-    if balancer is None or (model is not None and flow_law is not None):
-        raise ValueError(
-            "give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither"
-        )
-    check_fit(scene, balancer)
-    used = run_models(scene=scene, model=balancer, terms=modelled)
-    residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill
-    dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used), residual_fill=residual)
-    algorithm = controller or controller_of(scene, balancer)
-    loop = loop_factor(scene, balancer, algorithm)
+    check_fit(scene, model)
+    used = run_models(scene=scene, model=model, terms=modelled)
+    residual = residual_fill_ratio(scene, law=model.flow) if residual_fill is None else residual_fill
+    dynamics = dynamics_of(scene=scene, model=model, modelled=terms_modelled(used), residual_fill=residual)
+    algorithm = controller or controller_of(scene, model)
+    loop = loop_factor(scene, model, algorithm)
     sensed = sensor is not None
     plan = LoopPlan.of(
         [scene], [algorithm], most_samples=MAX_SAMPLES, sensed=sensed, to_time_limit=to_time_limit
     )
     total = 2 * scene.disc.initial_fill
     plant = dynamics.plant(total=total, relative_error=RELATIVE_ERROR)
-    tabulate_moment(plant[0], balancer, total=total)
+    tabulate_moment(plant[0], model, total=total)
     runs = plan.runs(
         1,
         start=scene.rotor_as_read.initial_vibration,
@@ -114,10 +107,10 @@ def simulate(
     trace = plan.carry(runs, plant, lambda _: deviations, traced=True, watch=watch if watched else None)
     positive = trace.instants[:, 1:].T
     fills = np.concatenate([positive, total - positive])
-    vibration = scene.rotor.vibration(disc_unbalance(moment=balancer.moment, fill_ratio=fills))
+    vibration = scene.rotor.vibration(disc_unbalance(moment=model.moment, fill_ratio=fills))
     run = Simulation(
         scene=scene,
-        plant=LiquidRing(model=balancer, chambers=scene.disc.chambers, dynamics=dynamics, total=total),
+        plant=LiquidRing(model=model, chambers=scene.disc.chambers, dynamics=dynamics, total=total),
         state=runs[0],
         controller=scene.controller.kind if foreign is None else type(foreign).__name__,
         as_scene=controller is None and sensor is None,
@@ -132,7 +125,7 @@ def simulate(
         terms_modelled=terms_modelled(used),
         models_used=used,
         presentation=Presentation(document=command_document, rows=simulation_rows),
-        again=partial(_again, balancer),
+        again=partial(simulate, model=model),
     )
     return replace(run, findings=run_findings(run))
 
@@ -213,7 +206,3 @@ def _injections(trace: Trace, chambers: int) -> tuple[Injection, ...]:
         )
         for row in trace.injections
     )
-
-
-def _again(model: BalancerModel, scene: Scene, modelled: Collection[str]) -> Simulation:
-    return simulate(scene, model, modelled=modelled)

@@ -75,11 +75,6 @@ def _moves(run: Simulation) -> bool:
     return run.longest is None or run.longest.moved
 
 
-def _is_foreign(run: Simulation) -> bool:
-    """True if the algorithm was the caller's."""
-    return run.controller != run.scene.controller.kind
-
-
 def _numbers(run: Simulation) -> dict[str, Value]:
     """Numbers by the names that the sentences use."""
     settings = run.scene.controller
@@ -141,14 +136,16 @@ def _causes(run: Simulation) -> Iterator[Finding]:
         lost = None if held.likely_speed is not None else held.finding
         yield lost or Finding(code="tube_runs_back")
     if outcome in _BY_SETTINGS:
-        code = "own_overshoots" if _is_foreign(run) else "overshoots"
+        foreign = run.controller != scene.controller.kind
+        code = "own_overshoots" if foreign else "overshoots"
         yield Finding(code=code, values={"overshoots": run.overshoots})
 
 
 def _dead_time(run: Simulation) -> list[Finding]:
     """Finding that the amplitude stays above the limit, since its valve-open time moves no liquid."""
     scene, loop = run.scene, run.loop
-    if _is_foreign(run) or scene.controller.kind == "trial" or loop.rate == 0.0:
+    foreign = run.controller != scene.controller.kind
+    if foreign or scene.controller.kind == "trial" or loop.rate == 0.0:
         return []
     lost = dead_time(scene, run.plant.model, rate=loop.rate)
     rest = max(lost - min(scene.controller.offsets(scene.disc.chambers)), 0.0)
@@ -178,7 +175,6 @@ def _pressures(run: Simulation) -> dict[str, Value]:
             law=law,
             fill=fill,
             opposite_fill=min(total - fill, law.max_fill_ratio),
-            primed=False,
             above=max(plant.gas_pressure, LEAST_PRESSURE_PA),
         )
 

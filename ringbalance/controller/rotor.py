@@ -39,8 +39,7 @@ def chamber_letters(chambers: int) -> tuple[str, ...]:
 
     Raises: ValueError: an odd number, or one outside 2 to 26.
     """
-    _check_chambers(chambers)
-    return tuple(ascii_uppercase[:chambers])
+    return tuple(ascii_uppercase[: chamber_directions(chambers).size])
 
 
 @cache
@@ -49,18 +48,14 @@ def chamber_directions(chambers: int) -> ComplexArray:
 
     Raises: ValueError: an odd number, or one outside 2 to 26.
     """
-    _check_chambers(chambers)
+    if chambers % 2 or not 2 <= chambers <= MAX_CHAMBERS:
+        raise ValueError(f"chambers must be even and within 2 to {MAX_CHAMBERS}, not {chambers}")
     half = np.exp(2j * np.pi * np.arange(chambers // 2) / chambers)
     if chambers % 4 == 0:
         half[chambers // 4] = 1j
     directions = np.concatenate([half, -half])
     directions.flags.writeable = False
     return directions
-
-
-def _check_chambers(chambers: int) -> None:
-    if chambers % 2 or not 2 <= chambers <= MAX_CHAMBERS:
-        raise ValueError(f"chambers must be even and within 2 to {MAX_CHAMBERS}, not {chambers}")
 
 
 def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> ComplexArray:

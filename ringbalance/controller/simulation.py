@@ -244,8 +244,8 @@ class Simulation(PresentedResult):
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: the flow law alone."""
-    again: Callable[[Scene, Sequence[str]], Simulation]
-    """Runs another scene under the same law, with the named terms modelled."""
+    again: Callable[..., Simulation]
+    """Runs another scene under the same law; `modelled`: names of the terms to model."""
 
     @property
     def status(self) -> str:
@@ -336,21 +336,18 @@ class Simulation(PresentedResult):
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
         if self.longest is not None and not self.longest.moved:
-            return self._unmoved(self.longest)
+            # The last injection moved nothing; gas may lack the time to fill the chamber.
+            last, plant = self.longest, self.plant
+            if last.event in {Event.EMPTY, Event.FULL}:
+                return Outcome.CHAMBER_EMPTY
+            if plant.dynamics.quasi_steady:
+                return Outcome.STALLED
+            other = min(max(plant.total - last.fill_after, 0.0), plant.model.flow.max_fill_ratio)
+            flow = plant.model.flow.evaluate(
+                fill_ratio=last.fill_after, opposite_fill_ratio=other, gas_pressure=plant.gas_pressure
+            )
+            return Outcome.GAS_TIME_TOO_SHORT if flow.velocity > 0 else Outcome.STALLED
         return Outcome.TOO_MANY_SAMPLES if cause == SAMPLES else self._out_of_time
-
-    def _unmoved(self, last: Injection) -> Outcome:
-        """End of a run whose last injection moved nothing; gas may lack the time to fill the chamber."""
-        plant = self.plant
-        if last.event in {Event.EMPTY, Event.FULL}:
-            return Outcome.CHAMBER_EMPTY
-        if plant.dynamics.quasi_steady:
-            return Outcome.STALLED
-        other = min(max(plant.total - last.fill_after, 0.0), plant.model.flow.max_fill_ratio)
-        flow = plant.model.flow.evaluate(
-            fill_ratio=last.fill_after, opposite_fill_ratio=other, gas_pressure=plant.gas_pressure
-        )
-        return Outcome.GAS_TIME_TOO_SHORT if flow.velocity > 0 else Outcome.STALLED
 
     @property
     def _out_of_time(self) -> Outcome:

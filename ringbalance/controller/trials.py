@@ -13,8 +13,6 @@ from typing import Any, Final
 
 from ringbalance.results.result import Facts
 from ringbalance.results.rows import Quantity
-from ringbalance.scene.kinds import scene_kind
-from ringbalance.scene.origins import SceneFile
 
 Point = Mapping[str, float]
 """Level by name of the axis."""
@@ -72,13 +70,6 @@ class DrawnInput:
     name: str = ""
     """Name under which related inputs are ranked together, such as both parts of a model's error; empty: the
     input's own."""
-
-
-def drawn_key(scene: SceneFile, path: str) -> DrawnInput:
-    """Kind of an input by its path in the scene, such as "rotor.mass"; it can be measured itself."""
-    table, _, key = path.split("[")[0].partition(".")
-    declared = scene_kind(scene.balancer).schema.key_at((table, key))
-    return DrawnInput(common=declared.common, measure=MEASURE_INPUT, path=path)
 
 
 @dataclass(frozen=True, kw_only=True)

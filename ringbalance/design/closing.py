@@ -47,24 +47,9 @@ def judged_designs(hunt: Hunt) -> list[RacedDesign]:
         return []
     if hunt.complete or not hunt.races.space.sized:
         return _judge_listed(hunt)
-    return _judge_smaller_and_smaller(hunt.races, hunt.size)
-
-
-def growth(races: Races, best: RacedDesign) -> float:
-    """Derivative of the fraction of devices with respect to the logarithm of the size, from the surface."""
-    shares = next(each.shares for each in races.candidates if each.point == best.point)
-    ends = best.size * np.array([1 - AS_SMALL, 1 + AS_SMALL])
-    points = races.able(np.array([races.space.sized_at(shares, size) for size in ends]))
-    fractions = expit(races.surface().logits(races.coordinates(points))[0])
-    sizes = [races.space.size(each) for each in points.points]
-    return float(np.diff(fractions)[0]) / math.log(sizes[1] / sizes[0]) if len(set(sizes)) == 2 else 0.0
-
-
-def _judge_smaller_and_smaller(races: Races, size: float) -> list[RacedDesign]:
-    """Judge two designs a round, by expected decrease of the size, until the surface predicts no decrease.
-
-    Every verdict improves the surface.
-    """
+    # Two designs a round, by expected decrease of the size, until the surface predicts no decrease; every
+    # verdict improves the surface.
+    races, size = hunt.races, hunt.size
     judged: list[RacedDesign] = []
     settings: Settings | None = None
     for round_number in range(_MAX_ROUNDS):
@@ -96,6 +81,16 @@ def _judge_smaller_and_smaller(races: Races, size: float) -> list[RacedDesign]:
         largest = max(races.space.size(point) for point in chosen.points)
         size = min((each.size for each in judged if each.race.succeeded), default=largest)
     return judged
+
+
+def growth(races: Races, best: RacedDesign) -> float:
+    """Derivative of the fraction of devices with respect to the logarithm of the size, from the surface."""
+    shares = next(each.shares for each in races.candidates if each.point == best.point)
+    ends = best.size * np.array([1 - AS_SMALL, 1 + AS_SMALL])
+    points = races.able(np.array([races.space.sized_at(shares, size) for size in ends]))
+    fractions = expit(races.surface().logits(races.coordinates(points))[0])
+    sizes = [races.space.size(each) for each in points.points]
+    return float(np.diff(fractions)[0]) / math.log(sizes[1] / sizes[0]) if len(set(sizes)) == 2 else 0.0
 
 
 def _most_promising_by_size(

@@ -82,11 +82,14 @@ def design_document(design: Design) -> dict[str, Any]:
         "front": [
             {
                 "changes": plain_settings(each.point),
-                "settings": plain_settings(each.race.settings),
+                "settings": plain_settings(each.race.judgement.settings),
                 "size_m3": each.size,
-                "fraction": each.race.fraction,
-                "devices": int(each.race.meets.size),
-                "settling_time_s": {"p50": finite(each.race.time(0.5)), "p90": finite(each.race.time(0.9))},
+                "fraction": each.race.judgement.fraction.value,
+                "devices": int(each.race.judgement.meets.size),
+                "settling_time_s": {
+                    "p50": finite(each.race.judgement.time(0.5)),
+                    "p90": finite(each.race.judgement.time(0.9)),
+                },
                 "energy_J": finite(each.race.gas),
             }
             for each in design.front
@@ -133,15 +136,26 @@ def _findings(design: Design) -> Iterator[Finding]:
     yield Finding(code="design_looked", values=counted)
     yield from _refusals(static.refusals, static.points)
     if design.succeeded:
-        yield from _sharpness(design)
+        if design.smaller is not None:
+            size, share = design.smaller
+            values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
+            yield Finding(code="design_smaller", values=values)
+        if design.doubt is not None:
+            yield Finding(code="design_doubt", values={"doubt": design.doubt})
     else:
         yield from _misses(design, judgement)
-    for path, end, wider in _edges(design):
-        code, default = _EDGES[design.succeeded]
-        if wider is None:
-            yield Finding(code=code, values={"path": path, "end": end})
-        else:
-            yield Finding(code=default, values={"path": path, "end": end, "vary": wider})
+    # Keys at an end of their range, and `vary` with a wider range if the end is a default.
+    code, default = _EDGES[design.succeeded]
+    for path, ends in (pair for axis in design.space.axes for pair in axis.ranges.items()):
+        value = float(design.point[path])
+        for low, end in ((True, ends.low), (False, ends.high)):
+            if abs(value - end) <= _EDGE_FRACTION * abs(end):
+                edge: dict[str, Value] = {"path": path, "end": setting_text(path, end)}
+                if (wider := design.space.wider(path, low=low)) is None:
+                    yield Finding(code=code, values=edge)
+                else:
+                    yield Finding(code=default, values=edge | {"vary": wider})
+                break
 
 
 def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
@@ -152,16 +166,6 @@ def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
         values = {"count": len(texts), "points": points, "reasons": len(set(reasons)), "most": most}
         text = texts[reasons.index(reason)]
         yield Finding(code="design_refused", values={**values, "text": text})
-
-
-def _sharpness(design: Design) -> Iterator[Finding]:
-    """Findings on the uncertainty of the smallest size."""
-    if design.smaller is not None:
-        size, share = design.smaller
-        values = {"less": 1 - size / design.size, "share": share.value, "of": share.of}
-        yield Finding(code="design_smaller", values=values)
-    if design.doubt is not None:
-        yield Finding(code="design_doubt", values={"doubt": design.doubt})
 
 
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
@@ -188,17 +192,6 @@ def _reached(judgement: Judgement, demand: Demand, fraction: float) -> float:
     values = np.sort(getattr(judgement.outcomes, demand.outcome))
     count = max(math.ceil(fraction * values.size), 1)
     return float(values[-count] if demand.sense == AT_LEAST else values[count - 1])
-
-
-def _edges(design: Design) -> Iterator[tuple[str, str, str | None]]:
-    """Keys at an end of their range, with that end, and `vary` with a wider range if the end is a default."""
-    for axis in design.space.axes:
-        for path, ends in axis.ranges.items():
-            value = float(design.point[path])
-            if abs(value - ends.low) <= _EDGE_FRACTION * abs(ends.low):
-                yield path, setting_text(path, ends.low), design.space.wider(path, low=True)
-            elif abs(value - ends.high) <= _EDGE_FRACTION * abs(ends.high):
-                yield path, setting_text(path, ends.high), design.space.wider(path, low=False)
 
 
 def _keys_table(design: Design, judgement: Judgement) -> Table:
@@ -244,11 +237,12 @@ def _effects_table(design: Design) -> Table:
 
 def _front_table(design: Design) -> Table:
     required_fraction = REQUIRED_FRACTION if design.judgement is None else design.judgement.required_fraction
-    paths = [path for path in design.space.paths if path not in design.space.valve_paths]
+    by_valve = [path for axis in design.space.axes if any(axis.names) for path in axis.paths]
+    paths = [path for path in design.space.paths if path not in by_valve]
     rows = [
         (
             format_given(each.size, "m^3", digits=4),
-            format_given(finite(each.race.time(required_fraction)), "s", digits=3),
+            format_given(finite(each.race.judgement.time(required_fraction)), "s", digits=3),
             format_given(finite(each.race.gas), "J", digits=3),
             *([design.space.valve(each.point)] if design.space.valves else []),
             *(setting_text(path, each.point.get(path)) for path in paths),

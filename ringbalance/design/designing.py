@@ -246,11 +246,13 @@ def _front(races: Races, required_fraction: float, best: RacedDesign) -> tuple[R
     passing = [
         each
         for each, promise in pairs
-        if each.size >= best.size and each.race.meets.size >= DEVICES and promise >= logit(races.threshold)
+        if each.size >= best.size
+        and each.race.judgement.meets.size >= DEVICES
+        and promise >= logit(races.threshold)
     ]
 
     def costs(each: RacedDesign) -> tuple[float, float, float]:
-        return each.size, each.race.time(required_fraction), each.race.gas
+        return each.size, each.race.judgement.time(required_fraction), each.race.gas
 
     front: list[RacedDesign] = []
     for each in passing:

@@ -126,7 +126,7 @@ def hunt(
 
     def served(candidate: RacedDesign) -> float:
         """Fraction of devices, reduced by one device: 4 of 4 rank below 60 of 64."""
-        return candidate.race.fraction - 1.0 / max(candidate.race.meets.size, 1)
+        return candidate.race.judgement.fraction.value - 1.0 / max(candidate.race.judgement.meets.size, 1)
 
     enough = [each.size for each in races.candidates if served(each) >= races.threshold]
     size = min(enough) if enough else max(races.candidates, key=served).size

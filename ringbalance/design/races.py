@@ -175,15 +175,17 @@ class Races:
         if self.fitted is None:
             self.fitted = Surface.of(
                 self.coordinates(self.points),
-                met=np.array([each.race.met for each in self.candidates]),
-                devices=np.array([each.race.meets.size for each in self.candidates]),
+                met=np.array([each.race.judgement.fraction.count for each in self.candidates]),
+                devices=np.array([each.race.judgement.meets.size for each in self.candidates]),
             )
         return self.fitted
 
     @property
     def _well_known(self) -> list[RacedDesign]:
         """Candidates that ran at least `DEVICES` devices; all candidates if there are none."""
-        return [each for each in self.candidates if each.race.meets.size >= DEVICES] or self.candidates
+        return [
+            each for each in self.candidates if each.race.judgement.meets.size >= DEVICES
+        ] or self.candidates
 
     def nearest_grid_points(self, shares: FloatArray) -> list[GridPoint | None]:
         """Settings of the nearest design that ran many devices, for each point."""
@@ -213,7 +215,9 @@ class Races:
         able = self.able(shares)
         if not able.points:
             return shares[
-                np.argsort([-each.race.fraction for each in measured], kind="stable")[:_MAX_PARENTS]
+                np.argsort([-each.race.judgement.fraction.value for each in measured], kind="stable")[
+                    :_MAX_PARENTS
+                ]
             ]
         return able.shares[np.argsort(-value(able), kind="stable")[:_MAX_PARENTS]]
 

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Draws, Outcomes, Settings, quick_balancer
+from ringbalance.controller.balancer import Draws, Settings, quick_balancer
 from ringbalance.controller.judging.judge import (
     FIRST_CHOOSING_DEVICE,
     FIRST_VERDICT_DEVICE,
@@ -62,29 +62,9 @@ class Race:
     judgement: Judgement
 
     @property
-    def settings(self) -> Settings:
-        """Settings by path, SI."""
-        return self.judgement.settings
-
-    @property
-    def meets(self) -> BoolArray:
-        """True for each device that meets every demand, shape (n,)."""
-        return self.judgement.meets
-
-    @property
     def succeeded(self) -> bool:
         """True if the verdict on the settings is `MET`."""
         return self.judgement.verdict == MET
-
-    @property
-    def met(self) -> int:
-        """Number of devices that meet every demand."""
-        return self.judgement.fraction.count
-
-    @property
-    def fraction(self) -> float:
-        """Fraction of the devices that meet every demand."""
-        return self.judgement.fraction.value
 
     @cached_property
     def gas(self) -> float:
@@ -93,20 +73,12 @@ class Race:
         ran = energy[np.isfinite(energy)]
         return float(np.median(ran)) if ran.size else math.inf
 
-    def time(self, fraction: float) -> float:
-        """Time after which a fraction of the devices has settled, s."""
-        times = np.sort(self.judgement.outcomes.settling_time)
-        return float(times[max(math.ceil(fraction * times.size), 1) - 1])
-
     @property
     def order(self) -> tuple[float, ...]:
         """Sort key: most devices that meet every demand, most settled, shortest times, least gas first."""
-        settled = float(np.mean(self.judgement.outcomes.settled))
-        return (-self.fraction, -settled, self.time(0.9), self.time(0.5), self.gas)
-
-    def extended(self, outcomes: Outcomes) -> Race:
-        """Race with the outcomes of further devices added."""
-        return replace(self, judgement=self.judgement.extended(outcomes))
+        judgement, settled = self.judgement, float(np.mean(self.judgement.outcomes.settled))
+        times = judgement.time(0.9), judgement.time(0.5)
+        return (-judgement.fraction.value, -settled, *times, self.gas)
 
 
 def race(
@@ -150,13 +122,19 @@ def race(
         ]
         for (first, end), survivors in zip(pairwise(HEATS), _SURVIVORS, strict=True):
             running.sort(key=lambda each: each.order)
-            if running[0].fraction < required_fraction - _MAX_SHORTFALL_FRACTION:
+            first_served = running[0].judgement.fraction
+            if first_served.value < required_fraction - _MAX_SHORTFALL_FRACTION:
                 return running[0]
-            least = running[0].met - _MAX_BEHIND_DEVICES
-            running = [each for each in running if each.met > least][:survivors]
+            least = first_served.count - _MAX_BEHIND_DEVICES
+            running = [each for each in running if each.judgement.fraction.count > least][:survivors]
             draws = Draws.block(start + first, end - first, complete=False)
-            ran = balancer.run_all([each.settings for each in running], draws, watch_time=_WATCH_TIME_S)
-            running = [each.extended(outcomes) for each, outcomes in zip(running, ran, strict=True)]
+            ran = balancer.run_all(
+                [each.judgement.settings for each in running], draws, watch_time=_WATCH_TIME_S
+            )
+            running = [
+                replace(each, judgement=each.judgement.extended(outcomes))
+                for each, outcomes in zip(running, ran, strict=True)
+            ]
         return min(running, key=lambda each: each.order)
     except (SceneError, *BREAKDOWNS):
         return None

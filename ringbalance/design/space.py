@@ -152,11 +152,6 @@ class Space:
         """Names of the available valves."""
         return tuple(name for axis in self.axes for name in axis.names if name)
 
-    @property
-    def valve_paths(self) -> tuple[str, ...]:
-        """Paths of the keys that a named valve sets."""
-        return tuple(path for axis in self.axes if any(axis.names) for path in axis.paths)
-
     def valve(self, point: Point) -> str:
         """Name of a point's valve; empty if valves have no choice or no name."""
         for axis in self.axes:

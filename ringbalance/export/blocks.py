@@ -324,12 +324,6 @@ def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
     )
 
 
-def declared_units() -> Mapping[str, Mapping[str, str]]:
-    """Units of all blocks' variables in base units, as FMI has them."""
-    units: Mapping[str, Mapping[str, str]] = declared()["units"]
-    return units
-
-
 def declared() -> dict[str, Any]:
     """Variables of each kind of block, `MOST` for the largest fill ratio and `#` for a chamber, and units."""
     return tomllib.loads(

@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
 from ringbalance.mesh.geometry import surface_radius
@@ -177,8 +176,8 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
         constants=tuple(constants.tolist()),
         tables=Tables(
             cells=tuple(map(int, (*level_numbers[point.PLACES :], *cells))),
-            pieces=_tuples(pieces.astype(np.float32)),
-            levels=_tuples(levels),
+            pieces=tuple(map(tuple, pieces.astype(np.float32).tolist())),
+            levels=tuple(map(tuple, levels.tolist())),
         ),
         level_error=level_error,
         calibrated=law,
@@ -194,10 +193,6 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
             velocity = compact.answer(**query, primed=at % 2 > 0).velocity
             departure = max(departure, abs(velocity / exact - 1.0))
     return replace(compact, departure=departure)
-
-
-def _tuples(rows: npt.NDArray[np.floating[Any]]) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, rows.tolist()))
 
 
 @dataclass(frozen=True, kw_only=True)

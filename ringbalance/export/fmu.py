@@ -14,7 +14,7 @@ from typing import Final
 from xml.etree import ElementTree as ET
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from ringbalance.export.blocks import Block, Variable, declared_units
+from ringbalance.export.blocks import Block, declared
 from ringbalance.export.hosts import block_c_files, filled
 from ringbalance.export.libraries import Version, every_library, local_library
 from ringbalance.export.reference import reference_files
@@ -54,7 +54,7 @@ def fmu_bytes(block: Block, name: str, version: Version, *, all_systems: bool = 
     core = filled("unit", block, name, **words)
     sources = {**block_c_files(block, name), f"{version}.c": filled(version, block, name, core=core, **words)}
     parts = {
-        "modelDescription.xml": _model_2(block, name) if version == "fmi2" else _model_3(block, name),
+        "modelDescription.xml": _description(block, name, second=version == "fmi2"),
         **{f"sources/{file}": text.encode() for file, text in sources.items()},
         **reference_files(block, name),
     }
@@ -77,75 +77,57 @@ def fmu_bytes(block: Block, name: str, version: Version, *, all_systems: bool = 
     return stream.getvalue(), bool(libraries)
 
 
-def _model_2(block: Block, name: str) -> bytes:
-    root = _root("2.0", block, name, guid=guid_of(block), variableNamingConvention="flat")
-    able = {each.format("s"): "true" for each in (*_ABLE, "canNotUseMemoryManagementFunctions")}
-    unit = ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
-    listed = ET.SubElement(unit, "SourceFiles")
-    for file in (f"{name}.c", "fmi2.c"):
-        ET.SubElement(listed, "File", name=file)
-    _add_units(root, block)
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
-    variables = ET.SubElement(root, "ModelVariables")
-    structure = ET.SubElement(root, "ModelStructure")
-    groups = [ET.SubElement(structure, group) for group in ("Outputs", "InitialUnknowns")]
-    for number, each in enumerate(block.variables):
-        variable = ET.SubElement(variables, "ScalarVariable", _heads(each, number))
-        ET.SubElement(variable, each.kind, _range(block, each))
-        for group in groups if not each.input else ():
-            ET.SubElement(group, "Unknown", index=str(number + 1))
-    return _xml(root)
-
-
-def _model_3(block: Block, name: str) -> bytes:
-    root = _root("3.0", block, name, instantiationToken=guid_of(block))
-    able = {each.format("S"): "true" for each in _ABLE}
-    ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
-    _add_units(root, block)
-    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
-    variables = ET.SubElement(root, "ModelVariables")
-    structure = ET.SubElement(root, "ModelStructure")
-    for number, each in enumerate(block.variables):
-        ET.SubElement(variables, _KINDS[each.kind], {**_heads(each, number), **_range(block, each)})
-    heads = {"name": "time", "valueReference": str(len(block.variables)), "description": "of the host"}
-    ET.SubElement(variables, "Float64", {**heads, "causality": "independent", "variability": "continuous"})
-    for group in ("Output", "InitialUnknown"):
-        for number, each in enumerate(block.variables):
-            if not each.input:
-                ET.SubElement(structure, group, valueReference=str(number))
-    return _xml(root)
-
-
-def _range(block: Block, variable: Variable) -> dict[str, str]:
-    """Unit and range, and for an input its value at the start."""
-    start = block.start[variable.index]
-    text = number_text(start) if variable.kind == "Real" else str(bool(start)).lower()
-    return {**variable.range, "start": text} if variable.input else dict(variable.range)
-
-
-def _root(version: str, block: Block, name: str, **further: str) -> ET.Element:
-    heads = {"fmiVersion": version, "modelName": name, **further}
+def _description(block: Block, name: str, *, second: bool) -> bytes:
+    """The model description of FMI 2.0 if `second`, else of FMI 3.0."""
+    guid = guid_of(block)
+    identity = {"guid": guid, "variableNamingConvention": "flat"} if second else {"instantiationToken": guid}
+    heads = {"fmiVersion": "2.0" if second else "3.0", "modelName": name, **identity}
     words = {"license": "BSD-3-Clause", "generationTool": "ringbalance"}
     title = f"{block.title}, from {block.scene.rpartition('/')[2]}"
-    return ET.Element("fmiModelDescription", {**heads, "description": title, **words})
-
-
-def _heads(variable: Variable, number: int) -> dict[str, str]:
-    return {
-        "name": variable.name,
-        "valueReference": str(number),
-        "causality": "input" if variable.input else "output",
-        "variability": "continuous" if variable.kind == "Real" else "discrete",
-        "description": variable.description,
-    }
-
-
-def _add_units(root: ET.Element, block: Block) -> None:
+    root = ET.Element("fmiModelDescription", {**heads, "description": title, **words})
+    abilities = (*_ABLE, "canNotUseMemoryManagementFunctions") if second else _ABLE
+    able = {each.format("s" if second else "S"): "true" for each in abilities}
+    unit = ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
+    if second:
+        listed = ET.SubElement(unit, "SourceFiles")
+        for file in (f"{name}.c", "fmi2.c"):
+            ET.SubElement(listed, "File", name=file)
     units = ET.SubElement(root, "UnitDefinitions")
     used = {each.range.get("unit") for each in block.variables}
-    for name, base in declared_units().items():
-        if name in used:
-            ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", dict(base))
+    for unit_name, base in declared()["units"].items():
+        if unit_name in used:
+            ET.SubElement(ET.SubElement(units, "Unit", name=unit_name), "BaseUnit", dict(base))
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
+    variables, structure = (ET.SubElement(root, each) for each in ("ModelVariables", "ModelStructure"))
+    for number, each in enumerate(block.variables):
+        heads = {
+            "name": each.name,
+            "valueReference": str(number),
+            "causality": "input" if each.input else "output",
+            "variability": "continuous" if each.kind == "Real" else "discrete",
+            "description": each.description,
+        }
+        # Unit and range, and for an input its value at the start.
+        start = block.start[each.index]
+        text = number_text(start) if each.kind == "Real" else str(bool(start)).lower()
+        span = {**each.range, **({"start": text} if each.input else {})}
+        if second:
+            ET.SubElement(ET.SubElement(variables, "ScalarVariable", heads), each.kind, span)
+        else:
+            ET.SubElement(variables, _KINDS[each.kind], {**heads, **span})
+    outputs = [number for number, each in enumerate(block.variables) if not each.input]
+    if second:
+        for group in ("Outputs", "InitialUnknowns"):
+            listed = ET.SubElement(structure, group)
+            for number in outputs:
+                ET.SubElement(listed, "Unknown", index=str(number + 1))
+        return _xml(root)
+    time = {"name": "time", "valueReference": str(len(block.variables)), "description": "of the host"}
+    ET.SubElement(variables, "Float64", {**time, "causality": "independent", "variability": "continuous"})
+    for group in ("Output", "InitialUnknown"):
+        for number in outputs:
+            ET.SubElement(structure, group, valueReference=str(number))
+    return _xml(root)
 
 
 def _xml(root: ET.Element) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from string import Template
 from typing import Any, Final
@@ -67,7 +67,7 @@ def st_files(block: Block, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
     sizes = {"Law": len(block.constants), "Query": len(block.start)}
     arrays = {kind: f"[0..{count - 1}] OF LREAL" for kind, count in sizes.items()}
-    arrays |= {kind: _st_array(kind, rows) for kind, rows in _tables_of(block)}
+    arrays |= {kind: _st_array(kind, rows) for kind, rows in zip(_NUMBERS, block.tables or (), strict=False)}
     entries = ("answer", *_CHAMBER_FUNCTIONS) if block.kind == "law" else ()
     functions = st_functions(block.source(entries), prefix=name, sizes=arrays)
     if block.kind == "law":
@@ -138,11 +138,6 @@ _NUMBERS: Final = {
 _ROW: Final = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}
 
 
-def _tables_of(block: Block) -> Iterator[tuple[str, Sequence[Any]]]:
-    """Tables of a block's law with their types; none without a law."""
-    return zip(_NUMBERS, block.tables or (), strict=False)
-
-
 def _st_array(kind: str, rows: Sequence[Any]) -> str:
     """Declaration of a table in structured text, after ARRAY."""
     width = "" if kind == "Cells" else f", 0..{PER_PIECE - 1}"
@@ -151,12 +146,16 @@ def _st_array(kind: str, rows: Sequence[Any]) -> str:
 
 def _declared(block: Block, language: str) -> Iterator[str]:
     """Declarations of all tables."""
-    for kind, rows in _tables_of(block):
+    tables: Iterable[tuple[str, Sequence[Any]]] = zip(_NUMBERS, block.tables or (), strict=False)
+    for kind, rows in tables:
         if kind == "Cells":
             text, width = _lines([str(row) for row in rows], per_line=20), ""
         else:
-            written = _single if (kind, language) == ("Pieces", "st") else _TEXT[language]
-            text = ",\n".join(_ROW[language].format(", ".join(map(written, row))) for row in rows)
+            if (kind, language) == ("Pieces", "st"):
+                # The shortest decimals that are these numbers in single precision.
+                rows = [[float(str(np.float32(value))) for value in row] for row in rows]
+            texts = (", ".join(map(_TEXT[language], row)) for row in rows)
+            text = ",\n".join(map(_ROW[language].format, texts))
             width = f"[{PER_PIECE}]"
         name = "CELL_ROWS" if kind == "Cells" else kind.upper()
         if language == "c":
@@ -166,11 +165,6 @@ def _declared(block: Block, language: str) -> Iterator[str]:
             yield f"    {name} : ARRAY{_st_array(kind, rows)} := [\n{text}\n    ];\n"
         else:
             yield f"{name} = (\n{text},\n)\n"
-
-
-def _single(value: float) -> str:
-    """The shortest decimal that is this number in single precision."""
-    return number_text(float(str(np.float32(value))))
 
 
 def template(name: str) -> str:

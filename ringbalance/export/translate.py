@@ -250,29 +250,26 @@ class Writer:
 
     def _block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
         for node in body:
-            yield from self._statement(node)
-
-    def _statement(self, node: ast.stmt) -> Iterator[str]:
-        match node:
-            case ast.Assign(targets=[ast.Name(id=name)], value=value):
-                text, kind = self._expression(value)
-                if self.types.setdefault(name, kind) != kind or name in self.source.constants:
+            match node:
+                case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                    text, kind = self._expression(value)
+                    if self.types.setdefault(name, kind) != kind or name in self.source.constants:
+                        raise self._refused(node)
+                    yield self.language.assign.format(self.language.variable.format(name), text)
+                case ast.Assign(targets=[ast.Subscript() as target], value=value):
+                    yield self.language.assign.format(self._expression(target)[0], self._typed(value, NUMBER))
+                case ast.If(test=test, body=inner, orelse=orelse):
+                    yield from self._if(self.language.open_if, test, inner, orelse)
+                case ast.While(test=test, body=inner, orelse=[]):
+                    yield self.language.open_while.format(self._typed(test, TRUTH))
+                    yield from self._inner(inner)
+                    yield self.language.close_while
+                case ast.Return(value=value):
+                    yield from self._return(value)
+                case ast.Expr(value=ast.Call() as call) if self._expression(call)[1] == NOTHING:
+                    yield f"{self._expression(call)[0]};"
+                case _:
                     raise self._refused(node)
-                yield self.language.assign.format(self.language.variable.format(name), text)
-            case ast.Assign(targets=[ast.Subscript() as target], value=value):
-                yield self.language.assign.format(self._expression(target)[0], self._typed(value, NUMBER))
-            case ast.If(test=test, body=body, orelse=orelse):
-                yield from self._if(self.language.open_if, test, body, orelse)
-            case ast.While(test=test, body=body, orelse=[]):
-                yield self.language.open_while.format(self._typed(test, TRUTH))
-                yield from self._inner(body)
-                yield self.language.close_while
-            case ast.Return(value=value):
-                yield from self._return(value)
-            case ast.Expr(value=ast.Call() as call) if self._expression(call)[1] == NOTHING:
-                yield f"{self._expression(call)[0]};"
-            case _:
-                raise self._refused(node)
 
     def _inner(self, body: Sequence[ast.stmt]) -> Iterator[str]:
         return (f"    {line}" for line in self._block(body))

@@ -11,83 +11,19 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.criticism import Review
-from ringbalance.identification.fitting import FitResult
+from ringbalance.identification.fitting import FitResult, FittedParameter
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.reading import KINDS
 from ringbalance.results.numbers import rounded
-from ringbalance.results.result import Rows, Table
+from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, IntArray, finite
 from ringbalance.scene.describe import in_usual_unit, si_unit, usual_unit
 from ringbalance.scene.errors import MODEL_ERRORS
 from ringbalance.scene.uncertain import NORMAL_95
-
-
-def fit_document(
-    result: FitResult, *, data: Sequence[Observations], review: Review, next_measurement: NextMeasurement
-) -> dict[str, Any]:
-    """Document that `ringbalance fit --json` prints."""
-    scene = result.optimum.residuals.problem.scene
-    return {
-        "scene": _chosen(scene, "name source sha256"),
-        "data": [
-            _chosen(each, "file kind source sha256")
-            | {"rows": len(each), "uncertainty_given": sorted(each.uncertainty)}
-            for each in data
-        ],
-        "parameters": [
-            _chosen(
-                each, "name path value at_bound before before_interval before_source contradicts doubts text"
-            )
-            | {"interval": [finite(end) for end in each.interval], "verdict": each.verdict.value}
-            for each in result.parameters
-        ],
-        "combinations": [asdict(each) for each in result.combinations],
-        "correlations": {
-            "names": [parameter.name for parameter in result.parameters],
-            "matrix": result.correlations.tolist(),
-        },
-        "noise": [asdict(each) for each in result.noise],
-        "residuals": [
-            _chosen(each, "file kind")
-            | {name: getattr(each, name).tolist() for name in ("lines", "normalised", "down_weighted")}
-            for each in result.residuals
-        ],
-        "data_over_fit": [
-            _chosen(each, "kind column slope slope_uncertainty") for each in against_fit(result)
-        ],
-        **_chosen(result, "exact loss starts evaluations log_likelihood"),
-        **{name: dict(getattr(result, name)) for name in ("held", "pulls")},
-        "criticism": {
-            **_chosen(review, "describes text"),
-            "findings": [
-                _chosen(each, "test p_value fails")
-                | {"residuals_of": each.block, "corrected_p_value": each.corrected}
-                for each in review.criticism.findings
-            ],
-            **{
-                name: [asdict(each) for each in getattr(review, name)]
-                for name in ("explained", "readings", "ranges")
-            },
-        },
-        "next_measurement": _chosen(next_measurement, "parameter text")
-        | {
-            "candidates": [
-                {"measurement": each.candidate, "expected_width_ratio": each.ratio}
-                for each in next_measurement.gains
-            ]
-        },
-        **fit_rows(result, data=data, review=review, next_measurement=next_measurement).document(),
-    }
-
-
-def _chosen(record: Any, names: str) -> dict[str, Any]:
-    """Fields and properties of a record that enter the document under the same names."""
-    return {name: getattr(record, name) for name in names.split()}
-
 
 _STRONG: Final = 0.9
 """Correlation beyond which two parameters are reported as correlated."""
@@ -101,56 +37,147 @@ _NOTABLE_RESIDUAL: Final = 3.0
 """Normalised residual beyond which a row is reported."""
 
 
-def fit_rows(
-    result: FitResult, *, data: Sequence[Observations], review: Review, next_measurement: NextMeasurement
-) -> Rows:
-    """Parameters with their intervals, the verdict on the fit, and further findings."""
-    scene, count = result.optimum.residuals.problem.scene, sum(len(each) for each in data)
-    held = [name for name in result.held if name not in MODEL_ERRORS]
-    causes = dict.fromkeys(MODEL_ERRORS[name] for name in result.held if name in MODEL_ERRORS)
-    facts = {
-        "not fitted, [uncertainty] in all intervals": ", ".join(held),
-        "errors of models, in all intervals": ", ".join(causes),
-        "not fitted, taken as exact": ", ".join(result.exact),
-    }
-    heads = ("quantity", "fitted", "from", "to", "unit", "before", "identified")
-    rows = []
-    for each in result.parameters:
-        path, upper = each.path, None if each.before_interval is None else each.before_interval[1]
-        low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in each.interval)
-        value, before = (in_usual_unit(path, number) for number in (each.value, each.before))
-        width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
-        ends = [rounded(end, width) if math.isfinite(end) else "?" for end in (low, high)]
-        range_before = f"{before:.4g}"
-        if upper is not None:
-            range_before += f" ± {in_usual_unit(path, upper) - before:.2g}"
-        cells = each.name, rounded(value, width), *ends, usual_unit(path), range_before
-        rows.append((*cells, _WORDS[each.verdict]))
-    quantities = [
-        Quantity(
-            key=each.path,
-            name=each.name,
-            unit=si_unit(each.path),
-            value=each.value,
-            lower=finite(each.interval[0]),
-            upper=finite(each.interval[1]),
-            origin="fitted",
-            status="ok" if each.verdict is Identified.IDENTIFIED else each.verdict.value.replace(" ", "_"),
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Fit(Result):
+    """A fit with the tests of its residuals and the measurement that would help most.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> data = rb.bundled_scene("liquid_ring_paper").parent / "measurements" / "trial_weight.csv"
+        >>> print(rb.fit(scene, data))
+        Pan's liquid-ring disc (liquid_ring_paper.toml), fitted to 7 measurements
+          influence_coefficient (0.011226 ± 0.000060) um/(g mm)
+          lag_angle (19.25 ± 0.31)°
+          nothing in the residuals speaks against the fit (4 tests, 5 % level)
+    """
+
+    result: FitResult
+    data: tuple[Observations, ...]
+    review: Review
+    next_measurement: NextMeasurement
+
+    @property
+    def parameters(self) -> tuple[FittedParameter, ...]:
+        """Parameters with value and interval (95 %), SI, and whether the data identify them."""
+        return self.result.parameters
+
+    @property
+    def succeeded(self) -> bool:
+        """True if the fit describes the data."""
+        return self.review.describes
+
+    def to_dict(self) -> dict[str, Any]:
+        """Document that `ringbalance fit --json` prints."""
+        result, scene = self.result, self.result.optimum.residuals.problem.scene
+        return {
+            "scene": _chosen(scene, "name source sha256"),
+            "data": [
+                _chosen(each, "file kind source sha256")
+                | {"rows": len(each), "uncertainty_given": sorted(each.uncertainty)}
+                for each in self.data
+            ],
+            "parameters": [
+                _chosen(
+                    each,
+                    "name path value at_bound before before_interval before_source contradicts doubts text",
+                )
+                | {"interval": [finite(end) for end in each.interval], "verdict": each.verdict.value}
+                for each in result.parameters
+            ],
+            "combinations": [asdict(each) for each in result.combinations],
+            "correlations": {
+                "names": [parameter.name for parameter in result.parameters],
+                "matrix": result.correlations.tolist(),
+            },
+            "noise": [asdict(each) for each in result.noise],
+            "residuals": [
+                _chosen(each, "file kind")
+                | {name: getattr(each, name).tolist() for name in ("lines", "normalised", "down_weighted")}
+                for each in result.residuals
+            ],
+            "data_over_fit": [
+                _chosen(each, "kind column slope slope_uncertainty") for each in against_fit(result)
+            ],
+            **_chosen(result, "exact loss starts evaluations log_likelihood"),
+            **{name: dict(getattr(result, name)) for name in ("held", "pulls")},
+            "criticism": {
+                **_chosen(self.review, "describes text"),
+                "findings": [
+                    _chosen(each, "test p_value fails")
+                    | {"residuals_of": each.block, "corrected_p_value": each.corrected}
+                    for each in self.review.criticism.findings
+                ],
+                **{
+                    name: [asdict(each) for each in getattr(self.review, name)]
+                    for name in ("explained", "readings", "ranges")
+                },
+            },
+            "next_measurement": _chosen(self.next_measurement, "parameter text")
+            | {
+                "candidates": [
+                    {"measurement": each.candidate, "expected_width_ratio": each.ratio}
+                    for each in self.next_measurement.gains
+                ]
+            },
+            **self.rows().document(),
+        }
+
+    def rows(self) -> Rows:
+        """Parameters with their intervals, the verdict on the fit, and further findings."""
+        result, scene = self.result, self.result.optimum.residuals.problem.scene
+        count = sum(len(each) for each in self.data)
+        held = [name for name in result.held if name not in MODEL_ERRORS]
+        causes = dict.fromkeys(MODEL_ERRORS[name] for name in result.held if name in MODEL_ERRORS)
+        facts = {
+            "not fitted, [uncertainty] in all intervals": ", ".join(held),
+            "errors of models, in all intervals": ", ".join(causes),
+            "not fitted, taken as exact": ", ".join(result.exact),
+        }
+        heads = ("quantity", "fitted", "from", "to", "unit", "before", "identified")
+        rows = []
+        for each in result.parameters:
+            path, upper = each.path, None if each.before_interval is None else each.before_interval[1]
+            low, high = (in_usual_unit(path, end) if math.isfinite(end) else end for end in each.interval)
+            value, before = (in_usual_unit(path, number) for number in (each.value, each.before))
+            width = (high - low) / 2 if math.isfinite(high - low) else abs(value)
+            ends = [rounded(end, width) if math.isfinite(end) else "?" for end in (low, high)]
+            range_before = f"{before:.4g}"
+            if upper is not None:
+                range_before += f" ± {in_usual_unit(path, upper) - before:.2g}"
+            cells = each.name, rounded(value, width), *ends, usual_unit(path), range_before
+            rows.append((*cells, _WORDS[each.verdict]))
+        quantities = [
+            Quantity(
+                key=each.path,
+                name=each.name,
+                unit=si_unit(each.path),
+                value=each.value,
+                lower=finite(each.interval[0]),
+                upper=finite(each.interval[1]),
+                origin="fitted",
+                status="ok"
+                if each.verdict is Identified.IDENTIFIED
+                else each.verdict.value.replace(" ", "_"),
+            )
+            for each in result.parameters
+        ]
+        return Rows(
+            title=f"{scene.name} ({scene.source}), fitted to {count} measurements",
+            quantities=tuple(quantities),
+            findings=(
+                *_findings(result, self.review),
+                *result.pulled,
+                Finding(code="next_measurement", values={"text": self.next_measurement.text}),
+            ),
+            facts=[(name, text) for name, text in facts.items() if text],
+            tables=(Table(heads=heads, rows=rows, note="from, to: ends of the 95 % interval"),),
+            listed=0,
         )
-        for each in result.parameters
-    ]
-    return Rows(
-        title=f"{scene.name} ({scene.source}), fitted to {count} measurements",
-        quantities=tuple(quantities),
-        findings=(
-            *_findings(result, review),
-            *result.pulled,
-            Finding(code="next_measurement", values={"text": next_measurement.text}),
-        ),
-        facts=[(name, text) for name, text in facts.items() if text],
-        tables=(Table(heads=heads, rows=rows, note="from, to: ends of the 95 % interval"),),
-        listed=0,
-    )
+
+
+def _chosen(record: Any, names: str) -> dict[str, Any]:
+    """Fields and properties of a record that enter the document under the same names."""
+    return {name: getattr(record, name) for name in names.split()}
 
 
 def _findings(result: FitResult, review: Review) -> Iterator[Finding]:

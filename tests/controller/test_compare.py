@@ -15,7 +15,7 @@ from ringbalance.controller.compare import Comparison, compare
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.rotor import CommonRotor, joined_rotor, rotors_of
 from ringbalance.results.requirements import Paired
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
@@ -162,7 +162,7 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
     assert 0 < result["residual_ratio"][0] < 0.05 / 10
     # The first injections, of a second, fill at least the 33.8 ml that a full chamber leaves, to 0.7 MPa.
     assert result["energy_J"][0] > 2 * 0.801325e6 * 33.8e-6 * math.log(0.801325 / 0.101325)
-    alone = judged(under_paper_law(brief), compared.sides[0].settings, most=16)
+    alone = judged_all(under_paper_law(brief), [compared.sides[0].settings], most=16)[0]
     assert compared.sides[0].fraction.count == pytest.approx(alone.fraction.count, abs=1)
 
 

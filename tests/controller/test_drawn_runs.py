@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.balancer import ARRAYS, Draws, Outcomes, balancer_of
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.devices import Spread, devices
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
@@ -113,7 +113,7 @@ def test_what_the_disc_cannot_reach_does_not_settle(first: Outcomes) -> None:
 
 
 def test_the_papers_pressure_is_too_high_for_its_disc(balancer: LiquidRingBalancer) -> None:
-    own = judged(balancer, {})
+    own = judged_all(balancer, [{}])[0]
     assert own.verdict == "not met"
     assert own.fraction.high >= 0.80
     assert own.fraction.low <= 0.88

@@ -14,7 +14,7 @@ import ringbalance as rb
 from ringbalance.controller.liquid_ring.linear_loop import LinearLoop
 from ringbalance.controller.liquid_ring.loop_factor import loop_margins
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.flow_law import CompleteLaw
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
@@ -53,7 +53,7 @@ def complex_of(matrix: np.ndarray) -> complex:
 
 def test_the_plant_has_frame_sign_and_size_of_a_run(scene: Scene, law: CompleteLaw) -> None:
     loop = rb.linear_loop(scene, flow_law=law)
-    run = simulate(scene, flow_law=law, modelled=[])
+    run = simulate(scene, BalancerModel.of(law), modelled=[])
     first = run.samples[0]
     before, after = (vibration_of(each.measurement) for each in run.samples[:2])
     axes = np.exp(2j * np.pi * np.arange(6) / 6)

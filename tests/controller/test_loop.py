@@ -23,7 +23,7 @@ from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.controller.stepped import Stepped
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
+from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from scenes import with_tables
@@ -346,17 +346,6 @@ def test_levels_run_back_by_the_law_once_the_valve_is_shut(
     lost = (driven.fill - 0.25) * math.exp(-rate * 0.7)
     assert waited.fill == pytest.approx(0.25 + lost, abs=1e-9)
     assert waited.ran_back == pytest.approx(0.25 + lost - driven.fill, abs=1e-9)
-
-
-def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> None:
-    law = paper_law(scene)
-    by_law, by_model = simulate(scene, flow_law=law), simulate(scene, model)
-    assert by_law.status == by_model.status
-    assert by_law.time.tolist() == by_model.time.tolist()
-    with pytest.raises(ValueError, match="flow_law"):
-        simulate(scene)
-    with pytest.raises(ValueError, match="flow_law"):
-        simulate(scene, model, flow_law=law)
 
 
 def gas_into(*chambers: int) -> Command:

@@ -17,7 +17,7 @@ from own_plant import Share, run, settings_of, settling_times
 
 import ringbalance
 from ringbalance.controller.balancer import AS_GIVEN, Draws, Outcomes, balancer_of
-from ringbalance.controller.judging.judge import judged, judged_all
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.models import Scene
@@ -118,7 +118,7 @@ def test_a_loop_that_goes_on_trying_settles(name: str, values: dict[str, object]
     """Commands too short to move liquid end no run: the integral grows, and noise moves what rests just above
     the limit, so that the devices that judge all settle within seconds, as those of an own plant do."""
     scene = bundled(name, values)
-    result = judged(balancer_of(scene), {}, most=64).outcomes
+    result = judged_all(balancer_of(scene), [{}], most=64)[0].outcomes
     assert set(result.ended) == {"settled"}
     assert own(scene, 64).agrees(Share.of(result.settled))
     assert float(np.quantile(result.settling_time, 0.9)) < 8.0
@@ -148,7 +148,7 @@ def test_a_nominal_run_is_that_of_an_own_plant(name: str) -> None:
 def test_the_seed_moves_no_verdict(pressure: str, verdict: str) -> None:
     for seed in (0, 1, 2):
         scene = bundled(PAPER, {"gas.pressure": pressure, "run.seed": seed})
-        assert judged(balancer_of(scene), OFFSET).verdict == verdict
+        assert judged_all(balancer_of(scene), [OFFSET])[0].verdict == verdict
 
 
 @pytest.mark.heavy

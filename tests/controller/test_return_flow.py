@@ -17,7 +17,7 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of, balancer_under
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import calibrated_model
@@ -212,7 +212,7 @@ def test_runs_and_draws_refuse_to_call_it_settled(
     assert (result["settled"], result["outcome"], result["settling_time_s"]) == (False, "drifting", None)
     assert result["gas_line"]["holds"] is False
     assert all(end["smallest_correction_m"] is None for end in result["gas_line"]["ends"])
-    drawn = judged(balancer_under(law, load_scene(tmp_path / "scene.toml")), {}, most=16)
+    drawn = judged_all(balancer_under(law, load_scene(tmp_path / "scene.toml")), [{}], most=16)[0]
     assert drawn.fraction.count == 0
     assert set(drawn.outcomes.ended) == {"drifting"}
 

@@ -147,7 +147,7 @@ def test_the_starting_pressure_of_the_paper_is_eq_19_at_rest(model: BalancerMode
     # rho omega^2 V 0.5/(B theta), the stall pressure of an emptied chamber: 0.381 MPa.
     omega = 10000 * 2 * math.pi / 60
     stall = 1000 * omega**2 * VOLUME * 0.5 / (62e-3 * math.pi / 2)
-    result = starting_pressure(law=model.flow, fill=0.0, opposite_fill=0.5, primed=False, above=1e5)
+    result = starting_pressure(law=model.flow, fill=0.0, opposite_fill=0.5, above=1e5)
     assert result == pytest.approx(stall, rel=1e-12)
     assert stall == pytest.approx(0.381e6, abs=500)
 

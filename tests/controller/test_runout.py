@@ -14,7 +14,7 @@ from own_plant import Run, Share, run, settings_of
 import ringbalance
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.document import simulation_history
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.export import disc
 from ringbalance.export.blocks import disc_block
 from ringbalance.reduced_model.calibration import calibrate
@@ -145,7 +145,7 @@ def test_a_scene_without_runout_answers_as_before() -> None:
 def test_the_rotor_is_judged_where_something_is_required_of_it(stated: dict[str, Any], verdict: str) -> None:
     """A limit of the controller is one of the reading."""
     balancer = balancer_of(with_runout("1 um", **stated))
-    result = judged(balancer, {}, most=64)
+    (result,) = judged_all(balancer, [{}], most=64)
     assert result.verdict == verdict
     demands = {each.code: each for each in (*result.demands, *result.reported)}
     fraction = result.fraction_of(demands["rotor_amplitude"]).value

@@ -19,7 +19,7 @@ from design_spread import answer
 
 import ringbalance as rb
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.judging.judge import MOST_DRAWS, judged
+from ringbalance.controller.judging.judge import MOST_DRAWS, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.design.races import deal, threshold
 from ringbalance.design.racing import near, settings_at
@@ -56,7 +56,7 @@ def test_the_smallest_of_a_whole_space_that_meets_what_is_required(design: rb.De
     verdicts = {}
     for width in (14e-3, 26e-3, 38e-3):
         balancer = balancer_of(design.given.with_values({**design.point, "disc.axial_width": width}))
-        verdicts[width] = judged(balancer, searched(balancer)).verdict
+        verdicts[width] = judged_all(balancer, [searched(balancer)])[0].verdict
     smallest = min(width for width, verdict in verdicts.items() if verdict == MET)
     assert design.succeeded
     assert all(each.size >= design.size for each in design.front)
@@ -65,7 +65,7 @@ def test_the_smallest_of_a_whole_space_that_meets_what_is_required(design: rb.De
 
 def test_the_scene_as_designed_is_judged_alike(design: rb.Design) -> None:
     scene = design.recommended_scene
-    again = judged(balancer_of(scene), {})
+    again = judged_all(balancer_of(scene), [{}])[0]
     assert design.judgement is not None
     assert again.fraction == design.judgement.fraction
 

@@ -15,7 +15,7 @@ from keep_evidence import kept_document
 
 from ringbalance import reporting
 from ringbalance.controller.judging import tune
-from ringbalance.controller.judging.judge import judged, judged_all
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
@@ -57,8 +57,8 @@ def few_cases(store: Path) -> Iterator[None]:
         patch.setattr(tune, "judged_all", partial(judged_all, most=16))
         patch.setattr(tune, "tried_remedies", lambda *_, **__: ())
         patch.setattr(first_page, "choice_records", lambda *_: [])
-        patch.setattr(first_page, "judged", partial(judged, most=16))
-        patch.setattr(loop, "judged", partial(judged, most=16))
+        patch.setattr(first_page, "judged_all", partial(judged_all, most=16))
+        patch.setattr(loop, "judged_all", partial(judged_all, most=16))
         yield
 
 

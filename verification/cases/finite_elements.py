@@ -250,7 +250,22 @@ def _error_ratios(count: int, seed: int) -> FloatArray:
     generator = np.random.default_rng(seed)
     ratios = np.full((count, len(_QUANTITIES)), np.nan)
     for row in ratios:
-        disc = _random_disc(generator)
+        chambers = int(generator.choice(_CHAMBERS))
+        angle = generator.uniform(0.7, 1.0) * 2 * math.pi / chambers
+        outer = generator.uniform(15e-3, 200e-3)
+        inner = outer * generator.uniform(0.2, 0.85)
+        widest = inner * math.sin(min(angle, math.pi) / 2)
+        largest = float(generator.choice([0.3, 0.5, 0.8]))
+        disc = Disc(
+            outer_radius=outer,
+            inner_radius=inner,
+            axial_width=generator.uniform(5e-3, 150e-3),
+            central_angle=angle,
+            chambers=chambers,
+            plate_thickness=float(generator.choice([0.0, 1.0])) * generator.uniform(0.0, 0.5) * widest,
+            max_fill_ratio=largest,
+            initial_fill=largest / 2,
+        )
         density, omega = generator.uniform(700, 6100), float(generator.uniform(80, 6000))
         x = disc.max_fill_ratio * generator.uniform(0.02, 1.0)
         ring = ring_quantities(disc=disc, density=density, angular_velocity=omega, fill_ratio=x)
@@ -271,25 +286,6 @@ def _error_ratios(count: int, seed: int) -> FloatArray:
             if error > _ROUND_OFF * abs(true):
                 row[index] = error / float(estimate.uncertainty[0])
     return ratios
-
-
-def _random_disc(generator: np.random.Generator) -> Disc:
-    chambers = int(generator.choice(_CHAMBERS))
-    angle = generator.uniform(0.7, 1.0) * 2 * math.pi / chambers
-    outer = generator.uniform(15e-3, 200e-3)
-    inner = outer * generator.uniform(0.2, 0.85)
-    widest = inner * math.sin(min(angle, math.pi) / 2)
-    largest = float(generator.choice([0.3, 0.5, 0.8]))
-    return Disc(
-        outer_radius=outer,
-        inner_radius=inner,
-        axial_width=generator.uniform(5e-3, 150e-3),
-        central_angle=angle,
-        chambers=chambers,
-        plate_thickness=float(generator.choice([0.0, 1.0])) * generator.uniform(0.0, 0.5) * widest,
-        max_fill_ratio=largest,
-        initial_fill=largest / 2,
-    )
 
 
 def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

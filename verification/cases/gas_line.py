@@ -27,7 +27,6 @@ from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.reduced_model.crater import Crater, crater_range
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.designs import Designs, changes_of
 from ringbalance.scene.errors import larger, uncertainties
 from ringbalance.scene.models import Disc, Scene
@@ -198,7 +197,37 @@ def _offset(scene: Scene) -> FloatArray:
 
 def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
     if disc.geometry is not None:
-        return _imported_cells(disc.geometry, radial, angular, points)
+        # Cells, each with the volume of a column along the shaft, at the centroid of the column.
+        # Gauss points of all cells across the shaft, m, and the volume at each, m^3.
+        body = tetrahedra(disc.geometry)
+        line, weights = gauss(points)
+        u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [line], indexing="ij"))
+        weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights], indexing="ij")], axis=0)
+        # A cube collapsed to a tetrahedron: its Jacobian is (1 - v)(1 - w)^2.
+        second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
+        local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
+        corners = body.nodes[body.cells]
+        jacobians = np.linalg.det(derivatives(corners, local))
+        volume = np.asarray(jacobians * weight * (1 - v) * (1 - w) ** 2).ravel()
+        across = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
+        point = np.asarray(across[..., 0] + 1j * across[..., 1]).ravel()
+        parts = []
+        for value, count in ((np.abs(point), radial), (np.angle(point), angular)):
+            step = np.ptp(value) / count
+            parts.append((np.minimum(((value - value.min()) / step).astype(np.int64), count - 1), step))
+        (ring, depth), (ray, angle) = parts
+        cell, size = ring * angular + ray, radial * angular
+        share = np.bincount(cell, volume, size)
+        sums = np.bincount(cell, volume * point.real, size) + 1j * np.bincount(
+            cell, volume * point.imag, size
+        )
+        filled = share > 0
+        middle = np.asarray(sums[filled] / share[filled], dtype=np.complex128)
+        return _Cells(
+            middle=middle,
+            share=share[filled] / share.sum(),
+            width=np.sqrt(depth * angle * np.abs(middle)),
+        )
     depth = disc.outer_radius - disc.inner_radius
     radius = disc.inner_radius + depth * (np.arange(radial) + 0.5) / radial
     alpha = half_angle(disc=disc, radius=radius)
@@ -206,38 +235,6 @@ def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
     area = np.broadcast_to((radius * 2 * alpha * depth / (radial * angular))[:, None], angle.shape).ravel()
     middle = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128).ravel()
     return _Cells(middle=middle, share=area / area.sum(), width=np.sqrt(area))
-
-
-def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points: int) -> _Cells:
-    """Cells, each with the volume of a column along the shaft, at the centroid of the column."""
-    # Gauss points of all cells across the shaft, m, and the volume at each, m^3.
-    body = tetrahedra(geometry)
-    line, weights = gauss(points)
-    u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [line], indexing="ij"))
-    weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights], indexing="ij")], axis=0)
-    # A cube collapsed to a tetrahedron: its Jacobian is (1 - v)(1 - w)^2.
-    second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
-    local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
-    corners = body.nodes[body.cells]
-    jacobians = np.linalg.det(derivatives(corners, local))
-    volume = np.asarray(jacobians * weight * (1 - v) * (1 - w) ** 2).ravel()
-    across = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
-    point = np.asarray(across[..., 0] + 1j * across[..., 1]).ravel()
-    parts = []
-    for value, count in ((np.abs(point), radial), (np.angle(point), angular)):
-        step = np.ptp(value) / count
-        parts.append((np.minimum(((value - value.min()) / step).astype(np.int64), count - 1), step))
-    (ring, depth), (ray, angle) = parts
-    cell, size = ring * angular + ray, radial * angular
-    share = np.bincount(cell, volume, size)
-    sums = np.bincount(cell, volume * point.real, size) + 1j * np.bincount(cell, volume * point.imag, size)
-    filled = share > 0
-    middle = np.asarray(sums[filled] / share[filled], dtype=np.complex128)
-    return _Cells(
-        middle=middle,
-        share=share[filled] / share.sum(),
-        width=np.sqrt(depth * angle * np.abs(middle)),
-    )
 
 
 def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:

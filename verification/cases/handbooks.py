@@ -49,7 +49,6 @@ from ringbalance.verification.evidence import (
     Level,
     NotRunError,
     Reference,
-    Series,
     figure,
     from_range,
 )
@@ -180,6 +179,9 @@ def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Eviden
     at_rest = _program(tube, reynolds, defect)
     library = [by_fluids(tube, float(re), without=without) for re in at_rest.reynolds]
     turning = replace(scene, tube=tube)
+    loss = tube_loss(turning, np.geomspace(*VELOCITIES, _CURVE_POINTS))
+    low, high = _spread(turning, loss.reynolds, without)
+    fifty = np.full(low.shape, PAPER_DRAG_COEFFICIENT)
     return Evidence(
         quantities={
             "friction": _worst(tube, at_rest, library, "friction"),
@@ -187,7 +189,17 @@ def k_by_fluids(scene: Scene, level: Level, defect: str | None = None) -> Eviden
             "k": _worst(tube, at_rest, library),
         },
         numbers=_at_equal_fills(turning, slowest, without),
-        series=(_figure(turning, without),),
+        series=(
+            figure(
+                "loss coefficient by the library and by the program",
+                ("velocity", "m/s", loss.velocity),
+                FigureCurve("fluids, all methods", "1", (low + high) / 2, "reference", (high - low) / 2),
+                FigureCurve("program, at rest", "1", _program(turning.tube, loss.reynolds, None).k, "points"),
+                FigureCurve("program, turning", "1", loss.k.value, uncertainty=loss.k.uncertainty),
+                FigureCurve("50", "1", fifty, "paper"),
+                log=True,
+            ),
+        ),
         tables=(_over_velocity(turning, without), _methods(tube, float(at_rest.reynolds[-1]), departs)),
     )
 
@@ -259,21 +271,6 @@ def _spread(scene: Scene, reynolds: FloatArray, without: frozenset[str]) -> Floa
     """Smallest and largest k by the library at each Re, shape (2, n)."""
     ends = [_range(by_fluids(scene.tube, float(re), without=without)) for re in reynolds]
     return np.array(ends).T
-
-
-def _figure(scene: Scene, without: frozenset[str]) -> Series:
-    loss = tube_loss(scene, np.geomspace(*VELOCITIES, _CURVE_POINTS))
-    low, high = _spread(scene, loss.reynolds, without)
-    fifty = np.full(low.shape, PAPER_DRAG_COEFFICIENT)
-    return figure(
-        "loss coefficient by the library and by the program",
-        ("velocity", "m/s", loss.velocity),
-        FigureCurve("fluids, all methods", "1", (low + high) / 2, "reference", (high - low) / 2),
-        FigureCurve("program, at rest", "1", _program(scene.tube, loss.reynolds, None).k, "points"),
-        FigureCurve("program, turning", "1", loss.k.value, uncertainty=loss.k.uncertainty),
-        FigureCurve("50", "1", fifty, "paper"),
-        log=True,
-    )
 
 
 def _over_velocity(scene: Scene, without: frozenset[str]) -> CaseTable:

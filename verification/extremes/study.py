@@ -76,7 +76,7 @@ class AxisSweep:
 
     def middles(self, fineness: float) -> list[float]:
         """Fractions half-way between neighbours with different endings, further apart than `fineness`."""
-        shares, ends = self.shares.tolist(), list(map(_outcome, self.judgements))
+        shares, ends = self.shares.tolist(), [(each.ending, each.loop) for each in self.judgements]
         return [
             (shares[i] + shares[i + 1]) / 2
             for i in range(len(ends) - 1)
@@ -98,7 +98,8 @@ class AxisSweep:
         message: of the first interval that of its last point, of the others that of their first.
         """
         values, spans = self.values, []
-        for _, group in groupby(range(len(values)), key=lambda i: _outcome(self.judgements[i])):
+        ends = [(each.ending, each.loop) for each in self.judgements]
+        for _, group in groupby(range(len(values)), key=ends.__getitem__):
             start, *rest = group
             last = rest[-1] if rest else start
             message = self.judgements[last if start == 0 else start]
@@ -131,10 +132,6 @@ class AxisSweep:
             "loop": [each.loop for each in self.judgements],
             "residual": [each.residual for each in self.judgements],
         }
-
-
-def _outcome(judgement: PointJudgement) -> tuple[Ending, str]:
-    return judgement.ending, judgement.loop
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -121,7 +121,22 @@ def end_field(end: End, *, reynolds: float) -> FlowField:
     """
     if end == "entrance":
         cells = EndMesh(cells_per_fold=1.8, edge_cell=1e-2, reservoir=10.0, tube=10.0 + 0.1 * reynolds)
-        system, first = _entrance_system(cells), 3.0
+        first = 3.0
+
+        def sink_velocity(component: int, points: FloatArray) -> FloatArray:
+            """Velocity of a half-space that drains U pi d^2/4 at the origin."""
+            distance = np.maximum(np.hypot(points[0], points[1]), 0.5)
+            return np.asarray(-points[component] / (8 * distance**3), dtype=np.float64)
+
+        # A sink's velocity on the far sides: free inflow so near is unstable at high Re.
+        conditions = [
+            Dirichlet(boundary=boundary, component=c, value=partial(sink_velocity, c))
+            for boundary in ("far", "side")
+            for c in (0, 1)
+        ]
+        conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
+        conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
+        system = FlowSystem.of(mesh=cells.mesh(end="entrance"), conditions=conditions, axisymmetric=True)
     else:
         cells = EndMesh(cells_per_fold=1.3, edge_cell=1e-2, reservoir=15.0, tube=2.0, jet_cell=1.0)
         system, first = cells.system(end="exit"), 1.2
@@ -150,24 +165,6 @@ def end_field(end: End, *, reynolds: float) -> FlowField:
         reynolds=reynolds,
         status=Status(),
     )
-
-
-def _entrance_system(cells: EndMesh) -> FlowSystem:
-    """An entrance with a sink's velocity on its far sides: free inflow so near is unstable at high Re."""
-
-    def sink_velocity(component: int, points: FloatArray) -> FloatArray:
-        """Velocity of a half-space that drains U pi d^2/4 at the origin."""
-        distance = np.maximum(np.hypot(points[0], points[1]), 0.5)
-        return np.asarray(-points[component] / (8 * distance**3), dtype=np.float64)
-
-    conditions = [
-        Dirichlet(boundary=boundary, component=c, value=partial(sink_velocity, c))
-        for boundary in ("far", "side")
-        for c in (0, 1)
-    ]
-    conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
-    conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
-    return FlowSystem.of(mesh=cells.mesh(end="entrance"), conditions=conditions, axisymmetric=True)
 
 
 def _potential(

@@ -11,7 +11,7 @@ Continuation uses a secant predictor and repeats a failed step with half its len
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -24,6 +24,8 @@ from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
 _GOOD, _USABLE = 1e-12, 1e-8
 """Relative residuals: below the first no refinement, above the second a retry with pivoting."""
 _MAX_REFINEMENTS = 3
+_KEEP_FACTORS_BELOW = 1e-3
+"""Relative change below which the next step reuses the factors: the contraction is then at least that."""
 
 
 class Factors:
@@ -35,21 +37,10 @@ class Factors:
             symmetric = {"SymmetricMode": True}
             self.factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
         except RuntimeError:
-            self._pivot()
-
-    def _pivot(self) -> None:
-        self.factors, self.pivoted = splu(self.matrix, permc_spec="COLAMD"), True
+            self.factors, self.pivoted = splu(matrix, permc_spec="COLAMD"), True
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solution of A x = b, refined, with pivots if need be. Raises: RuntimeError: A is singular."""
-        x, gap = self._refined(right)
-        if gap > _USABLE and not self.pivoted:
-            self._pivot()
-            x, gap = self._refined(right)
-        return x
-
-    def _refined(self, right: FloatArray) -> tuple[FloatArray, float]:
-        """Solution with up to three refinements, and its relative residual."""
         scale = float(np.abs(right).max()) or 1.0
         x, gap = np.asarray(self.factors.solve(right), dtype=np.float64), np.inf
         for _ in range(_MAX_REFINEMENTS):
@@ -58,18 +49,19 @@ class Factors:
             if gap <= _GOOD or not gap < before / 2:
                 break
             x = x + self.factors.solve(residual)
-        return x, gap if np.isfinite(gap) else np.inf
+        if not gap <= _USABLE and not self.pivoted:
+            self.factors, self.pivoted = splu(self.matrix, permc_spec="COLAMD"), True
+            return self.solve(right)
+        return x
 
 
 @dataclass(frozen=True, kw_only=True)
 class NewtonSettings:
-    """Criteria by which Newton's method stops, and reuses its factors."""
+    """Criteria by which Newton's method stops."""
 
     tolerance: float = 1e-9
     """Largest change of a velocity over the largest velocity, below which the flow has converged."""
     max_iterations: int = 20
-    keep_factors_below: float = 1e-3
-    """Relative change below which the next step reuses the factors: the contraction is then at least that."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,31 +74,16 @@ class FlowSolution:
     """Nodal, shape (components, velocity nodes)."""
     pressure: FloatArray
     """Nodal, shape (pressure nodes,)."""
-    driving_gradient: float
+    driving_gradient: float = 0.0
     """G that drives the prescribed flow rate, 0 without one."""
-    status: Status
-    statistics: Statistics
+    status: Status = field(default_factory=Status)
+    statistics: Statistics = field(default_factory=Statistics)
 
     @classmethod
-    def of(
-        cls,
-        system: FlowSystem,
-        vector: FloatArray,
-        *,
-        driving_gradient: float = 0.0,
-        status: Status | None = None,
-        statistics: Statistics | None = None,
-    ) -> Self:
-        """A flow from its full vector of unknowns."""
+    def of(cls, system: FlowSystem, vector: FloatArray, **more: Any) -> Self:
+        """A flow from its full vector of unknowns, and further fields."""
         velocity, pressure = system.split(vector)
-        return cls(
-            vector=vector,
-            velocity=velocity,
-            pressure=pressure,
-            driving_gradient=driving_gradient,
-            status=status or Status(),
-            statistics=statistics or Statistics(),
-        )
+        return cls(vector=vector, velocity=velocity, pressure=pressure, **more)
 
 
 def solve_flow(
@@ -129,125 +106,112 @@ def solve_flow(
         raise ValueError("viscosity must be above zero")
     if start is not None and start.vector.size != system.unknowns:
         raise ValueError("start belongs to another system")
-    settings = settings or NewtonSettings()
-    state = _State(vector=system.fixed_values.copy())
+    settings, free = settings or NewtonSettings(), system.free
+    vector, gradient, iterations = system.fixed_values.copy(), 0.0, 0
     stages = [coefficients]
     if start is not None:
-        state.vector[system.free] = start.vector[system.free]
-        state.gradient = start.driving_gradient
+        vector[free], gradient = start.vector[free], start.driving_gradient
     elif coefficients.inertia != 0.0:
         stages = [replace(coefficients, inertia=0.0), coefficients]
     for stage in stages:
-        equations = _Equations(system, stage.inertia, system.linear_matrix(stage))
-        if problem := _iterate(state, equations, flow_rate, settings, progress):
+        linear = system.linear_matrix(stage)
+        vector, gradient, steps, problem = _iterate(
+            system, linear, stage.inertia, vector, gradient, flow_rate, settings, progress
+        )
+        iterations += steps
+        if problem:
             break
-    finite = np.isfinite(state.vector)
+    finite = np.isfinite(vector)
     if not np.all(finite):
         problem = problem or "the iteration diverged"
-    state.vector = np.where(finite, state.vector, 0.0)
+    vector = np.where(finite, vector, 0.0)
     if system.enclosed:
         # Nothing else fixes the pressure's level: its mean is zero.
-        pressure = state.vector[-system.mean_load.size :]
+        pressure = vector[-system.mean_load.size :]
         pressure -= float(system.mean_load @ pressure) / float(system.mean_load.sum())
-    residual = np.abs(equations.residual(state))
-    at_walls = np.delete(residual, system.free)
+    residual = np.abs(_residual(system, linear, stage.inertia, vector, gradient))
+    at_walls = np.delete(residual, free)
     status = Status()
     if problem:
         remedy = "start from the solution of a neighbouring, less convective case, or refine the mesh"
         status = Status(code=StatusCode.NOT_CONVERGED, text=f"{problem}; {remedy}")
-    return FlowSolution.of(
-        system,
-        state.vector,
-        driving_gradient=state.gradient,
-        status=status,
-        statistics=Statistics(
-            unknowns=int(system.free.size),
-            iterations=state.iterations,
-            relative_residual=float(residual[system.free].max() / (at_walls.max() or 1.0)),
-        ),
+    statistics = Statistics(
+        unknowns=int(free.size),
+        iterations=iterations,
+        relative_residual=float(residual[free].max() / (at_walls.max() or 1.0)),
     )
+    return FlowSolution.of(system, vector, driving_gradient=gradient, status=status, statistics=statistics)
 
 
-@dataclass
-class _State:
-    """The flow between two Newton iterations."""
-
-    vector: FloatArray
-    gradient: float = 0.0
-    iterations: int = 0
-
-
-@dataclass(frozen=True)
-class _Equations:
-    """Discrete equations of a flow at given coefficients."""
-
-    system: FlowSystem
-    inertia: float
-    linear: Any
-
-    def residual(self, state: _State) -> FloatArray:
-        """Imbalance of each equation, full vector."""
-        system = self.system
-        residual = np.asarray(self.linear @ state.vector, dtype=np.float64) - system.source
-        if system.flow_load is not None:
-            residual -= state.gradient * system.flow_load
-        if self.inertia != 0.0:
-            residual += self.inertia * system.convection_vector(state.vector)
-        if system.enclosed:
-            # A discrete boundary flow that does not sum to zero is spread evenly instead of
-            # becoming a point source at the pinned node.
-            mass = residual[-system.mean_load.size :]
-            mass -= mass.sum() / system.mean_load.sum() * system.mean_load
-        return residual
+def _residual(
+    system: FlowSystem, linear: Any, inertia: float, vector: FloatArray, gradient: float
+) -> FloatArray:
+    """Imbalance of each equation, full vector."""
+    residual = np.asarray(linear @ vector, dtype=np.float64) - system.source
+    if system.flow_load is not None:
+        residual -= gradient * system.flow_load
+    if inertia != 0.0:
+        residual += inertia * system.convection_vector(vector)
+    if system.enclosed:
+        # A discrete boundary flow that does not sum to zero is spread evenly instead of
+        # becoming a point source at the pinned node.
+        mass = residual[-system.mean_load.size :]
+        mass -= mass.sum() / system.mean_load.sum() * system.mean_load
+    return residual
 
 
 def _iterate(
-    state: _State,
-    equations: _Equations,
+    system: FlowSystem,
+    linear: Any,
+    inertia: float,
+    vector: FloatArray,
+    gradient: float,
     flow_rate: float,
     settings: NewtonSettings,
     progress: Callable[[str], None] | None,
-) -> str:
-    """Advance the flow by Newton steps until they are small. Returns: The problem, empty without one."""
-    system, free, factors, contracting, update = equations.system, equations.system.free, None, True, np.inf
-    for _ in range(settings.max_iterations):
+) -> tuple[FloatArray, float, int, str]:
+    """Take Newton steps until they are small. Returns: Flow, gradient, iterations, and the problem or ""."""
+    free, factors, contracting, update = system.free, None, True, np.inf
+    for iteration in range(1, settings.max_iterations + 1):
         # Contracting: well below the step before, so that the old factors are good for another step.
-        keep = equations.inertia == 0.0 or (update < settings.keep_factors_below and contracting)
-        change = np.zeros_like(state.vector)
+        keep = inertia == 0.0 or (update < _KEEP_FACTORS_BELOW and contracting)
+        change = np.zeros_like(vector)
         try:
             if factors is None or not keep:
-                jacobian = equations.linear
-                if equations.inertia != 0.0:
-                    jacobian = jacobian + equations.inertia * system.convection_matrix(state.vector)
+                jacobian = linear
+                if inertia != 0.0:
+                    jacobian = jacobian + inertia * system.convection_matrix(vector)
                 factors = Factors(system.free_part(jacobian))
                 if system.flow_load is not None:
                     bordering = factors.solve(system.flow_load[free])
-            change[free] = factors.solve(-equations.residual(state)[free])
+            change[free] = factors.solve(-_residual(system, linear, inertia, vector, gradient)[free])
         except RuntimeError as error:
-            return f"the matrix could not be factorized ({error})"
+            return vector, gradient, iteration - 1, f"the matrix could not be factorized ({error})"
         if system.flow_load is not None:
-            missing = flow_rate - float(system.flow_load @ (state.vector + change))
+            missing = flow_rate - float(system.flow_load @ (vector + change))
             share = missing / float(system.flow_load[free] @ bordering)
             change[free] += share * bordering
-            state.gradient += share
-        state.vector = state.vector + change
-        largest, moved = (float(np.abs(system.split(each)[0]).max()) for each in (state.vector, change))
+            gradient += share
+        vector = vector + change
+        largest, moved = (float(np.abs(system.split(each)[0]).max()) for each in (vector, change))
         before, update = update, moved / largest if largest > 0.0 else 0.0
         contracting = update < 0.1 * before
-        state.iterations += 1
         if progress is not None:
-            progress(f"Newton iteration {state.iterations}: relative change {update:.1e}")
+            progress(f"Newton iteration {iteration}: relative change {update:.1e}")
         if not np.isfinite(update) or update > 1e8:
-            return "the iteration diverged"
+            return vector, gradient, iteration, "the iteration diverged"
         if update <= settings.tolerance:
-            return ""
-    return f"no convergence in {settings.max_iterations} iterations (last relative change {update:.1e})"
+            return vector, gradient, iteration, ""
+    problem = f"no convergence in {settings.max_iterations} iterations (last relative change {update:.1e})"
+    return vector, gradient, settings.max_iterations, problem
 
 
 Solve = Callable[[float, FlowSolution | None], FlowSolution]
 """Flow at a parameter from a predicted start, or from rest."""
 _EASY = 2.0
 """Parameter up to which a start from rest converges."""
+_EASY_ITERATIONS, _GROWTH = 6, 1.6
+"""Newton iterations up to which a step counts as easy, and the factor of the next; a failed one is halved."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,10 +222,6 @@ class StepRule:
     smallest: float = 1 / 64
     largest: float = float("inf")
     """Longest step: with several flows for one parameter a longer one can land on another branch."""
-    growth: float = 1.6
-    """Factor after an easy step; a failed step is halved."""
-    easy_iterations: int = 6
-    """Newton iterations up to which a step counts as easy."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -313,8 +273,8 @@ def follow(
                 failures, step = failures + 1, length / 2
                 continue
             before, at, flow = (at, flow), parameter, solution
-            easy = flow.statistics.iterations <= rule.easy_iterations
-            step = min(max(step, length) * (rule.growth if easy else 1.0), rule.largest)
+            easy = flow.statistics.iterations <= _EASY_ITERATIONS
+            step = min(max(step, length) * (_GROWTH if easy else 1.0), rule.largest)
         if at != target:
             text = f"the path ended at {at:.6g} on its way to {target:.6g}"
             remedy = "refine the mesh or take smaller steps"

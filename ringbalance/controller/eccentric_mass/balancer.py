@@ -24,7 +24,6 @@ from ringbalance.controller.balancer import (
     Settings,
     settles_within,
 )
-from ringbalance.controller.eccentric_mass.control_records import ImbalanceFilter
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, EccentricDevice, device, on_rotor
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.remedies import remedies_of
@@ -40,7 +39,6 @@ from ringbalance.controller.eccentric_mass.sampled_loops import (
 )
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricRequirement,
-    EccentricRotor,
     EccentricScene,
     eccentric_scene,
 )
@@ -261,12 +259,27 @@ class EccentricMassBalancer(Balancer):
         )
         start = math.ceil(start / step) * step
         angle = scene.masses.initial_angle[0]
+        # The filter's noises and its rotor change as the sensor and the rotor do.
+        keys, mass_ratio = scene.imbalance_filter, mass / own_mass
+        noise = max(rotor.noise, _LEAST_NOISE_FRACTION * rotor.limit)
+        louder, stiffer = noise / keys.position_noise, after.stiffness / before.stiffness
         mounted = replace(
             plant,
             sensor=replace(
                 scene.sensor, position_noise=rotor.noise, velocity_noise=rotor.noise * rotor.speed
             ),
-            imbalance_filter=_rescaled(scene, after, rotor, mass_ratio=mass / own_mass),
+            imbalance_filter=replace(
+                keys,
+                position_noise=noise,
+                velocity_noise=noise * rotor.speed,
+                velocity_walk=keys.velocity_walk * louder * stiffer / mass_ratio,
+                unbalance_walk=keys.unbalance_walk * louder * mass_ratio,
+                assumed_mass=keys.assumed_mass * (after.mass / before.mass),
+                assumed_stiffness=keys.assumed_stiffness * stiffer,
+                assumed_damping=after.damping
+                if before.damping == 0
+                else keys.assumed_damping * (after.damping / before.damping),
+            ),
             masses=replace(scene.masses, initial_angle=(angle, angle + math.pi)),
             supervisor=replace(scene.supervisor, limit=rotor.limit, start=start),
             requirement=EccentricRequirement(fraction=scene.requirement.fraction),
@@ -312,23 +325,3 @@ class EccentricMassBalancer(Balancer):
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
         """Columns of every sample of a run."""
         return eccentric_history(run)
-
-
-def _rescaled(
-    scene: EccentricScene, after: EccentricRotor, rotor: CommonRotor, *, mass_ratio: float
-) -> ImbalanceFilter:
-    """Imbalance filter on another rotor. Args: `mass_ratio`: new over old mass, with eccentric masses."""
-    before, keys = scene.rotor, scene.imbalance_filter
-    noise = max(rotor.noise, _LEAST_NOISE_FRACTION * rotor.limit)
-    louder, stiffer = noise / keys.position_noise, after.stiffness / before.stiffness
-    damping = keys.assumed_damping
-    return replace(
-        keys,
-        position_noise=noise,
-        velocity_noise=noise * rotor.speed,
-        velocity_walk=keys.velocity_walk * louder * stiffer / mass_ratio,
-        unbalance_walk=keys.unbalance_walk * louder * mass_ratio,
-        assumed_mass=keys.assumed_mass * (after.mass / before.mass),
-        assumed_stiffness=keys.assumed_stiffness * stiffer,
-        assumed_damping=after.damping if before.damping == 0 else damping * (after.damping / before.damping),
-    )

@@ -60,24 +60,9 @@ def _capacity_travel(mass: float, radius: float, rotor: float) -> float:
     return _capacity(mass, radius) / (rotor + 2 * mass)
 
 
-def _critical_velocity(travel: float, stiffness: float, rotor: float, mass: float) -> float:
-    """Velocity amplitude of a displacement at the critical speed, m/s."""
-    return travel * math.sqrt(stiffness / (rotor + 2 * mass))
-
-
 def _assumed_noise(noise: float, expected: float) -> float:
     """Standard deviation of a sensor that the filter assumes, with a lower bound for exact sensors."""
     return max(noise, _FINEST_FRACTION * expected)
-
-
-def _velocity_walk(noise: float, step: float, stiffness: float, rotor: float, mass: float) -> float:
-    """Random walk of the velocity within 1 s, m/s: a fraction of W_c^2 times displacement noise of 1 s."""
-    return _VELOCITY_WALK_FRACTION * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
-
-
-def _unbalance_walk(noise: float, step: float, rotor: float, mass: float) -> float:
-    """Random walk of the unbalance within 1 s, kg m: a fraction of mass times displacement noise of 1 s."""
-    return _UNBALANCE_WALK_FRACTION * (rotor + 2 * mass) * noise * math.sqrt(step)
 
 
 def _settling(damping: float, rotor: float, mass: float) -> float:
@@ -91,16 +76,6 @@ def _two_turns(profile: Sequence[Any]) -> float:
     speeds = [abs(corner.speed) for corner in profile]
     fastest = speeds[0] or max(speeds) if speeds else 0.0
     return 4 * math.pi / fastest if fastest else 1.0
-
-
-def _friction_walk(radius: float) -> float:
-    """Random walk of a friction arm within 1 s, m."""
-    return 4e-5 * radius
-
-
-def _amplitude_limit(mass: float, radius: float, rotor: float, noise: float) -> float:
-    """Amplitude below which no fine tuning is needed, m."""
-    return max(0.02 * _capacity_travel(mass, radius, rotor), 3 * noise)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,7 +110,7 @@ class ImbalanceFilter:
             "rotor.stiffness",
             "rotor.mass",
             "masses.mass",
-            rule=_critical_velocity,
+            rule=lambda travel, stiffness, rotor, mass: travel * math.sqrt(stiffness / (rotor + 2 * mass)),
         ),
     ]
     initial_unbalance: Annotated[
@@ -178,7 +153,9 @@ class ImbalanceFilter:
             "rotor.stiffness",
             "rotor.mass",
             "masses.mass",
-            rule=_velocity_walk,
+            rule=lambda noise, step, stiffness, rotor, mass: (
+                _VELOCITY_WALK_FRACTION * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
+            ),
         ),
     ]
     unbalance_walk: Annotated[
@@ -190,7 +167,9 @@ class ImbalanceFilter:
             "imbalance_filter.step",
             "rotor.mass",
             "masses.mass",
-            rule=_unbalance_walk,
+            rule=lambda noise, step, rotor, mass: (
+                _UNBALANCE_WALK_FRACTION * (rotor + 2 * mass) * noise * math.sqrt(step)
+            ),
         ),
     ]
     gate: Annotated[
@@ -237,7 +216,7 @@ class FrictionFilter:
             "4e-5 guide_radius",
             "random walk of the friction arm within 1 s",
             "masses.guide_radius",
-            rule=_friction_walk,
+            rule=lambda radius: 4e-5 * radius,
         ),
     ]
     initial_rate: Annotated[
@@ -354,7 +333,9 @@ class Supervisor:
             "masses.guide_radius",
             "rotor.mass",
             "sensor.position_noise",
-            rule=_amplitude_limit,
+            rule=lambda mass, radius, rotor, noise: max(
+                0.02 * _capacity_travel(mass, radius, rotor), 3 * noise
+            ),
         ),
     ]
     lowest_speed: Annotated[

@@ -138,23 +138,6 @@ def _write_identity(out: FloatArray) -> None:
             out[i, k] = 1.0 if i == k else 0.0
 
 
-@in_place
-def _write_euler_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
-    """Write the paper's transition I + A dt, whose steady whirl is exact but whose transient is not.
-
-    Source: Eq. 14 of the paper on eccentric masses.
-    """
-    mass, damping, stiffness = model
-    w = angular_velocity
-    _write_identity(out)
-    out[0, 2] = out[1, 3] = step
-    out[2, 0] = out[3, 1] = (w * w - stiffness / mass) * step
-    out[2, 1], out[3, 0] = damping * w / mass * step, -damping * w / mass * step
-    out[2, 2] = out[3, 3] = 1.0 - damping / mass * step
-    out[2, 3], out[3, 2] = 2 * w * step, -2 * w * step
-    out[2, 4] = out[3, 5] = w * w / mass * step
-
-
 @compiled
 def _write_process(settings: FilterSettings, angular_velocity: float, out: FloatArray) -> None:
     """Write the covariance that white noise builds up within one step, positive semidefinite.
@@ -210,7 +193,16 @@ def set_speed(estimate: Record, settings: FilterSettings, speed: float) -> None:
     """
     estimate.speed = speed
     if settings.euler:
-        _write_euler_transition(settings.model, speed, settings.step, estimate.transition)
+        # Eq. 14 of the paper, I + A dt, whose steady whirl is exact but whose transient is not.
+        (mass, damping, stiffness), w = settings.model, speed
+        step, out = settings.step, estimate.transition
+        _write_identity(out)
+        out[0, 2] = out[1, 3] = step
+        out[2, 0] = out[3, 1] = (w * w - stiffness / mass) * step
+        out[2, 1], out[3, 0] = damping * w / mass * step, -damping * w / mass * step
+        out[2, 2] = out[3, 3] = 1.0 - damping / mass * step
+        out[2, 3], out[3, 2] = 2 * w * step, -2 * w * step
+        out[2, 4] = out[3, 5] = w * w / mass * step
     else:
         _write_transition(settings.model, speed, settings.step, estimate.transition)
     _write_process(settings, speed, estimate.process)

@@ -358,11 +358,11 @@ class EccentricRun(PresentedResult):
         unlike = self.innovation is not None and self.innovation > _WRONG_MODEL_INNOVATION
         # The Euler transition is the cause to remove first.
         by_euler = keys.discretisation == "euler" and (unlike or keys.step > _euler_limit(self))
-        stalls = _stalled_fraction(self) > _NOTICEABLE_STALL_FRACTION and not self.friction_known
+        stalled = int(self.memory["stalled"]) > _NOTICEABLE_STALL_FRACTION * int(self.memory["driven"])
         due = {
             "strategy_not_finished": settled and self.stage not in {REST, FAILED},
             "strategy_failed": settled and self.stage == FAILED,
-            "drive_nearly_stalled": stalls,
+            "drive_nearly_stalled": stalled and not self.friction_known,
             "voltage_at_limit": self.saturation > 0,
             "euler_too_coarse": by_euler,
             "innovations_unlike_model": unlike and not by_euler,
@@ -409,10 +409,6 @@ def _unstable(scene: EccentricScene) -> Iterator[Finding]:
             )
 
 
-def _stalled_fraction(run: EccentricRun) -> float:
-    return int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1)
-
-
 def _numbers(run: EccentricRun) -> dict[str, Value]:
     """Numbers that sentences refer to by name."""
     scene, worst = run.scene, run.left
@@ -438,7 +434,7 @@ def _numbers(run: EccentricRun) -> dict[str, Value]:
         "stage": STAGE_NAMES[run.stage],
         "turns": run.run_away,
         "cause": CAUSE_NAMES[int(run.history["cause"][-1])].replace("_", " "),
-        "stalled_fraction": _stalled_fraction(run),
+        "stalled_fraction": int(run.memory["stalled"]) / max(int(run.memory["driven"]), 1),
         "saturation": run.saturation,
         "euler_limit": _euler_limit(run),
         "innovation": run.innovation,

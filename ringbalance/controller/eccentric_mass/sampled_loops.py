@@ -99,9 +99,6 @@ class RecommendedGains:
             position, rate = lqr_gain(track, state_weight=weight, input_weight=lqr.input_weight)
             return _poles(scene, hold, margin * position, margin * rate)
 
-        def speed_poles(gain: float, hold: float, margin: float) -> ComplexArray:
-            return _poles(scene, hold, 0.0, plant.drive_gain * (margin * gain), eased=True)
-
         def pair_poles(pair: float, speed: float, hold: float) -> ComplexArray:
             # Both drives act on the angle between the masses.
             return _poles(scene, hold, 2 * plant.drive_gain * pair, plant.drive_gain * speed, eased=True)
@@ -120,7 +117,9 @@ class RecommendedGains:
             key="friction_filter.speed_gain",
             value=keys.speed_gain,
             unit="V*s/rad",
-            poles=speed_poles,
+            poles=lambda gain, hold, margin: _poles(
+                scene, hold, 0.0, plant.drive_gain * (margin * gain), eased=True
+            ),
         )
         slower = min(speed.value, speed.recommended)
         pair = _loop(

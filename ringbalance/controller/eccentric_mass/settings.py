@@ -25,16 +25,12 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.origins import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
-_DWELL_TIME_S = 0.2
 _LEAST_DECAY_TIMES = 2.0
 """Shortest imbalance estimation, in decay times of the rotor."""
 _LONGEST_ESTIMATE_FRACTION = 0.5
 """Upper bound of the shortest imbalance estimation, as a fraction of its time limit."""
 _NOTICEABLE_FRACTION = 0.25
 """Noticeable travel, as a fraction of the arrival angle."""
-_LEAST_DRIVE_TIME_S = 1.0
-"""Shortest friction stage: long against the drive's own time constants."""
-_LONGEST_TRIAL_MOVE_S = 10.0
 _CERTAIN_SIGMA = 5.0
 """Standard deviations of a smoothed rate beyond which a mass counts as moving."""
 _CONSTANTS = (
@@ -61,8 +57,6 @@ class Gates(NamedTuple):
     target_error: Pair
     noticeable: float
     """Smallest approach to the goal within 1 s of masses that are not held, rad."""
-    dwell: float
-    """Time for which masses must stay at their goal to count as arrived, s."""
     imbalance_gate: float
     """Relative standard deviation of the imbalance at which its estimation ends."""
     friction_gate: float
@@ -77,8 +71,6 @@ class Gates(NamedTuple):
     """Standard deviation of the friction torque below which it does not affect arrival, N m."""
     least_estimate: float
     """Shortest time of imbalance estimation, s."""
-    least_drive: float
-    """Shortest time of friction estimation, s."""
     stall_rate: float
     """Rate below which the drive nearly stalls, rad/s."""
     tuning_step: float
@@ -89,8 +81,6 @@ class Gates(NamedTuple):
     average: float
     margin: float
     """Reduction of the amplitude by which a trial or a correction counts as better, m."""
-    move_time: float
-    """Longest move of one trial, s."""
     moment: float
     """b, kg m."""
     gap: float
@@ -115,13 +105,11 @@ class Gates(NamedTuple):
         return cls(
             **{name: getattr(keys, name) for name in shared},
             noticeable=max(_NOTICEABLE_FRACTION * keys.arrival_angle, 2 * law.near),
-            dwell=_DWELL_TIME_S,
             imbalance_gate=scene.imbalance_filter.gate,
             friction_gate=scene.friction_filter.gate,
             constants=(float(constants[0, 0]), float(constants[0, 1]), float(constants[1, 1])),
             friction_torque=_FRICTION_ERROR_FRACTION * law.position_gain * keys.arrival_angle,
             least_estimate=least_estimate,
-            least_drive=_LEAST_DRIVE_TIME_S,
             stall_rate=scene.friction_filter.stall_share * scene.friction_filter.drive_speed,
             tuning_step=tuning.step,
             tuning_stop=tuning.stop,
@@ -129,7 +117,6 @@ class Gates(NamedTuple):
             wait=tuning.wait,
             average=tuning.average,
             margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
-            move_time=_LONGEST_TRIAL_MOVE_S,
             moment=law.track.moment,
             gap=scene.masses.gap,
             by_trials=keys.correction == "trials",

@@ -45,7 +45,6 @@ from ringbalance.controller.eccentric_mass.settings import Gates
 from ringbalance.controller.eccentric_mass.targets import (
     aim_back,
     assign,
-    begin_correction,
     begin_tuning,
     judge_correction,
     next_trial,
@@ -63,6 +62,11 @@ _DRIVES_OFF_LOAD: Final = 0.5
 """Load below which holding drives are switched off, as a fraction of the certain friction."""
 STALLED_SHARE: Final = 0.5
 """Fraction of the friction stage with a stalled mass beyond which the drive is the cause of failure."""
+_DWELL_TIME_S: Final = 0.2
+"""Time for which masses must stay at their goal to count as arrived."""
+_LEAST_DRIVE_TIME_S: Final = 1.0
+"""Shortest friction stage: long against the drive's own time constants."""
+_LONGEST_MOVE_S: Final = 10.0
 _STILL_TIME_S: Final = 1.0
 """Time without approach to the goal after which masses count as held by friction."""
 _STEADY_RAD_S2: Final = 1e-6
@@ -88,7 +92,7 @@ def supervise(
     elif memory.stage == POSITIONING:
         # Until the masses are at their targets or held by friction; the check shows the residual vibration.
         _watch_arrival(gates, memory, time, gates.arrival_angle)
-        if _arrived(gates, memory, time) or _held(gates, memory, time):
+        if _arrived(memory, time) or _held(gates, memory, time):
             enter(memory, CHECK, time, NONE)
         elif time - memory.entered >= gates.positioning_time:
             _stay(memory, FAILED, time, NOT_ARRIVED)
@@ -180,7 +184,7 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
     """Estimate both friction arms until their errors are small, relative to the arms or for the arrival."""
     elapsed, precise = time - memory.entered, True
     # Without the time in which the drives start.
-    if elapsed >= 0.5 * gates.least_drive:
+    if elapsed >= 0.5 * _LEAST_DRIVE_TIME_S:
         memory.driven += 1
         memory.stalled += 1 if min(abs(memory.rate[0]), abs(memory.rate[1])) < gates.stall_rate else 0
     for i in range(2):
@@ -197,10 +201,14 @@ def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None
         possible = arm >= -2 * arm_deviation(memory, i)
         little = deviation * gates.moment * motion.speed**2 <= gates.friction_torque
         precise = precise and possible and (relative or little)
-    if precise and elapsed >= gates.least_drive:
+    if precise and elapsed >= _LEAST_DRIVE_TIME_S:
         (first, second), memory.saturated, memory.left = _goal(gates, memory.angle, memory.imbalance)
         set_pair(memory.goal, first, second)
-        begin_correction(memory)
+        # The first targets, for the estimated imbalance, are corrected by the mean vibration there.
+        memory.residual, memory.share, memory.steps = complex(math.inf, 0.0), 1.0, 0
+        memory.corrected, memory.aim = memory.imbalance, memory.imbalance
+        set_pair(memory.best_goal, first, second)
+        set_pair(memory.aimed, first, second)
         enter(memory, POSITIONING, time, NONE)
     elif elapsed >= gates.friction_time:
         stalled = memory.stalled > STALLED_SHARE * memory.driven
@@ -363,7 +371,7 @@ def _rest(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: flo
         load = max(load, abs(torque[i]) / most if most > 0 else math.inf)
     if _distance(memory) > 2 * gates.arrival_angle or load > _DRIVES_ON_LOAD:
         memory.hold = HELD
-    elif load < _DRIVES_OFF_LOAD and (_arrived(gates, memory, time) or _held(gates, memory, time)):
+    elif load < _DRIVES_OFF_LOAD and (_arrived(memory, time) or _held(gates, memory, time)):
         memory.hold = RELEASED
 
 
@@ -380,8 +388,8 @@ def _watch_arrival(gates: Gates, memory: Record, time: float, closeness: float) 
 
 
 @in_place
-def _arrived(gates: Gates, memory: Record, time: float) -> bool:
-    return bool(memory.arrived != NOT_YET and time - memory.arrived >= gates.dwell)
+def _arrived(memory: Record, time: float) -> bool:
+    return bool(memory.arrived != NOT_YET and time - memory.arrived >= _DWELL_TIME_S)
 
 
 @in_place
@@ -394,8 +402,8 @@ def _held(gates: Gates, memory: Record, time: float) -> bool:
 @in_place
 def _move_ended(gates: Gates, memory: Record, time: float) -> bool:
     """Return True if a move has ended, at its goal or short of it."""
-    late = time - memory.moving >= gates.move_time
-    return late or _arrived(gates, memory, time) or _held(gates, memory, time)
+    late = time - memory.moving >= _LONGEST_MOVE_S
+    return late or _arrived(memory, time) or _held(gates, memory, time)
 
 
 @in_place

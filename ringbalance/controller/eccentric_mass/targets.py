@@ -143,15 +143,6 @@ _SHOWN_MARGINS: Final = 2.0
 
 
 @in_place
-def begin_correction(memory: Record) -> None:
-    """Begin the correction with the first targets, for the estimated imbalance, without a mean vibration."""
-    memory.residual, memory.share, memory.steps = complex(math.inf, 0.0), 1.0, 0
-    memory.corrected, memory.aim = memory.imbalance, memory.imbalance
-    set_pair(memory.best_goal, memory.goal[0], memory.goal[1])
-    set_pair(memory.aimed, memory.goal[0], memory.goal[1])
-
-
-@in_place
 def judge_correction(memory: Record, residual: complex, margin: float, held: bool) -> bool:
     """Compare a mean vibration with that of the best goal so far, and keep the better goal.
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
-
-import numpy as np
 
 from ringbalance.controller.balancer import Outcomes, Settings
 from ringbalance.controller.judging.judge import Judgement
@@ -91,11 +88,6 @@ class Tried:
         """Add the outcomes of further devices."""
         return replace(self, judgement=self.judgement.extended(outcomes))
 
-    def time(self, share: float) -> float:
-        """Time by which a fraction of the devices has settled, s."""
-        times = np.sort(self.judgement.outcomes.settling_time)
-        return float(times[max(math.ceil(share * times.size * (1 - 1e-12)), 1) - 1])
-
     def replaces(self, scenes: Tried) -> bool:
         """True if this candidate replaces the best of the scene's kind of controller.
 
@@ -104,7 +96,7 @@ class Tried:
         """
         # Compared by fractions: a kind that serves no device has run on fewer.
         more, share = self.fraction - scenes.fraction, _SETTLED * scenes.fraction
-        faster = _AS_FAST * self.time(share) < scenes.time(share)
+        faster = _AS_FAST * self.judgement.time(share) < scenes.judgement.time(share)
         return more >= _MORE or (more >= 0 and faster and not scenes.candidate.trials.kind_stated)
 
 
@@ -116,14 +108,20 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
         return every[0] if every else None
     best = [each for each in every if each.count == most]
     share = _SETTLED * best[0].fraction
-    fastest = min(each.time(share) for each in best)
-    plateau = [each for each in every if each.count >= most - 1 and each.time(share) <= _AS_FAST**2 * fastest]
-
-    def amid(each: Tried) -> int:
-        return sum(each.candidate.is_beside(other.candidate) for other in plateau)
-
-    fast = [each for each in best if each.time(share) <= _AS_FAST * fastest]
-    return max(fast, key=lambda each: (amid(each), -each.time(share)))
+    fastest = min(each.judgement.time(share) for each in best)
+    plateau = [
+        each
+        for each in every
+        if each.count >= most - 1 and each.judgement.time(share) <= _AS_FAST**2 * fastest
+    ]
+    fast = [each for each in best if each.judgement.time(share) <= _AS_FAST * fastest]
+    return max(
+        fast,
+        key=lambda each: (
+            sum(each.candidate.is_beside(other.candidate) for other in plateau),
+            -each.judgement.time(share),
+        ),
+    )
 
 
 def is_worse(each: Tried, best: BoolArray) -> bool:

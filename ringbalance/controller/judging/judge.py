@@ -84,6 +84,11 @@ class Judgement:
             return None
         return float(times[math.ceil(fraction * times.size) - 1]), float(times[count - 1])
 
+    def time(self, fraction: float) -> float:
+        """Time by which a fraction of the devices has settled, s; infinite where fewer settle."""
+        times = np.sort(self.outcomes.settling_time)
+        return float(times[max(math.ceil(fraction * times.size * (1 - 1e-12)), 1) - 1])
+
     @property
     def settling_times(self) -> dict[str, float | None]:
         """Times within which 50 % ("p50") and 90 % ("p90") of all devices have settled, s."""
@@ -144,21 +149,6 @@ class Judgement:
             }
             for demand in self.demands
         ]
-
-
-def judged(
-    balancer: Balancer,
-    settings: Settings,
-    *,
-    most: int | None = None,
-    start: int = FIRST_VERDICT_DEVICE,
-    watch_time: float = WATCH_TIME_S,
-    progress: Callable[[str], None] | None = None,
-) -> Judgement:
-    """Judge one choice of settings; see `judged_all`."""
-    return judged_all(balancer, [settings], most=most, start=start, watch_time=watch_time, progress=progress)[
-        0
-    ]
 
 
 def best_of(

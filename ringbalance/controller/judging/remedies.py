@@ -17,7 +17,6 @@ from ringbalance.controller.judging.judge import (
     FIRST_CHOOSING_DEVICE,
     FIRST_VERDICT_DEVICE,
     Judgement,
-    judged,
     judged_all,
     plain_settings,
 )
@@ -216,7 +215,8 @@ def _judgement(changed: Balancer, settings: Settings, start: int) -> Judgement:
     (first,) = judged_all(changed, [settings], first=_FIRST_DEVICES, most=_FIRST_DEVICES, start=start)
     if first.verdict == MISSED and first.fraction.value < _GIVE_UP_SHARE * first.required_fraction:
         return first
-    return judged(changed, settings, most=min(_MAX_DEVICES, changed.verdict_draws[1]), start=start)
+    most = min(_MAX_DEVICES, changed.verdict_draws[1])
+    return judged_all(changed, [settings], most=most, start=start)[0]
 
 
 def _merged(remedies: Sequence[Remedy]) -> dict[str, Any]:

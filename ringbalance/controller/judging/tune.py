@@ -9,7 +9,7 @@ from typing import Final
 
 from ringbalance.controller.balancer import Balancer, Settings
 from ringbalance.controller.judging.candidates import Tried
-from ringbalance.controller.judging.judge import Judgement, best_of, judged, judged_all
+from ringbalance.controller.judging.judge import Judgement, best_of, judged_all
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import (
@@ -62,7 +62,7 @@ def tuned(
         levels, winners_there = (curve.levels, curve.searched) if curve else ((), ())
         chosen = best_of(balancer, [best.settings, *_worth_judging(winners_there)], progress=report)
         if chosen != best.settings:
-            best, winners = judged(balancer, chosen, progress=report), winners_there
+            (best,), winners = judged_all(balancer, [chosen], progress=report), winners_there
 
     # Where no device meets the demands, a longer watch time changes nothing.
     longer: Judgement | None = None

@@ -202,7 +202,7 @@ class LiquidRingBalancer(Balancer):
 
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes of the scene that may help, those of one kind with the smallest first."""
-        return remedies_of(self.scene, self.model)
+        return tuple(remedies_of(self.scene, self.model))
 
     def choices(self) -> tuple[Remedy, ...]:
         """Valves that can be bought, where the scene gives none."""

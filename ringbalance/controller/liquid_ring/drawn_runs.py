@@ -162,12 +162,9 @@ class DrawnRuns:
     @cached_property
     def _devices(self) -> Callable[[range], tuple[RingDevice, ...]]:
         """Devices of some numbers; the last ones are cached, as a search runs the same again and again."""
-
-        def made_together(block: range) -> tuple[RingDevice, ...]:
-            seed, rotors = self.scene.run.seed, self.rotors
-            return devices(self.scene, self.model, self.spread, block, seed=seed, rotors=rotors)
-
-        return lru_cache(_CACHED_GROUPS)(made_together)
+        seed, rotors = self.scene.run.seed, self.rotors
+        some = partial(devices, self.scene, self.model, self.spread, seed=seed, rotors=rotors)
+        return lru_cache(_CACHED_GROUPS)(some)
 
     @cached_property
     def _groups(self) -> Callable[[range, bool, float], _Group]:

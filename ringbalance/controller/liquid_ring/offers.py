@@ -154,16 +154,48 @@ _MEASURED: Mapping[str, str] = MappingProxyType(
 """Codes of the measurements that replace an error of a model."""
 
 
-def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
-    """Single changes of a scene, those of one kind with the smallest first."""
-    return (
-        *_of_crest(scene, model),
-        *_of_bore(scene, model),
-        *_of_valve(scene),
-        *_of_jet(scene),
-        Remedy(code="period", changes={"controller.period": scene.controller.period / 2}),
-        *_of_limit(scene),
-    )
+def remedies_of(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
+    """Yield single changes of a scene, those of one kind with the smallest first."""
+    disc, tube, gas, law = scene.disc, scene.tube, scene.gas, model.flow
+    # Higher crests where liquid runs back, or other ones where gas does not lift the liquid to the crest.
+    held, total = Holding.of(scene, fill_ratio=disc.max_fill_ratio), 2 * disc.initial_fill
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=applied_pressure(gas))
+    lifted = stalled <= residual_fill_ratio(scene, law=law)
+    if held.largest_hump_radius is not None and not (held.holds and lifted):
+        for factor in _CRESTS:
+            # Rounded down to a tenth of a millimetre, where a crest holds the liquid.
+            radius = math.floor(1e4 * factor * held.largest_hump_radius * (1 + 1e-12)) / 1e4
+            path = shortest_path(
+                port_radius=tube.port_radius,
+                hump_radius=radius,
+                separation=max(math.pi - disc.central_angle, 0.0),
+            )
+            changes = {"tube.hump_radius": radius}
+            if path > tube.length:
+                changes["tube.length"] = math.ceil(1e3 * path) / 1e3
+            yield Remedy(code="crest", changes=changes)
+    yield from (Remedy(code="bore", changes={"tube.bore": each * tube.bore}) for each in _NARROWER_BORES)
+    # Valve-open time in which the full tube would correct the initial vibration, s.
+    rate = loop_rate(scene, model)
+    open_time = scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
+    if open_time > _SLOW_FRACTION * (scene.requirement.settling_time or scene.run.time_limit):
+        for factor in _WIDER_BORES:
+            yield Remedy(code="wider_bore", changes={"tube.bore": factor * tube.bore})
+    for factor in _FASTER:
+        changes = {}
+        if gas.conductance is not None:
+            changes["gas.conductance"] = factor * gas.conductance
+        if gas.valve_lag:
+            changes["gas.valve_lag"] = gas.valve_lag / factor
+        if changes:
+            yield Remedy(code="faster_valve", changes=changes)
+    yield from _of_jet(scene)
+    yield Remedy(code="period", changes={"controller.period": scene.controller.period / 2})
+    # Higher limits would miss a residual that the scene requires.
+    if scene.requirement.residual is None and scene.requirement.grade is None:
+        for factor in _LIMITS:
+            changes = {"controller.limit": factor * scene.controller.limit}
+            yield Remedy(code="limit", changes=changes, continuous=True)
 
 
 def valves_of(scene: Scene) -> tuple[Remedy, ...]:
@@ -201,29 +233,6 @@ def drawn_input(name: str) -> DrawnInput:
     return DrawnInput(common=False, measure="", path=name)
 
 
-def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
-    for factor in _NARROWER_BORES:
-        yield Remedy(code="bore", changes={"tube.bore": factor * scene.tube.bore})
-    # Valve-open time in which the full tube would correct the initial vibration, s.
-    rate = loop_rate(scene, model)
-    open_time = scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
-    if open_time > _SLOW_FRACTION * (scene.requirement.settling_time or scene.run.time_limit):
-        for factor in _WIDER_BORES:
-            yield Remedy(code="wider_bore", changes={"tube.bore": factor * scene.tube.bore})
-
-
-def _of_valve(scene: Scene) -> Iterator[Remedy]:
-    gas = scene.gas
-    for factor in _FASTER:
-        changes = {}
-        if gas.conductance is not None:
-            changes["gas.conductance"] = factor * gas.conductance
-        if gas.valve_lag:
-            changes["gas.valve_lag"] = gas.valve_lag / factor
-        if changes:
-            yield Remedy(code="faster_valve", changes=changes)
-
-
 def _of_jet(scene: Scene) -> Iterator[Remedy]:
     """Milder gas jets, where the scene limits the crater: a larger or turned hole, a slower valve."""
     disc, gas = scene.disc, scene.gas
@@ -238,33 +247,3 @@ def _of_jet(scene: Scene) -> Iterator[Remedy]:
         for factor in _FASTER:
             changes = {"gas.conductance": gas.conductance / factor}
             yield Remedy(code="slower_valve", changes=changes, continuous=True)
-
-
-def _of_limit(scene: Scene) -> Iterator[Remedy]:
-    """Higher limits; none where the scene requires a residual, which they would miss."""
-    if scene.requirement.residual is None and scene.requirement.grade is None:
-        for factor in _LIMITS:
-            changes = {"controller.limit": factor * scene.controller.limit}
-            yield Remedy(code="limit", changes=changes, continuous=True)
-
-
-def _of_crest(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
-    """Higher crests where liquid runs back, or other ones where gas does not lift the liquid to the crest."""
-    disc, tube, law = scene.disc, scene.tube, model.flow
-    held, total = Holding.of(scene, fill_ratio=disc.max_fill_ratio), 2 * disc.initial_fill
-    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=applied_pressure(scene.gas))
-    lifted = stalled <= residual_fill_ratio(scene, law=law)
-    if held.largest_hump_radius is None or (held.holds and lifted):
-        return
-    for factor in _CRESTS:
-        # Rounded down to a tenth of a millimetre, where a crest holds the liquid.
-        radius = math.floor(1e4 * factor * held.largest_hump_radius * (1 + 1e-12)) / 1e4
-        path = shortest_path(
-            port_radius=tube.port_radius,
-            hump_radius=radius,
-            separation=max(math.pi - disc.central_angle, 0.0),
-        )
-        changes = {"tube.hump_radius": radius}
-        if path > tube.length:
-            changes["tube.length"] = math.ceil(1e3 * path) / 1e3
-        yield Remedy(code="crest", changes=changes)

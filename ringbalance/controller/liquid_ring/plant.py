@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -130,12 +129,10 @@ def _corner_directions(chambers: int) -> ComplexArray:
     return np.asarray(signs @ axes)
 
 
-def starting_pressure(
-    *, law: FlowLaw, fill: float, opposite_fill: float, primed: bool, above: float
-) -> float | None:
+def starting_pressure(*, law: FlowLaw, fill: float, opposite_fill: float, above: float) -> float | None:
     """Smallest gauge pressure at which liquid leaves a chamber, Pa, to 12 digits, searched from `above` on.
 
-    None when no pressure does.
+    The crest is empty.  None when no pressure does.
     """
 
     def flows(pressure: FloatArray) -> BoolArray:
@@ -144,28 +141,23 @@ def starting_pressure(
             fill_ratio=fill * ones,
             opposite_fill_ratio=opposite_fill * ones,
             gas_pressure=pressure,
-            primed=primed,
+            primed=False,
         )
         return flow.velocity > 0
 
     if flows(np.array([above]))[0]:
         return above
     for doubled in range(_MAX_DOUBLINGS):
-        low = above * 2.0**doubled
-        pressure = _least_pressure(flows, low, 2.0 * low)
-        if pressure is not None:
-            return pressure
+        low, high = above * 2.0**doubled, 2.0 * (above * 2.0**doubled)
+        for _ in range(_REFINEMENTS):
+            p = np.linspace(low, high, _PRESSURES)
+            dry = np.flatnonzero(~flows(p))
+            if dry.size == 0:
+                return low
+            if dry[-1] == p.size - 1:
+                # Nothing flows at the highest pressure.
+                break
+            low, high = float(p[dry[-1]]), float(p[dry[-1] + 1])
+        else:
+            return high
     return None
-
-
-def _least_pressure(flows: Callable[[FloatArray], BoolArray], low: float, high: float) -> float | None:
-    """Smallest pressure from `low` on above which liquid flows up to `high`; None: none flows at `high`."""
-    for _ in range(_REFINEMENTS):
-        p = np.linspace(low, high, _PRESSURES)
-        dry = np.flatnonzero(~flows(p))
-        if dry.size == 0:
-            return low
-        if dry[-1] == p.size - 1:
-            return None
-        low, high = float(p[dry[-1]]), float(p[dry[-1] + 1])
-    return high

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
-from ringbalance.controller.judging.judge import Judgement, judged, judged_all
+from ringbalance.controller.judging.judge import Judgement, judged_all
 from ringbalance.controller.judging.remedies import Remedied, tried_choices, tried_remedies
 from ringbalance.controller.liquid_ring.offers import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -82,7 +82,7 @@ def limit(factor: float) -> Remedy:
 
 def tried(paper_scene: Scene, *offered: Remedy) -> tuple[Remedied, ...]:
     machine: Any = Machine(paper_scene, offered)
-    own = judged(machine, {"gain": 1.0}, most=64)
+    (own,) = judged_all(machine, [{"gain": 1.0}], most=64)
     return tried_remedies(machine, own, search=lambda _: {"gain": 1.0})
 
 
@@ -188,7 +188,7 @@ def test_a_crest_too_low_is_moved_inwards(paper_scene: Scene) -> None:
 def test_the_bundled_complete_machine_meets_what_it_requires() -> None:
     """With its own valve and settings, on devices that these were not chosen on."""
     balancer = balancer_of(load_scene(bundled_scene("grinding_spindle")))
-    result = judged(balancer, {}, most=64)
+    (result,) = judged_all(balancer, [{}], most=64)
     assert result.verdict == "met"
     assert result.demands[0].stated
     assert balancer.choices() == ()

@@ -15,7 +15,7 @@ from ball_balancer.scene_keys import EXAMPLE, BallScene
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Draws, balancer_of
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.judging.search import search, searched
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
@@ -66,7 +66,7 @@ def test_a_tuned_scene_is_a_scene(paper: Tuning) -> None:
 
 
 def test_too_little_pressure_is_told_from_capacity() -> None:
-    outcomes = judged(balancer_of(bundled("liquid_ring_paper", gas__pressure="0.42 MPa")), {})
+    (outcomes,) = judged_all(balancer_of(bundled("liquid_ring_paper", gas__pressure="0.42 MPa")), [{}])
     assert outcomes.verdict == MISSED
     assert set(outcomes.outcomes.ended) == {"stalled"}
 
@@ -144,5 +144,5 @@ def test_six_chambers_work_with_settings_of_their_own_and_with_those_that_the_co
     assert scene.controller.kind == settings["controller.kind"] == "law_based"
     assert settings["controller.gas_time_offset"]
     assert scene.controller.offsets(6) == pytest.approx(6 * settings["controller.gas_time_offset"])
-    assert judged(balancer_of(scene), {}).verdict == MET
+    assert judged_all(balancer_of(scene), [{}])[0].verdict == MET
     assert math.isfinite(document["settling_time_s"]["p90"])

@@ -16,7 +16,7 @@ from importlib.resources import files
 from string import Formatter
 from typing import Any, Literal, TypeVar
 
-from ringbalance.results.numbers import MISSING, Width, believed, format_given, percent, plain, shown
+from ringbalance.results.numbers import MISSING, Width, believed, format_given, plain, short, shown, with_unit
 from ringbalance.results.requirements import Proportion
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -217,7 +217,7 @@ class _Filled:
         elif isinstance(value, Sequence):
             text = series(value)
         elif unit == "%":
-            text = percent(value, digits=int(digits or 4))
+            text = with_unit(short(100 * value, digits=int(digits or 4)), unit)
         else:
             exact = len(str(value)) if isinstance(value, int) else 0
             text = format_given(value, unit or "1", digits=max(int(digits or 4), exact))

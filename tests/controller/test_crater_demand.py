@@ -9,7 +9,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.liquid_ring.offers import remedies_of
 from ringbalance.reduced_model.crater import Crater
 from ringbalance.scene import SceneError
@@ -40,7 +40,7 @@ def test_every_device_is_judged_at_the_lowest_fill_of_its_injections(balancer: A
 
 
 def test_the_demand_counts_beside_the_settling_time(balancer: Any, spindle: Scene) -> None:
-    result = judged(balancer, {}, most=64)
+    (result,) = judged_all(balancer, [{}], most=64)
     settles, crater = result.demands
     assert (crater.code, crater.required, crater.sense) == ("crater", 0.8, "at most")
     outcomes = result.outcomes

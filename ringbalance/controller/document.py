@@ -387,5 +387,5 @@ def _convention_rows(run: Simulation) -> Iterator[tuple[str, str, float | None, 
         ("levelled_speed", "perhaps", held.sure_speed, level.sure_speed),
         ("likely_levelled_speed", "as runs assume", held.likely_speed, level.likely_speed),
     ):
-        name = f"opposite chambers level after a slow run-down, {how_sure}, to"
+        name = f"slow run-down levels opposite chambers, {how_sure} at"
         yield key, name, None if lasting is None else speed, "rad/s", "ok" if lasting is not None else status

@@ -48,7 +48,7 @@ test: style ## lint, types and every test but the heavy ones and the faults
 	wait $$types || { cat build/types.txt; exit 1; }; exit $$tests
 
 # Types of NumPy differ between versions, and the product uses them; those of the tests were seen by `make test`.
-test-numbers: TYPED := $(CODE)
+test-numbers: TYPED := ringbalance tools benchmarks
 test-numbers: TESTS := $(NUMBER_TESTS)
 test-numbers: test ## lint, types and the tests of what may differ between versions of Python, NumPy and SciPy
 

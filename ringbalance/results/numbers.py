@@ -207,7 +207,7 @@ _Scale = tuple[str, float] | tuple[str, float, float]
 SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
     "m": (("nm", 1e9), ("µm", 1e6, 1e-8), ("mm", 1e3, 1e-4)),
     "Pa": (("Pa", 1.0), ("kPa", 1e-3, 1e3), ("MPa", 1e-6, 1e5)),
-    "s": (("ms", 1e3), ("s", 1.0, 0.1)),
+    "s": (("ms", 1e3), ("s", 1.0, 0.1), ("h", 1 / 3600, 7200.0)),
     "kg": (("g", 1e3), ("kg", 1.0, 10.0)),
     "m^3": (("ml", 1e6), ("l", 1e3, 1e-3)),
     "m^2": (("mm²", 1e6),),

@@ -54,11 +54,13 @@ BY_NAME: Final = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Scenes: the paper's with a short time limit, and with a gas line."""
+    """Scenes: the paper's with a short time limit, with a gas line, and with a runout of the sensor."""
     answers = tmp_path_factory.mktemp("scenes")
     short = rb.load_scene(PAPER).with_values({"run.time_limit": "6 s"})
     line = {"gas.conductance": "2 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
-    for name, scene in (("short", short), ("line", short.with_values(line))):
+    read = {"sensor.runout": {"amplitude": "0.01 um"}}
+    scenes = {"short": short, "line": short.with_values(line), "read": short.with_values(read)}
+    for name, scene in scenes.items():
         (answers / f"{name}.toml").write_bytes(toml_bytes(document_of(scene)))
     return answers
 
@@ -145,9 +147,9 @@ def test_keys_of_calibrate(folder: Path, printed: Any) -> None:
 
 
 def test_keys_of_simulate(folder: Path, printed: Any) -> None:
-    answers = [printed("simulate", folder / f"{name}.toml") for name in ("short", "line")]
+    answers = [printed("simulate", folder / f"{name}.toml") for name in ("short", "line", "read")]
     compare("`simulate --json`", answers)
-    assert [len(each["gas_line_runs"]) for each in answers] == [2, 0]
+    assert [len(each["gas_line_runs"]) for each in answers] == [2, 0, 2]
 
 
 def test_keys_of_simulate_of_eccentric_masses(printed: Any) -> None:

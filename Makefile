@@ -26,7 +26,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-numbers test-faults test-heavy test-short test-units test-versions lint style format bench bench-cfd pages docs dist lock clean
+.PHONY: help env report test test-numbers test-faults test-heavy test-short test-units test-versions test-ends lint style format bench bench-cfd pages docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -64,6 +64,9 @@ test-short: env ## a short selection of the tests
 
 test-versions: env ## the tests under every further supported Python of this machine, each in .venv-3.X
 	$(PYTHON_IN_VENV) tools/other_pythons.py
+
+test-ends: env ## of these the oldest and the newest Python alone, as in .ci/run
+	$(PYTHON_IN_VENV) tools/other_pythons.py --ends
 
 test-heavy: env ## the tests that take long
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m heavy

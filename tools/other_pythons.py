@@ -1,13 +1,14 @@
 """Run tests under every further supported Python of this machine.
 
-    .venv/bin/python tools/other_pythons.py
+    .venv/bin/python tools/other_pythons.py [--ends]
 
 Supported are the versions that pyproject.toml's classifiers name.  Python is looked for as `python3.X` on
 the search path and among the versions of pyenv; one that does not start, or has no venv, does not count.
 The Python that runs this program is left out, since `make test` has used it.  The oldest and the newest of
 the others on this machine run `make test-numbers`, types included; those between, which have the packages of
-the newest (requirements/lock.txt), run `make test-short`.  Each has an environment, `.venv-3.X`.  Before a
-release, `make test pages VENV=.venv-3.13` runs everything under another Python.
+the newest (requirements/lock.txt), run `make test-short`; with --ends they are left out.  Each has an
+environment, `.venv-3.X`.  Before a release, `make test pages VENV=.venv-3.13` runs everything under another
+Python.
 """
 
 from __future__ import annotations
@@ -67,8 +68,9 @@ def main() -> int:
         print(f"Python {version}: {python or 'not on this machine, not tested'}", flush=True)
     present = [version for version in versions if version == running or others[version]]
     for version, python in others.items():
-        if python is not None:
-            target = "test-numbers" if version in (present[0], present[-1]) else "test-short"
+        ends = version in (present[0], present[-1])
+        if python is not None and (ends or "--ends" not in sys.argv[1:]):
+            target = "test-numbers" if ends else "test-short"
             command = ["make", target, f"VENV=.venv-{version}", f"PYTHON={python}"]
             code = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
             if code != 0:

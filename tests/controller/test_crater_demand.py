@@ -7,22 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-import ringbalance as rb
 from ringbalance.controller.balancer import Draws, balancer_of, quick_balancer
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.controller.liquid_ring.offers import remedies_of
 from ringbalance.reduced_model.crater import Crater
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene
+from scenes import bundled
 
 HOLE = {"disc.gas_hole_diameter": "3 mm", "disc.gas_hole_radius": "30 mm", "requirement.crater": 0.8}
 
 
 @pytest.fixture(scope="module")
 def spindle() -> Scene:
-    scene = rb.load_scene(rb.bundled_scene("grinding_spindle"))
-    assert isinstance(scene, Scene)
-    return scene
+    return bundled("grinding_spindle")
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +35,12 @@ def test_every_device_is_judged_at_the_lowest_fill_of_its_injections(balancer: A
         fill = min(injection.fill_before for injection in result.run.injections)
         assert traced.crater[place] == float(Crater.of(result.run.scene, fill).ratio)
     assert np.ptp(together.crater) > 0.1
+
+
+def test_a_leak_takes_nothing_from_the_supply_of_the_jet(spindle: Scene) -> None:
+    leaking = balancer_of(spindle.with_values({**HOLE, "gas.leak_to_ambient": "0.15 l/(s*bar)"}))
+    together, traced = (leaking.run({}, Draws.first(4), trace=each) for each in (False, True))
+    assert traced.crater == pytest.approx(together.crater, rel=1e-4)
 
 
 def test_the_demand_counts_beside_the_settling_time(balancer: Any, spindle: Scene) -> None:

@@ -279,6 +279,7 @@ class _Group:
         usable, beyond = corners_of(np.stack(moments, axis=1), disc.chambers)
         return _Under(
             group=self,
+            supply=pressures,
             changed={name: plants[name].copy() for name in _CHANGED},
             residual=residual,
             unreachable=unreachable_moment(usable, -as_read) * influence,
@@ -309,6 +310,8 @@ class _Under:
     """A group under gas pressures of its devices; arrays of shape (n,)."""
 
     group: _Group
+    supply: FloatArray
+    """Gas pressure of the supply, gauge, Pa."""
     changed: Mapping[str, FloatArray]
     residual: FloatArray
     """Fill of a driven chamber at which gas enters its port."""
@@ -356,7 +359,8 @@ class _Under:
         seeps = group.plants["leak_from_supply"] * group.plants["supply_pressure"]
         seeped = group.scenes[0].disc.chambers * seeps[rows] * runs["time"]
         numbers[2][:, carried] = (runs["gas"] + seeped) * self.work[rows]
-        numbers[5][:, carried] = self._crater(runs["least_driven"], rows)
+        if group.scenes[0].disc.gas_hole_diameter is not None:
+            numbers[5][:, carried] = self._crater(runs["least_driven"], rows)
         shown = (
             settled,
             self.beyond_disc[rows] > limit,
@@ -371,18 +375,16 @@ class _Under:
         return numbers, ends
 
     def _crater(self, fills: FloatArray, rows: IntArray) -> FloatArray:
-        """Part of the ring's depth that the gas jet digs, zero where no valve opened, NaN without a hole.
+        """Part of the ring's depth that the gas jet digs, zero where no valve opened.
 
         Args: `fills`: of the driven chambers, shape (settings, rows).
         """
-        largest = np.full((len(fills), len(self.group.devices)), math.inf)
-        largest[:, rows] = fills
-        ratios = [
-            largest_ratio(Designs.of(kind, {"gas.pressure": self.changed["gas_pressure"][each]}).scene, part)
-            for each, kind in self.group.kinds
-            for part in (largest[:, each],)
-        ]
-        return np.concatenate(ratios, axis=1)[:, rows]
+        ratios = np.full((len(fills), len(self.group.devices)), math.inf)
+        ratios[:, rows] = fills
+        for each, kind in self.group.kinds:
+            designs = Designs.of(kind, {"gas.pressure": self.supply[each]})
+            ratios[:, each] = largest_ratio(designs.scene, ratios[:, each])
+        return ratios[:, rows]
 
 
 def _group(number: int) -> range:

@@ -145,8 +145,7 @@ class GasLine:
         top = np.minimum(end, first + REACHED * (steady / self.supply_pressure - first))
         part, weight = np.polynomial.legendre.leggauss(_LEAKING_NODES)
         r = first + (top[..., None] - first) * (1 + part) / 2
-        shape = np.vectorize(flow_shape)
-        integrand = 1 / (shape(r, b) - leak * r * shape(first / r, b))
+        integrand = 1 / (flow_shapes(r, b) - leak * r * flow_shapes(first / r, b))
         inside = (top - first) / 2 * np.sum(weight * integrand, axis=-1)
         return np.asarray(self.time_constant(volume=volume) * inside)
 

@@ -8,22 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-import ringbalance as rb
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import OF_THE_JET
 from ringbalance.reduced_model.crater import Crater, crater_range, jet_text, largest_ratio
 from ringbalance.results.numbers import percent
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_model_errors
+from scenes import bundled
 
 HOLE = {"disc.gas_hole_diameter": "3 mm", "disc.gas_hole_radius": "30 mm"}
 
 
 @pytest.fixture(scope="module")
 def spindle() -> Scene:
-    scene = rb.load_scene(rb.bundled_scene("grinding_spindle"))
-    assert isinstance(scene, Scene)
-    return scene
+    return bundled("grinding_spindle")
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from matplotlib.ticker import AutoLocator, FuncFormatter, NullLocator
 from numpy.typing import ArrayLike
 
 from ringbalance.results.numbers import MINUS, display_unit, number, power_of_ten
+from ringbalance.scene.arrays import FloatArray
 
 INK: Final = "#010101"
 MUTED: Final = "#020202"
@@ -53,10 +54,19 @@ MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 """Twelve shades from low to high, for a field in colour."""
 
 
-def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
-    """Shades from one colour through another to a third; lines in the text's colour stand out on each."""
-    ramp = LinearSegmentedColormap.from_list("ramp", [low, middle, high])
+def _ramp(low: str, middle: str, high: str) -> LinearSegmentedColormap:
+    """Colours from one through another to a third; lines in the text's colour stand out on each."""
+    return LinearSegmentedColormap.from_list("ramp", [low, middle, high])
+
+
+def _shades(ramp: LinearSegmentedColormap) -> tuple[str, ...]:
     return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
+
+
+LIGHT_RAMP: Final = _ramp("#f1f5fa", "#a9c9ec", "#5597d6")
+"""Colours of a field on a light page without steps, for pictures that are embedded."""
+POINT_RAMP: Final = _ramp("#a9c9ec", "#5597d6", "#0b3a6e")
+"""Colours of points on a light page, which stand out from it."""
 
 
 _PALETTE: Final = {
@@ -74,8 +84,8 @@ _PALETTE: Final = {
         for step, (shade, light, dark) in enumerate(
             zip(
                 MAP,
-                _shades("#f1f5fa", "#a9c9ec", "#5597d6"),
-                _shades("#18202a", "#1d4a7c", "#3f83c9"),
+                _shades(LIGHT_RAMP),
+                _shades(_ramp("#18202a", "#1d4a7c", "#3f83c9")),
                 strict=True,
             )
         )
@@ -108,6 +118,7 @@ _RC: Final = {
     "axes.unicode_minus": True,
     "grid.color": GRID,
     "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.6,
     "figure.facecolor": "none",
     "savefig.facecolor": "none",
     "legend.frameon": False,
@@ -144,6 +155,27 @@ def line(index: int, *, size: float | None = None) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Frame:
+    """Linear axes of a finished figure: where values lie in its picture."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    """Box of the axes in the picture, pt from its upper left corner."""
+    x: tuple[float, float]
+    y: tuple[float, float]
+    """Values at the ends of the axes."""
+
+    def places(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
+        """Positions (n, 2) of points in the picture, pt; NaN where a value is."""
+        (left, right), (low, high) = self.x, self.y
+        across = self.left + self.width * (np.asarray(x, dtype=np.float64) - left) / (right - left)
+        down = self.top + self.height * (high - np.asarray(y, dtype=np.float64)) / (high - low)
+        return np.stack(np.broadcast_arrays(across, down), axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Drawing:
     """A finished figure."""
 
@@ -153,6 +185,8 @@ class Drawing:
     """Element for an HTML page that defines the colour variables."""
     wide: bool = False
     """True if it takes the page's whole width."""
+    frames: tuple[Frame, ...] = ()
+    """Axes with values, in the order in which they were made."""
 
     @property
     def size(self) -> tuple[float, float]:
@@ -186,6 +220,10 @@ def _as_file(body: str, width: float, height: float) -> str:
 WIDE_IN: Final = 7.5
 """Width of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
 NARROW_IN: Final = 3.6
+COLUMN_IN: Final = 85 / 25.4
+"""Width of a column of a journal, 85 mm."""
+_EMBEDDED_DPI: Final = 300
+"""Resolution of parts that are embedded as pictures: that of print."""
 _LEFT_IN, _RIGHT_IN, _BOTTOM_IN, _TOP_IN = 0.66, 0.14, 0.42, 0.1
 _LEGEND_ROW_IN, _TOP_AXIS_IN = 0.175, 0.42
 _PT_PER_IN, _SHEET_MARGIN_PT = 72, 18.0
@@ -308,11 +346,13 @@ def _to_page(text: str, name: str) -> str:
     # Screen readers read the frame around it on the page, by the figure's caption.
     body = body.replace("<svg ", '<svg aria-hidden="true" ', 1)
     # A tenth of a point is below what the eye sees; small parts, such as markers, keep another digit.
-    parts = re.split(r'( (?:d|x|y|transform)="[^"]*")', body)
+    # The matrix of an embedded picture is multiplied by its pixels.
+    parts = re.split(r'( (?:d|x|y|transform)="(?!matrix)[^"]*")', body)
     short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", "\0".join(parts[1::2])))
     parts[1::2] = re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short)).split("\0")
     body = "".join(parts)
-    return "\n".join(text.rstrip() for text in body.splitlines())
+    body = "\n".join(text.rstrip() for text in body.splitlines())
+    return re.sub(r"\bM ([\d.]+ [\d.]+)\nL \1\n", r"M\1h0", body)
 
 
 def draw(
@@ -324,16 +364,18 @@ def draw(
     ylim: tuple[float | None, float | None] | None = None,
     columns: int = 2,
     wide: bool = False,
+    width: float | None = None,
     height: float = 2.7,
 ) -> Drawing:
     """Draw one figure: its paints in their order, its axes in suitable units, and above it the
     legend of what is labelled.
 
-    Args: `name`: stem of the file. `columns`: of the legend; 0: no legend. `height`: inches of 72 units.
+    Args: `name`: stem of the file. `columns`: of the legend; 0: no legend. `width`: inches of 72 units, by
+    default the page's whole width or half of it, see `wide`. `height`: inches.
     """
     settings: Any = dict(_RC)
     with matplotlib.rc_context(settings):
-        width = WIDE_IN if wide else NARROW_IN
+        width = width or (WIDE_IN if wide else NARROW_IN)
         figure = Figure(figsize=(width, height))
         # Margins in inches, equal in all figures, so that neighbours align.
         sizes = 1 - (_LEFT_IN + _RIGHT_IN) / width, 1 - (_BOTTOM_IN + _TOP_IN) / height
@@ -348,8 +390,21 @@ def draw(
         if columns:
             _legend_above(axes, columns=columns)
         buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return Drawing(name=name, svg=_to_page(buffer.getvalue(), name), wide=wide)
+        figure.savefig(buffer, format="svg", dpi=_EMBEDDED_DPI, metadata={"Date": None, "Creator": None})
+        frames = tuple(_frame(each) for each in figure.axes if each.axison and each.get_xscale() == "linear")
+    return Drawing(name=name, svg=_to_page(buffer.getvalue(), name), wide=wide, frames=frames)
+
+
+def _frame(axes: Axes) -> Frame:
+    box, (width, height) = axes.get_position(), figure_of(axes).get_size_inches() * _PT_PER_IN
+    return Frame(
+        left=float(box.x0 * width),
+        top=float((1 - box.y1) * height),
+        width=float(box.width * width),
+        height=float(box.height * height),
+        x=axes.get_xlim(),
+        y=axes.get_ylim(),
+    )
 
 
 def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], label: AxisLabel) -> None:

@@ -1,36 +1,83 @@
-"""Figures of a sweep: a map over two keys, or curves over one, with feasible points, boundary and best."""
+"""Figures of a sweep: a map over two keys, or curves over one, with what is not feasible and the best."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_hex
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.transforms import Bbox
 
 from ringbalance.design.axes import unit_of_path
+from ringbalance.design.static import BLOCKED, REFUSED
 from ringbalance.design.sweep import Sweep
-from ringbalance.reports.figure import FIFTH, FOUND, INK, MAP, MUTED, AxisLabel, Drawing, draw
-from ringbalance.results.numbers import format_given
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.reports.figure import (
+    COLUMN_IN,
+    FOUND,
+    INK,
+    LIGHT_RAMP,
+    MUTED,
+    POINT_RAMP,
+    SURFACE,
+    AxisLabel,
+    Drawing,
+    draw,
+    figure_of,
+    plain_number,
+)
+from ringbalance.reports.prose import input_name, typeset
+from ringbalance.results.numbers import display_unit
+from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
+from ringbalance.scene.describe import usual_name
 from ringbalance.scene.platform.files import write_whole
 
-_COLUMNS: Final = ("fraction", "settling_time", "reach", "velocity", "loop_factor")
-"""Columns of a sweep that are drawn if they have numbers."""
+COLUMNS: Final = MappingProxyType(
+    {
+        "fraction": "fraction of devices that meet the requirements",
+        "settling_time": "time to settle",
+        "reach": "usable moment in any direction",
+        "velocity": "flow velocity",
+        "loop_factor": "loop factor",
+    }
+)
+"""Columns of a sweep that are drawn if they have numbers, with their names in words."""
+_REASONS: Final = MappingProxyType({BLOCKED: "no flow", REFUSED: "refused scene"})
+"""Reasons why a point has no value, by its status."""
+_TOO_FEW: Final = "too few devices settle"
 _MAX_NOTE_CHARACTERS: Final = 50
-_OUTSIDE: Final = {"marker": "x", "linewidths": 1.0}
-_POINT_SHADES: Final = MAP[3:]
-"""Shades of points, which stand out from the page."""
-_BEST: Final = {"marker": "*", "facecolors": "none", "edgecolors": INK}
-_Shades = list[tuple[str, BoolArray]]
-"""Colours, each with a mask of its points."""
+_MAX_BAR_LABEL_CHARACTERS: Final = 26
+_CONTOURS: Final = 6
+"""Largest number of steps between contour lines."""
+_RASTER_PIXELS: Final = 600
+"""Least number of pixels along each side of a map: where a viewer smooths pictures, cells stay sharp."""
+_POINT_SHADES: Final = 24
+"""Number of shades of the points of a sample."""
+_POINT_PT: Final = 4.0
+_DENSE_POINTS: Final = 600
+"""Number of points beyond which they are drawn in half the size."""
+_BAR_IN, _BAR_GAP_IN, _BAR_SPACE_IN = 0.12, 0.1, 0.8
+_BEST: Final[dict[str, Any]] = {
+    "marker": "*",
+    "s": 90,
+    "zorder": 5,
+    "facecolors": SURFACE,
+    "edgecolors": INK,
+}
+_HATCHED: Final[dict[str, Any]] = {"facecolor": "none", "edgecolor": MUTED, "linewidth": 0.0}
 
 
 @dataclass(frozen=True, kw_only=True)
-class _View:
+class View:
     """Part of a sweep that its figures show."""
 
     sweep: Sweep
@@ -41,30 +88,39 @@ class _View:
     note: str
     """Values of the other axes; empty: all points are shown."""
 
+    def keys(self) -> list[FloatArray]:
+        """Values of the keys at the points shown, SI."""
+        points = self.sweep.points
+        return [np.array([p[path] for p in points], dtype=np.float64)[self.shown] for path in self.paths]
+
 
 def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
-    """Write `sweep_drawings` into a folder. Returns: The files. Raises: OSError: they cannot be written."""
-    drawings = sweep_drawings(sweep)
+    """Write the figures of a sweep, each for the page's width and for a column of 85 mm.
+
+    Returns: The files. Raises: OSError: they cannot be written.
+    """
+    drawings = [*sweep_drawings(sweep), *sweep_drawings(sweep, width=COLUMN_IN)]
     return tuple(write_whole(folder / f"{each.name}.svg", each.standalone()) for each in drawings)
 
 
-def sweep_drawings(sweep: Sweep) -> list[Drawing]:
+def sweep_drawings(sweep: Sweep, *, width: float | None = None) -> list[Drawing]:
     """A figure of each quantity over the keys that vary; none where a key takes texts.
 
     A grid of more than two axes is drawn over the two with most values, with the others as in the best row.
+    Args: `width`: inches; None: the page's width.
     """
     fields = {name: (unit, values) for name, unit, values in sweep.fields()}
-    view = _view(sweep)
+    view = view_of(sweep)
     if view is None:
         return []
     return [
-        _drawing(view, name, *fields[name])
-        for name in _COLUMNS
+        _drawing(view, name, *fields[name], width)
+        for name in COLUMNS
         if name in fields and any(value is not None for value in np.array(fields[name][1])[view.shown])
     ]
 
 
-def _view(sweep: Sweep) -> _View | None:
+def view_of(sweep: Sweep) -> View | None:
     """Axes and points to draw; None where no axis has numbers."""
     numbers = [
         axis
@@ -76,7 +132,7 @@ def _view(sweep: Sweep) -> _View | None:
         return None
     if sweep.plan.sample:
         paths = tuple(axis.head for axis in numbers[:2])
-        return _View(sweep=sweep, paths=paths, shown=shown, note="")
+        return View(sweep=sweep, paths=paths, shown=shown, note="")
     most = sorted(numbers, key=lambda axis: -len(axis.grid()))[:2]
     axes = [axis for axis in sweep.plan.axes if axis in most]
     row = sweep.best_or_nearest or 0
@@ -86,75 +142,171 @@ def _view(sweep: Sweep) -> _View | None:
         shown &= [[point.get(path) for path in axis.paths] == values for point in sweep.points]
     held = ", ".join(sweep.axis_text(axis, row) for axis in others)
     note = f"{held if len(held) <= _MAX_NOTE_CHARACTERS else 'other keys'} as in row {row}" if others else ""
-    return _View(sweep=sweep, paths=tuple(axis.head for axis in axes), shown=shown, note=note)
+    return View(sweep=sweep, paths=tuple(axis.head for axis in axes), shown=shown, note=note)
 
 
-def _drawing(view: _View, name: str, unit: str, values: list[Any]) -> Drawing:
-    sweep, paths = view.sweep, view.paths
-    keys = [np.array([point[path] for point in sweep.points], dtype=np.float64)[view.shown] for path in paths]
+def axis_name(path: str) -> str:
+    """Name of a key on an axis, such as "bore d", with its owner where it has no symbol."""
+    name = usual_name(path)
+    return input_name(path) if name == path or " " not in name else typeset(name)
+
+
+def _drawing(view: View, name: str, unit: str, values: list[Any], width: float | None) -> Drawing:
+    sweep, keys = view.sweep, view.keys()
     shown = np.array([np.nan if value is None else value for value in values], dtype=np.float64)[view.shown]
-    axes: list[AxisLabel] = [(path, unit_of_path(sweep.scene, path)) for path in paths]
-    title = name.replace("_", " ")
+    axes: list[AxisLabel] = [(axis_name(path), unit_of_path(sweep.scene, path)) for path in view.paths]
     feasible = np.array(sweep.feasible)[view.shown]
     best = np.flatnonzero(view.shown) == sweep.best_or_nearest
     over = [*keys, shown][:2]
-
-    def points(panel: Axes, mask: BoolArray, **look: Any) -> None:
-        if mask.any():
-            panel.scatter(*(each[mask] for each in over), zorder=3, **look)
+    statuses = {
+        row["status"]
+        for row, finite in zip(np.array(sweep.static)[view.shown], np.isfinite(shown), strict=True)
+        if not finite
+    }
+    reasons = ", ".join(sorted({_REASONS.get(status, _TOO_FEW) for status in statuses}))
+    unmet = "not met or undecided" if sweep.runs else "no flow"
 
     def paint(panel: Axes) -> None:
-        inside, outside = [(FOUND, feasible)], [(FIFTH, ~feasible)]
+        if view.note:
+            panel.plot([], [], linestyle="", label=view.note)
         if len(keys) == 1:
             order = np.argsort(over[0], kind="stable")
             panel.plot(over[0][order], over[1][order], color=MUTED, linewidth=1)
-            _noted(panel, view.note)
+            _points(panel, over, np.full(shown.size, FOUND), feasible, unmet)
         else:
-            inside, outside = _coloured(panel, view, keys, shown, feasible, title, unit)
-        for index, (shade, mask) in enumerate(inside):
-            points(panel, mask, s=14, color=shade, label="" if index else "feasible")
-        for index, (shade, mask) in enumerate(outside):
-            points(panel, mask, s=14, color=shade, label="" if index else "not feasible", **_OUTSIDE)
-        points(panel, best, s=90, label="nearest" if sweep.best is None else "best", **_BEST)
+            _coloured(panel, view, keys, shown, feasible, (COLUMNS[name], unit), (unmet, reasons))
+        if best.any():
+            label = "nearest" if sweep.best is None else "best"
+            panel.scatter(*(each[best] for each in over), label=label, **_BEST)
 
-    y = axes[1] if len(axes) > 1 else (title, unit)
-    return draw(f"sweep-{name.replace('_', '-')}", paint, x=axes[0], y=y, columns=3, wide=True, height=3.6)
+    y = axes[1] if len(axes) > 1 else (COLUMNS[name], unit)
+    stem, page = f"sweep-{name.replace('_', '-')}", width is None
+    size: dict[str, Any] = {"height": 3.6 if page else 2.9, "columns": 4 if page else 2, "wide": page}
+    return draw(stem if page else f"{stem}-85mm", paint, x=axes[0], y=y, width=width, **size)
 
 
-def _noted(panel: Axes, *parts: str) -> None:
-    """Write a line of text above the frame, to the right of the legend."""
-    panel.text(1, 1.02, "; ".join(filter(None, parts)), ha="right", transform=panel.transAxes)
+def _points(
+    panel: Axes, over: list[FloatArray], colours: StringArray, feasible: BoolArray, unmet: str
+) -> None:
+    """Points as dots where feasible, as rings elsewhere.
+
+    A line without length and with round ends is a dot, in a quarter of the bytes of a marker.
+    """
+    positions = np.stack(over[:2], axis=1)
+    diameter = _POINT_PT / (2 if len(positions) > _DENSE_POINTS else 1)
+
+    def dots(mask: BoolArray, colour: str, size: float) -> None:
+        codes = np.resize([Outline.MOVETO, Outline.LINETO], 2 * np.count_nonzero(mask))
+        shape = Outline(np.repeat(positions[mask], 2, axis=0), codes)
+        # Lines without length would be left out.
+        shape.should_simplify = False
+        look: dict[str, Any] = {"linewidth": size, "capstyle": "round", "fill": False, "zorder": 3}
+        panel.add_patch(PathPatch(shape, edgecolor=colour, **look))
+
+    for mask, hollow, label in ((feasible, False, "feasible"), (~feasible, True, f"not feasible: {unmet}")):
+        for colour in sorted({*colours[mask].tolist()}):
+            dots(mask & (colours == colour), colour, diameter)
+        if mask.any():
+            if hollow:
+                dots(mask, SURFACE, diameter / 2)
+            look: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": _POINT_PT, "color": INK}
+            panel.plot([], [], markerfacecolor=SURFACE if hollow else INK, label=label, **look)
+    panel.autoscale_view()
 
 
 def _coloured(
-    panel: Axes, view: _View, keys: list[Any], shown: Any, feasible: Any, title: str, unit: str
-) -> tuple[_Shades, _Shades]:
-    """Shades over a grid of two keys, with the boundary of what is feasible; else those of points.
+    panel: Axes,
+    view: View,
+    keys: list[FloatArray],
+    shown: FloatArray,
+    feasible: BoolArray,
+    quantity: AxisLabel,
+    words: tuple[str, str],
+) -> None:
+    """A grid of two keys as coloured cells with contour lines, or a sample as coloured points, with the bar.
 
-    Returns: Colours of the feasible points and of the others that are still to be drawn.
+    Args: `words`: why points are not feasible, and why they have no value.
     """
-    finite = shown[np.isfinite(shown)]
+    finite, (unmet, reasons) = shown[np.isfinite(shown)], words
     low, high = float(finite.min()), float(finite.max())
-    ends = (
-        f"{title}: {format_given(low, unit, digits=3)} (light) to {format_given(high, unit, digits=3)} (dark)"
+    norm = Normalize(low, high if high > low else low + (abs(low) or 1.0))
+    display = display_unit(quantity[1], low, high)
+    ticks = MaxNLocator(_CONTOURS, steps=[1, 2, 5, 10]).tick_values(
+        low * display.factor, high * display.factor
     )
-    _noted(panel, view.note, ends)
+    levels = [tick / display.factor for tick in ticks if low < tick / display.factor < high]
+    panel.grid(visible=False)
     sizes = [len(np.unique(each)) for each in keys]
-    if view.sweep.plan.sample or min(sizes) < 2 or math.prod(sizes) != shown.size:
-        without = (FIFTH, ~feasible & ~np.isfinite(shown))
-        return _shades(shown, low, high, feasible), [*_shades(shown, low, high, ~feasible), without]
+    sample = view.sweep.plan.sample or min(sizes) < 2 or math.prod(sizes) != shown.size
+    _bar(panel, ScalarMappable(norm, POINT_RAMP if sample else LIGHT_RAMP), levels, quantity)
+    if sample:
+        steps = np.round(_POINT_SHADES * norm(np.where(np.isfinite(shown), shown, low))) / _POINT_SHADES
+        colours = np.array([to_hex(POINT_RAMP(step)) for step in steps])
+        colours[~np.isfinite(shown)] = MUTED
+        _points(panel, keys, colours, feasible, unmet)
+        return
     x, y, z, inside = (np.reshape(each, sizes) for each in (*keys, shown, feasible))
-    colours = ListedColormap(list(MAP))
-    panel.pcolormesh(x, y, z, shading="nearest", edgecolors="none", cmap=colours, vmin=low, vmax=high)
-    if inside.any() and not inside.all():
-        panel.contour(x, y, inside.astype(float), levels=[0.5], colors=INK, linewidths=1.2)
-    return [], [(FIFTH, ~feasible)]
+    # The first axis that varies is that of the rows.
+    order = np.argsort(x[:, 0]), np.argsort(y[0])
+    across, down, z, inside = x[order[0], 0], y[0, order[1]], z[np.ix_(*order)].T, inside[np.ix_(*order)].T
+    edges = [_edges(across), _edges(down)]
+    columns, rows = (
+        np.searchsorted(each, np.linspace(each[0], each[-1], 2 * count + 1)[1::2]) - 1
+        for each, count in ((each, (len(each) - 1) * -(-_RASTER_PIXELS // (len(each) - 1))) for each in edges)
+    )
+    picture = LIGHT_RAMP(norm(np.where(np.isfinite(z), z, low)), bytes=True)
+    picture[~np.isfinite(z)] = (255, 255, 255, 0)
+    extent = (edges[0][0], edges[0][-1], edges[1][0], edges[1][-1])
+    panel.imshow(
+        picture[np.ix_(rows, columns)], extent=extent, origin="lower", aspect="auto", interpolation="none"
+    )
+    empty = ~np.isfinite(z)
+    for mask, hatch, label in (
+        (empty, "xxxx", f"no value: {reasons}"),
+        (~inside & ~empty, "//", f"not feasible: {unmet}"),
+    ):
+        if mask.any():
+            panel.add_patch(PathPatch(_outline(mask, *edges), label=label, hatch=hatch, **_HATCHED))
+    if min(sizes) > 2 and levels:
+        lines = panel.contour(
+            across, down, np.ma.masked_invalid(z), levels=levels, colors=INK, linewidths=0.7
+        )
+        panel.clabel(lines, fmt=lambda level: plain_number(level * display.factor), fontsize="small")
+    panel.set(xlim=extent[:2], ylim=extent[2:])
 
 
-def _shades(shown: FloatArray, low: float, high: float, among: BoolArray) -> _Shades:
-    """Shades of points, the darkest first, each with a mask of its points."""
-    share = np.nan_to_num((shown - low) / ((high - low) or 1.0))
-    index = np.minimum(share * len(_POINT_SHADES), len(_POINT_SHADES) - 1).astype(int)
-    finite = among & np.isfinite(shown)
-    masks = [(shade, finite & (index == number)) for number, shade in enumerate(_POINT_SHADES)]
-    return [(shade, mask) for shade, mask in reversed(masks) if mask.any()]
+def _bar(panel: Axes, colours: ScalarMappable, levels: list[float], quantity: AxisLabel) -> None:
+    """Colour bar at the right of a map, which keeps its height, with the unit once."""
+    figure, box = figure_of(panel), panel.get_position()
+    space, gap, width = (each / figure.get_figwidth() for each in (_BAR_SPACE_IN, _BAR_GAP_IN, _BAR_IN))
+    panel.set_position((box.x0, box.y0, box.width - space, box.height))
+    bar = figure.add_axes((0, 0, 1, 1))
+
+    def bar_box(*_: object) -> Bbox:
+        map_box = panel.get_position()
+        return Bbox.from_bounds(map_box.x1 + gap, map_box.y0, width, map_box.height)
+
+    bar.set_axes_locator(bar_box)
+    name, display = quantity[0], display_unit(quantity[1], *colours.get_clim())
+    figure.colorbar(colours, cax=bar, ticks=levels)
+    bar.yaxis.set_major_formatter(FuncFormatter(lambda level, _: plain_number(level * display.factor)))
+    text = f"{name} in {display.symbol}" if display.symbol not in ("", "1") else name
+    bar.set_ylabel(fill(text, _MAX_BAR_LABEL_CHARACTERS))
+
+
+def _edges(centres: FloatArray) -> FloatArray:
+    """Ends of cells half-way between their centres, the outermost as far out as in."""
+    half = np.diff(centres) / 2
+    return np.concatenate([[centres[0] - half[0]], centres[:-1] + half, [centres[-1] + half[-1]]])
+
+
+def _outline(mask: BoolArray, across: FloatArray, down: FloatArray) -> Outline:
+    """Area of the cells of a mask, each run of cells in a row as one rectangle."""
+    parts = []
+    for row, cells in enumerate(mask):
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], cells.astype(int), [0]])))
+        for start, stop in ends.reshape(-1, 2):
+            (left, right), (low, high) = across[[start, stop]], down[row : row + 2]
+            corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
+            parts.append(Outline(corners, closed=True))
+    return Outline.make_compound_path(*parts)

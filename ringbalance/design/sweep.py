@@ -90,7 +90,7 @@ class Sweep(Result):
         ['13', '14.9']
         >>> table.to_csv().splitlines()[0][:29]
         'row,tube.bore [m],lambda [m],'
-        >>> [file.name for file in table.plot("figures")]
+        >>> [file.name for file in table.plot("figures")][:3]
         ['sweep-reach.svg', 'sweep-velocity.svg', 'sweep-loop-factor.svg']
     """
 
@@ -280,9 +280,9 @@ class Sweep(Result):
         }
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Draw the map or curves of the sweep: feasible points, their boundary, the best.
+        """Draw the map or curves of the sweep: values, what is not feasible, the best.
 
-        Args: `path`: folder for one SVG file per figure; None: no files.
+        Args: `path`: folder for two SVG files per figure, 190 mm and 85 mm wide; None: no files.
         Returns: Files, or without a folder figures that a notebook shows; `svg()` gives them as text.
         Raises: OSError: a file cannot be written.
         """

@@ -2,43 +2,125 @@
 
 from __future__ import annotations
 
-import math
+import base64
+import io
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba_array
+from PIL import Image
+
 import ringbalance as rb
-from ringbalance.results.numbers import format_given
+from ringbalance.design.sweep import Sweep
+from ringbalance.reports.figure import LIGHT_RAMP
+from ringbalance.reports.sweep_figures import sweep_drawings
 from ringbalance.scene.models import Scene
 
+VARY = {"tube.bore": [1e-3, 1.2e-3, 2e-3], "gas.pressure": "0.2MPa:0.8MPa:4"}
+STEMS = ["sweep-reach", "sweep-velocity", "sweep-loop-factor"]
+MOST_BYTES = 80_000
+"""Of a map of 2,000 points: ten fit a page of 1 MB; one number of four digits a point takes 10 kB."""
 
-def test_a_map_is_drawn_with_its_boundary(paper_scene: Scene, tmp_path: Path) -> None:
+
+@pytest.fixture(scope="module")
+def sweep(paper_scene: Scene) -> Sweep:
+    return rb.sweep(paper_scene, VARY, intervals=False)
+
+
+def embedded(svg: str) -> list[Image.Image]:
+    """Pictures in an SVG text, the map before its colour bar."""
+    packed = re.findall(r'href="data:image/png;base64,([^"]+)"', svg)
+    return [Image.open(io.BytesIO(base64.b64decode(each))) for each in packed]
+
+
+def texts(svg: str) -> list[str]:
+    return re.findall(r"<text[^>]*>([^<]*)</text>", svg)
+
+
+def test_a_map_is_drawn_for_the_page_and_for_a_column(sweep: Sweep, tmp_path: Path) -> None:
+    files = sweep.plot(tmp_path)
+    assert [path.stem for path in files] == [*STEMS, *(f"{stem}-85mm" for stem in STEMS)]
+    assert "not feasible: no flow" in texts(files[0].read_text())
+    for file, inches in zip(files, [7.5] * 3 + [85 / 25.4] * 3, strict=True):
+        width = re.search(r'<svg [^>]*width="([\d.]+)pt"', file.read_text())
+        assert width is not None
+        # The viewBox is written with six digits.
+        assert float(width[1]) == pytest.approx(72 * inches, abs=1e-3)
+        sizes = re.findall(r"font(?:-size)?: (?:\w+ )?([\d.]+)px", file.read_text())
+        assert min(map(float, sizes)) >= 7, "smaller letters are hard to read in print"
+
+
+def test_each_cell_has_the_colour_of_its_value_and_the_bar_one_unit(sweep: Sweep) -> None:
+    svg = sweep_drawings(sweep)[0].standalone()
+    values = np.array(sweep.columns()["reach [kg m]"]).reshape(3, 4)
+    low, high = values.min(), values.max()
+    picture = np.asarray(embedded(svg)[0].convert("RGB"), dtype=float)
+    # Cells lie half-way between 1, 1.2 and 2 mm: they end at 0.9, 1.1, 1.6 and 2.4 mm.
+    for column, bore in enumerate((1.0, 1.2, 2.0)):
+        for row in range(4):
+            pixel = int(len(picture) * (row + 0.5) / 4), int(picture.shape[1] * (bore - 0.9) / 1.5)
+            expected = 255 * to_rgba_array(LIGHT_RAMP((values[column, row] - low) / (high - low)))[0, :3]
+            # Half a step of 256 colours and of a byte each.
+            assert np.abs(picture[pixel] - expected).max() <= 2, (bore, row)
+    assert [text for text in texts(svg) if text.endswith(" in g\u202fmm")]
+    assert not re.search(r"light|dark|kg m", " ".join(texts(svg)))
+
+
+def test_contour_lines_name_levels_of_the_bar(paper_scene: Scene) -> None:
+    """Velocity grows with the pressure: lines lie at the round numbers of the bar, in its unit."""
     sweep = rb.sweep(
-        paper_scene, {"tube.bore": "1mm:2mm:3", "gas.pressure": "0.2MPa:0.8MPa:4"}, intervals=False
+        paper_scene, {"tube.bore": "1mm:2mm:9", "gas.pressure": "0.5MPa:0.8MPa:9"}, intervals=False
     )
-    names = [path.name for path in sweep.plot(tmp_path)]
-    assert names == ["sweep-reach.svg", "sweep-velocity.svg", "sweep-loop-factor.svg"]
-    assert sweep.best is not None
-    assert math.isfinite(sweep.static[sweep.best]["values"]["reach"][0])
-    assert "not feasible" in (tmp_path / names[0]).read_text()
+    velocities = sweep.columns()["velocity [m/s]"]
+    svg = sweep_drawings(sweep)[1].svg
+    bar = svg[svg.index('id="sweep-velocity-axes_2"') :]
+    levels = [text for text in texts(bar) if re.fullmatch(r"[\d.]+", text)]
+    lines = [text for text in texts(svg[: -len(bar)]) if text in levels]
+    assert len({*lines}) >= 3
+    assert all(min(velocities) < float(text) < max(velocities) for text in levels)
+
+
+def test_a_map_of_many_points_stays_small(paper_scene: Scene) -> None:
+    grid = {"tube.bore": "0.5mm:2mm:50", "gas.pressure": "0.2MPa:0.8MPa:40"}
+    ranges = {path: text.rpartition(":")[0] for path, text in grid.items()}
+    for vary, sample in ((grid, ""), (ranges, "sobol:2048")):
+        table = rb.sweep(paper_scene, vary, sample=sample, intervals=False)
+        for drawing in sweep_drawings(table):
+            assert len(drawing.standalone()) <= MOST_BYTES, (drawing.name, sample)
+
+
+def test_a_cell_without_value_is_hatched_and_explained(sweep: Sweep) -> None:
+    """A scene that is refused is distinguished from one without flow."""
+    rows = list(sweep.static)
+    rows[5] = {**rows[5], "values": {}, "status": "point_refused"}
+    svg = sweep_drawings(replace(sweep, static=tuple(rows)))[0].standalone()
+    assert "no value: refused scene" in texts(svg)
+    alpha = np.asarray(embedded(svg)[0].convert("RGBA"))[..., 3]
+    # One cell of twelve, the second bore at the second pressure, is empty.
+    assert {*alpha.ravel().tolist()} == {0, 255}
+    assert alpha[int(len(alpha) * 1.5 / 4), int(alpha.shape[1] * 0.3 / 1.5)] == 0
+    assert "no value" not in sweep_drawings(sweep)[0].svg
 
 
 def test_figures_of_a_sweep_are_shown_without_a_folder(paper_scene: Scene) -> None:
     sweep = rb.sweep(paper_scene, {"tube.bore": [1e-3, 1.5e-3, 2e-3]}, intervals=False)
-    assert sweep.plot().svg().count("tube.bore in mm") == 3
+    assert sweep.plot().svg().count("bore d in mm") == 3
 
 
 def test_a_map_of_more_axes_shows_those_with_most_values(
     paper_scene: Scene, valves: Path, tmp_path: Path
 ) -> None:
-    """The others are held as in the best row; the boundary between shades is that of a two-axis sweep."""
+    """The others are held as in the best row; colours and lines are those of a two-axis sweep."""
     vary = {"gas": valves, "tube.bore": "1mm:2mm:3", "gas.pressure": "0.2MPa:0.8MPa:4"}
     sweep = rb.sweep(paper_scene, vary, intervals=False)
     reach = sweep.plot(tmp_path)[0].read_text()
-    assert "gas.name = slow as in row" in reach
-    values = [value for value in sweep.columns()["reach [kg m]"][:12] if value is not None]
-    assert f"{format_given(max(values), 'kg m', digits=3)} (dark)" in reach
+    assert any(text.startswith("gas.name = slow as in row") for text in texts(reach))
     alone = rb.sweep(paper_scene, dict(list(vary.items())[1:]), intervals=False)
-    assert reach.count("<use") == alone.plot(tmp_path / "alone")[0].read_text().count("<use")
+    (alone_map, _), (full_map, _) = embedded(sweep_drawings(alone)[0].standalone()), embedded(reach)
+    assert alone_map.tobytes() == full_map.tobytes()
 
 
 def test_points_that_do_not_meet_show_their_values_too_and_the_nearest_is_marked(
@@ -50,5 +132,5 @@ def test_points_that_do_not_meet_show_their_values_too_and_the_nearest_is_marked
     assert sweep.best is None
     reach = next(path for path in sweep.plot(tmp_path) if path.name == "sweep-reach.svg").read_text()
     assert "nearest" in reach
-    colours = re.findall(r'<use [^>]*style="fill: (#[0-9a-f]{6}); stroke', reach)
+    colours = re.findall(r'style="fill: none; stroke: (#[0-9a-f]{6}); stroke-width: 4;', reach)
     assert len({*colours}) > 4

@@ -120,7 +120,8 @@ def resting(evidence: Mapping[str, Any], *paths: str) -> str:
     by_origin: dict[str, list[str]] = {}
     for input_path in paths:
         # A value derived from the mesh of an imported chamber rests on the mesh.
-        path = _MESH if origins.get(input_path) == "derived" else input_path
+        of_mesh = origins.get(input_path) == "derived" and not input_path.startswith("gas.")
+        path = _MESH if of_mesh else input_path
         if (origin := origins.get(path, "given")) not in _KNOWN_ORIGINS:
             text = f"{key_words(path)} {values.get(path, '')}".rstrip()
             by_origin.setdefault(origin, []).append(re.sub(r"\bum\b", "\N{MICRO SIGN}m", text))

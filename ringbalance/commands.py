@@ -90,6 +90,9 @@ _OPTIONS: Final = {
     "save": ShellOption(Path | None, ending=""),
     "csv": ShellOption(Path | None, ending=".csv"),
     "plot": ShellOption(Path | None, ending=".svg"),
+    "valves": _PATH._replace(
+        text="a CSV file of valves at hand (docs/scene-file.md), in place of those otherwise tried."
+    ),
     "level": ShellOption(_EFFORT, "light"),
     "workers": ShellOption(
         int | None, None, "processes; default one for each processor.", limits=_AT_LEAST_1
@@ -135,7 +138,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
             level: "heavy" also runs the cases that take long.
         """,
-        _options("scene out level tolerance"),
+        _options("scene out level valves tolerance"),
         "SCENE --out out",
         "a check of the program failed (what becomes of the scene's requirements does not count)",
     ),
@@ -171,7 +174,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
                 where the requirement is not met; --no-remedies tries settings only.
             save: write the scene with the recommended settings.
         """,
-        _options("scene law json pressure remedies save tolerance"),
+        _options("scene law json pressure remedies valves save tolerance"),
         "SCENE --save tuned.toml",
         "the best settings miss a requirement of the scene, or it is undecided",
         begin="runs ...",
@@ -221,7 +224,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             scene: the scene file, with [requirement] and [design].
             save: write the scene of the design, with its settings.
         """,
-        _options("scene save workers json"),
+        _options("scene save valves workers json"),
         "SCENE --save designed.toml",
         "no design meets the requirement of the scene, or it is undecided",
         begin="designs ...",

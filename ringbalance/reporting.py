@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
+from ringbalance.design.choices import with_valves
 from ringbalance.interface import checked
 from ringbalance.reports.pictures import process
 from ringbalance.reports.report import Report
@@ -82,6 +83,9 @@ def write_report(
 def report(options: SimpleNamespace) -> int:
     """Run the command `report`. Returns: Exit code: 1 when a check of the program failed."""
     scene, text = read_scene(options.scene)
+    if options.valves:
+        scene = with_valves(scene, options.valves)
+        text = toml_bytes(document_of(scene)).decode()
     workers = min(_MAX_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
         finished = write_scene_report(

@@ -58,6 +58,10 @@ def run_command(name: str, /, **settings: Any) -> int:
     if not command.begin:
         return int(target(SimpleNamespace(**options)))
     options |= {key: opened(options[key], options.get("tolerance")) for key in SCENES if key in options}
+    if options.get("valves"):
+        options["scene"] = imported("ringbalance.design.choices:with_valves")(
+            options["scene"], options["valves"]
+        )
     if options.get("workers", 1) is None:
         options["workers"] = os.cpu_count() or 1
     if "law" in options and "scene" in options:

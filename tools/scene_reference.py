@@ -10,6 +10,7 @@ from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
 from ringbalance.scene import known_liquids
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.platform.files import packaged_rows
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import DIMENSIONS
 
@@ -89,6 +90,19 @@ def liquid_reference() -> str:
     return "\n".join([head, *rows])
 
 
+def valve_reference() -> str:
+    """Write a Markdown table of the known valves, as their sources print them."""
+    heads = ("C, l/(s bar)", "b", "6 to 5 bar, l/min", "Cv", "lag, ms", "bar gauge", "source")
+    columns = ("conductance", "critical_ratio", "nominal_flow", "Cv", "valve_lag")
+    rows = []
+    for row in packaged_rows("ringbalance.scene", "data", "valves.csv"):
+        pressures = " to ".join(filter(None, (row["lowest_pressure"], row["highest_pressure"])))
+        source = ", ".join(filter(None, (row["source"], row["date"])))
+        rows.append((row["name"], row["type"], *(row[each] for each in columns), pressures, source))
+    lines = (f"| {' | '.join(cells)} |" for cells in (("name", "type", *heads), ("---",) * 9, *rows))
+    return "\n".join(lines)
+
+
 def unit_reference() -> str:
     """Write a Markdown table of the units."""
     rows = (f"| {kind.noun} | `{kind.example}` | {_units([*kind.units])} |" for kind in DIMENSIONS.values())
@@ -134,4 +148,5 @@ def tables() -> dict[str, str]:
             ECCENTRIC_MASS, "At the top of a file with eccentric masses", above=LIQUID_RING
         ),
         "liquids": liquid_reference(),
+        "valves": valve_reference(),
     }

@@ -17,10 +17,13 @@ from ringbalance.identification.tables import (
     split_head,
 )
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean
-from ringbalance.scene.keys.declaration import Key
+from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.fields import ValueReader
 from ringbalance.scene.keys.schema import ORIGIN
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.platform.display import LOG
 from ringbalance.scene.units import FieldError
+from ringbalance.scene.valves import FLOWS, Valve, taken_ratio
 
 NAME: Final = "name"
 """Column with the names of rows, unless the scene's table has a key of this name."""
@@ -56,8 +59,11 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
         raise SceneError(in_order(problems))
     faults: list[Fault] = []
     columns: dict[str, list[Any]] = {}
+    # The heads of a table are in small letters, as keys are but for a few.
+    spelled = {each.lower(): each for each in keys}
     for head in content.heads:
         name, unit = split_head(head) or (head, "")
+        name = spelled.get(name, name)
         key = keys.get(name)
         if name == NAME and key is None:
             continue
@@ -83,7 +89,28 @@ def read_choices(file: Path, *, table: str, keys: Mapping[str, Key]) -> Choices:
     if faults:
         raise SceneError(in_order(faults))
     rows = tuple(dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-    return Choices(names=content.texts(NAME) if NAME in content.heads and NAME not in keys else (), rows=rows)
+    names = content.texts(NAME) if NAME in content.heads and NAME not in keys else ()
+    named = zip(rows, names or [f"line {line}" for line in content.lines], strict=True)
+    taken = [n for row, n in named if any(row.get(key) for key in FLOWS) and not row.get("critical_ratio")]
+    if taken and table == "gas":
+        LOG.warning("%s: %s", shown, taken_ratio(taken))
+    return Choices(names=names, rows=rows)
+
+
+def with_valves(scene: AnyScene, file: Path) -> AnyScene:
+    """The scene with the valves at hand of a CSV file, in place of those of its table [design].
+
+    Raises: SceneError: every error of the file; or a scene without a liquid ring.
+    """
+    declared = keys_of(Valve)
+    rows = read_choices(file, table="gas", keys={name: declared[name] for name in declared if name != NAME})
+    names = rows.names or tuple(f"valve {number}" for number in range(1, len(rows.rows) + 1))
+    valves = [
+        {NAME: name, **{key: value for key, value in row.items() if value is not None}}
+        for name, row in zip(names, rows.rows, strict=True)
+    ]
+    changes = {"design.valves": valves, "design.valve_file": None}
+    return liquid_ring_scene(scene).with_values(changes)
 
 
 def as_toml(text: str, reader: ValueReader) -> Any:

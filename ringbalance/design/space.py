@@ -211,7 +211,8 @@ def _valves(scene: Scene) -> tuple[SweepAxis, ...]:
     if not keys.valves:
         return ()
     choices = tuple(
-        {path: getattr(valve, path.partition(".")[2]) for path in _VALVE} for valve in keys.valves
+        dict(zip(_VALVE, (*valve.iso_6358, valve.valve_lag), strict=True))
+        for valve in (each.completed for each in keys.valves)
     )
     return (SweepAxis(ranges={}, choices=choices, names=tuple(valve.name for valve in keys.valves)),)
 

@@ -23,10 +23,11 @@ from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.loader import CHANGED, nameless_scene, scene_of
 from ringbalance.scene.narrowing import AnyScene, Kind, scene_as
-from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
+from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile, raw_value_at
 from ringbalance.scene.toml import toml_bytes, toml_text
 from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.scene.units import DIMENSIONS, plain_number, written_like
+from ringbalance.scene.valves import FLOWS, find_valve
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")
 """Paths on which reading a mesh, or meshing a solid, depends."""
@@ -92,6 +93,20 @@ def _changed_document(
         if not isinstance(path, str):
             raise TypeError(f'a value is named by its path, such as "tube.bore", and not by {path!r}')
         _place(document, path, value, schema=schema, origin=origin)
+        flows = {f"gas.{key}" for key in (*FLOWS, "valve")}
+        if path not in flows or value is None:
+            continue
+        # A named valve brings its own critical ratio and lag; any other flow keeps those of the valve before.
+        valve, left = find_valve(str(value)) if path == "gas.valve" else None, "valve" in document["gas"]
+        for key in ("critical_ratio", "valve_lag"):
+            if values.get(f"gas.{key}") is not None:
+                continue
+            if valve is not None and (key == "critical_ratio" or getattr(valve, key) is not None):
+                _place(document, f"gas.{key}", None, schema=schema, origin=origin)
+            elif left and (number := raw_value_at(scene, f"gas.{key}")) is not None:
+                _place(document, f"gas.{key}", number, schema=schema, origin=origin)
+        for other in sorted(flows - {path}):
+            _place(document, other, None, schema=schema, origin=origin)
     return document
 
 

@@ -3,28 +3,9 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
-from ringbalance.scene.keys.fields import (
-    POSITIVE,
-    OneLine,
-    PositiveGaugePressure,
-    PositiveLength,
-    ProperFraction,
-    Time,
-    each_of,
-    quantity,
-    text,
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _ValveAtHand:
-    """A valve with its line."""
-
-    name: Annotated[OneLine, needed("as it is ordered")]
-    conductance: Annotated[float, quantity("conductance", POSITIVE), needed("sonic conductance C (ISO 6358)")]
-    critical_ratio: Annotated[ProperFraction, needed("critical pressure ratio b (ISO 6358)")]
-    valve_lag: Annotated[Time, needed("time from the command to the valve's motion")]
+from ringbalance.scene.keys.declaration import Listed, Shown, standard, unused
+from ringbalance.scene.keys.fields import OneLine, PositiveGaugePressure, PositiveLength, each_of, text
+from ringbalance.scene.valves import Valve
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +30,7 @@ class DesignSettings:
         Shown("gas pressure available", "MPa", note="gauge"),
     ] = None
     valves: Annotated[
-        tuple[_ValveAtHand, ...],
+        tuple[Valve, ...],
         standard([], "valves at hand; without any, and without `valve_file`, the scene's own stays"),
         Listed(
             '[{ name = "V1", conductance = "0.4 l/(s*bar)", critical_ratio = 0.3, valve_lag = "2 ms" }, ...]'

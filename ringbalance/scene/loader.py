@@ -17,13 +17,14 @@ from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import VECTOR_KEYS, CheckedValues, InputUncertainty, ShownOrigin
+from ringbalance.scene.platform.display import LOG
 from ringbalance.scene.platform.files import read_bounded
 from ringbalance.scene.registry import balancers
 from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml import read_toml, toml_text
 
 _LARGEST_FILE_BYTES = 2**20
-_DECIDE_NOTHING = ("requirement.", "design.", "measured.", "rotor.mass", "liquid.source")
+_DECIDE_NOTHING = ("requirement.", "design.", "measured.", "rotor.mass", "liquid.source", "gas.valve_source")
 """Values that no result depends on."""
 CHANGED: Final = ", changed"
 """Suffix of `source` for a scene whose values were changed after reading."""
@@ -53,6 +54,8 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
     if problem:
         raise SceneError.of_file(file, problem, "a TOML file")
     scene = scene_from(content=content, file=file, folder=Path(name).parent)
+    if scene.remark:
+        LOG.warning("%s: %s", file, scene.remark)
     return scene, content.decode("utf-8-sig")
 
 
@@ -97,19 +100,20 @@ def scene_of(
         and not path.endswith(f".{ORIGIN}")
         and not path.startswith(_DECIDE_NOTHING)
     }
+    following = reading.derived | reading.converted
     # Properties looked up for a known liquid are not defaults.
     defaulted = tuple(
         path
         for path in reading.values
         if not reading.given(path)
-        and path not in reading.derived
+        and path not in following
         and (not path.startswith("liquid.") or path == "liquid.dissolved_gas")
     )
     origins: list[tuple[str, ShownOrigin]] = []
     for name, table in reading.schema.tables.items():
         stated = reading.values.get(f"{name}.{ORIGIN}", {})
         for key in (key for key in table.keys if key != ORIGIN):
-            absent: ShownOrigin = "derived" if (path := f"{name}.{key}") in reading.derived else "default"
+            absent: ShownOrigin = "derived" if (path := f"{name}.{key}") in following else "default"
             origins.append((path, stated.get(key, "given") if reading.given(path) else absent))
     parts: dict[str, Any] = {
         **_records(reading, before),

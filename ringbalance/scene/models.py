@@ -58,6 +58,7 @@ from ringbalance.scene.loop_models import (
     required_amplitude,
 )
 from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.valves import taken_ratio
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -380,16 +381,39 @@ class Gas:
         quantity("conductance", POSITIVE),
         unused(
             "the chamber fills at once",
-            "sonic conductance C (ISO 6358) of valve and line; needs critical_ratio",
+            "sonic conductance C (ISO 6358) of valve and line; it, or one of the next four",
         ),
         UNCERTAIN,
         Shown("sonic conductance C", "l/(s*bar)", absent="none: the chamber fills at once"),
     ]
+    nominal_flow: Annotated[
+        float | None,
+        quantity("flow_rate", POSITIVE),
+        unused("`conductance` or another", "flow of the valve from 6 to 5 bar gauge, at 20 degC and 1 bar"),
+        Shown("nominal flow of the valve", "l/min"),
+    ] = None
+    Kv: Annotated[
+        float | None,
+        number(POSITIVE),
+        unused("`conductance` or another", "flow coefficient of the valve, water in m^3/h at 1 bar"),
+        Shown("flow coefficient Kv"),
+    ] = None
+    Cv: Annotated[
+        float | None,
+        number(POSITIVE),
+        unused("`conductance` or another", "flow coefficient of the valve, water in US gal/min at 1 psi"),
+        Shown("flow coefficient Cv"),
+    ] = None
+    valve: Annotated[
+        OneLine | None,
+        unused("`conductance` or another", "name of a valve of the catalogue, see below"),
+        Shown("valve"),
+    ] = None
     critical_ratio: Annotated[
         ProperFraction | None,
         unused(
-            "the chamber fills at once",
-            "critical pressure ratio b (ISO 6358) of valve and line; needs conductance",
+            "that of the valve, or 0.3, which every command then says",
+            "critical pressure ratio b (ISO 6358) of valve and line",
         ),
         UNCERTAIN,
         Shown("critical pressure ratio b"),
@@ -448,6 +472,8 @@ class Gas:
         ),
         Shown("gas in the chambers", note="matters with a conductance only"),
     ]
+    valve_source: str = ""
+    """Origin of conductance and critical ratio where another key states them, in words."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -492,6 +518,14 @@ class Scene(SceneFile):
             return self.rotor
         seen = self.rotor.initial_vibration + self.sensor.runout
         return replace(self.rotor, initial_amplitude=abs(seen), initial_phase=cmath.phase(seen))
+
+    @property
+    def remark(self) -> str:
+        """Origin of C and b of valves where they do not stand in the file."""
+        taken = [each.name for each in self.design.valves if each.completed.critical_ratio is None]
+        texts = [f"[gas] {self.gas.valve_source}"] if self.gas.valve_source else []
+        texts += [f"[design] valves: {taken_ratio(taken)}"] if taken else []
+        return "; ".join(texts)
 
     @property
     def mesh_digest(self) -> str:

@@ -88,7 +88,7 @@ class Measured:
 Origin = Literal["given", "inferred", "assumed", "measured"]
 """Stated in the machine's documents; inferred from other values; chosen, as nothing is known; measured."""
 ShownOrigin = Origin | Literal["derived", "default"]
-"""`Origin`, or "derived": read off the mesh that the scene names; or "default": not in the file."""
+"""`Origin`, or "derived": of the mesh or the valve that the scene names; or "default": not in the file."""
 VECTOR_KEYS = {
     "rotor.initial_amplitude": "rotor.initial_vibration",
     "rotor.initial_phase": "rotor.initial_vibration",
@@ -174,6 +174,11 @@ class SceneFile:
     @property
     def mesh_digest(self) -> str:
         """SHA-256 of the mesh of a chamber; empty without one."""
+        return ""
+
+    @property
+    def remark(self) -> str:
+        """Conversion or default that a command says when it reads the file; empty: none."""
         return ""
 
     def __repr__(self) -> str:

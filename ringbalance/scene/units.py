@@ -102,6 +102,7 @@ _NOT_FINITE = re.compile(r"\s*[+-]?(nan|inf)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]")
 _THOUSANDS = re.compile(r"\s*([+-]?[1-9][0-9]{0,2}(?:[ ,'_’][0-9]{3})+)(\.[0-9]+)?(?![0-9.,])")
 _NORMAL_LITRES = re.compile(r"[Nn](l|L|dm\^3|m\^3)/.*")
+_STATED_FLOWS = "; a flow from 6 to 5 bar gauge goes to nominal_flow, flow coefficients go to Kv and Cv"
 _COUNTED = re.compile(r"(.*[a-z])[ *]?\(?([gGaA])(?:auge|bs|bsolute)?\)?", re.DOTALL)
 """Unit of pressure with a mark for gauge or absolute, as in barg and bar(a)."""
 _DYNAMIC_VISCOSITIES = ("Pa*s", "mPa*s", "cP", "P")
@@ -319,10 +320,15 @@ def _wrong_unit(unit_text: str, kind: _Dimension) -> str:
         return f'"{unit}" is a unit of dynamic viscosity; divide by the density'
     for other in DIMENSIONS.values():
         if unit in other.units:
-            return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}'
+            hint = _STATED_FLOWS if kind is DIMENSIONS["conductance"] else ""
+            return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}{hint}'
     problem = f"{toml_text(unit)} is not a unit of {kind.noun}"
-    if kind is DIMENSIONS["conductance"] and (normal := _NORMAL_LITRES.fullmatch(unit)):
-        return f"{problem}: it counts gas at 0 degC and 101.325 kPa; 1 N{normal[1]} is 1.087 {normal[1]} ANR"
+    if kind in (DIMENSIONS["conductance"], DIMENSIONS["flow_rate"]) and (
+        normal := _NORMAL_LITRES.fullmatch(unit)
+    ):
+        hint = _STATED_FLOWS if kind is DIMENSIONS["conductance"] else ""
+        counted = f"it counts gas at 0 degC and 101.325 kPa; 1 N{normal[1]} is 1.087 {normal[1]} ANR"
+        return f"{problem}: {counted}{hint}"
     # One letter more or less is another unit: only a unit with the same letters and digits is suggested.
     alike = (each for each in kind.units if _letters(each) == _letters(unit))
     return f"{problem}{meant_text(next(alike, ''))}"

@@ -111,6 +111,7 @@ def test_every_description_of_a_scene_reaches_its_table() -> None:
     optional |= {"measured factor on lambda", "geometry of a chamber", "runout", "phase of the runout"}
     optional |= {"leak to ambient", "leak from the supply", "relative humidity of the supply"}
     optional |= {f"{each} of the gas hole" for each in ("diameter", "radius", "direction")}
+    optional |= {"valve", "nominal flow of the valve", "flow coefficient Kv", "flow coefficient Cv"}
     optional |= {entry.name for entry in descriptions_of(RequirementSettings).values()}
     optional |= {entry.name for entry in descriptions_of(DesignSettings).values()}
     assert names - described <= optional

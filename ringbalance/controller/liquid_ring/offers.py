@@ -35,6 +35,7 @@ from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import raw_value_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+from ringbalance.scene.valves import Valve, known_valves
 
 PRESSURE: Final = "gas.pressure"
 _GAIN: Final = SearchAxis(
@@ -135,18 +136,12 @@ _LARGER_HOLES: Final = (1.5, 2.0, 3.0)
 _LIMITS: Final = (2.0, 4.0, 6.0)
 _CRESTS: Final = (1.0, 0.96, 0.92)
 """Factors on the largest radius of a crest that holds the liquid."""
-_SOLD: Final = (
-    ("Festo MHA2-MS1H-3/2", 0.39e-8, 0.3, 2.0e-3),
-    ("SMC SY3000", 1.1e-8, 0.28, 12e-3),
-    ("CKD M4GA2 R", 2.3e-8, 0.36, 20e-3),
+_SOLD: Mapping[str, float] = MappingProxyType(
+    {"Festo MHA2-MS1H-3/2": 2e-3, "SMC SY3000": 12e-3, "CKD M4GA2 R": 20e-3}
 )
-"""Solenoid valves that can be bought: C, m^3/(s Pa), b and lag, s, of the valve alone.
-
-A line and a rotary distributor behind it let less through.
-Source: C and b of the SY3000 from SMC's catalogue EUS11-83 B-UK, of the M4GA2 R (two positions) from CKD's
-    manual SM-P00077-A/3.  A seller's data of the MHA2 gives a standard nominal flow of 100 l/min, from 6 to 5
-    bar gauge, of which C follows by ISO 6358 with b taken as 0.3.  All lags are assumed.
-"""
+"""Valves of the catalogue to try, and their lags, s, which are assumed: their sources print none."""
+_DIGITS: Final = 2
+"""Significant digits of C in data sheets, m^3/(s Pa)."""
 _MEASURED: Mapping[str, str] = MappingProxyType(
     dict.fromkeys((LOSS, *MODEL_ERRORS), "measure_flow")
     | {MOMENT: "measure_moment", "draw_down_factor": "measure_residual"}
@@ -199,22 +194,24 @@ def remedies_of(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
 
 
 def valves_of(scene: Scene) -> tuple[Remedy, ...]:
-    """Valves that can be bought; empty for a scene that gives its valve."""
-    gas = scene.gas
+    """Valves at hand, or some that can be bought; empty for a scene that gives its valve."""
+    gas, catalogue = scene.gas, known_valves()
     if gas.conductance is not None:
         return ()
-    return tuple(
-        Remedy(
-            code="valve",
-            name=name,
-            changes={
-                "gas.conductance": conductance,
-                "gas.critical_ratio": ratio,
-                "gas.valve_lag": lag if gas.valve_lag is None else gas.valve_lag,
-            },
-        )
-        for name, conductance, ratio, lag in _SOLD
+    sold = tuple(
+        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], _DIGITS), valve_lag=lag)
+        for name, lag in _SOLD.items()
     )
+    remedies = []
+    for valve in (each.completed for each in scene.design.valves or sold):
+        conductance, ratio = valve.iso_6358
+        changes = {
+            "gas.conductance": conductance,
+            "gas.critical_ratio": ratio,
+            "gas.valve_lag": valve.valve_lag if gas.valve_lag is None else gas.valve_lag,
+        }
+        remedies.append(Remedy(code="valve", name=valve.name, changes=changes))
+    return tuple(remedies)
 
 
 def drawn_input(name: str) -> DrawnInput:

@@ -80,6 +80,8 @@ class SceneReading:
     """Keys and tables of this kind of file."""
     derived: frozenset[str] = frozenset()
     """Paths of values from another file, such as a mesh, that this one names."""
+    converted: frozenset[str] = frozenset()
+    """Paths of values that follow from another key, such as a valve's name."""
     tables: Mapping[str, TableRead] = field(default_factory=dict)
     """Tables of the document, by name."""
 
@@ -90,6 +92,10 @@ class SceneReading:
     def following(self, values: Mapping[str, Any]) -> SceneReading:
         """Copy with more values from another file."""
         return replace(self.adding(values), derived=self.derived | frozenset(values))
+
+    def converting(self, values: Mapping[str, Any]) -> SceneReading:
+        """Copy with more values that follow from other keys of the file."""
+        return replace(self.adding(values), converted=self.converted | frozenset(values))
 
     def given(self, path: str) -> bool:
         """True when the file itself has a value at a path, readable or not."""

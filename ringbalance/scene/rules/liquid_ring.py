@@ -15,6 +15,7 @@ from ringbalance.scene.kinds import SceneKind, failed_checks
 from ringbalance.scene.liquids import with_liquid
 from ringbalance.scene.registry import registered
 from ringbalance.scene.rules import shape, working
+from ringbalance.scene.rules.valve import with_valve
 
 
 def _read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
@@ -36,6 +37,7 @@ def _read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
         length = shortest_path(port_radius=port_radius, hump_radius=hump_radius, separation=math.pi)
         reading = reading.adding({"tube.length": length})
     reading, liquid_faults = with_liquid(reading)
+    reading, valve_faults = with_valve(reading)
     failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS))
     missing = [*reading.missing_faults()]
     if reading.given("tube") and reading.lacks("tube.length") and reading.lacks("tube.drag_coefficient"):
@@ -47,12 +49,18 @@ def _read(content: SceneInput) -> tuple[SceneReading, tuple[Fault, ...]]:
     for present, absent in _TOGETHER:
         if not reading.lacks(present) and reading.lacks(absent):
             missing.append(reading.missing(absent, f"{present.split('.')[1]} has no meaning without it"))
-    return reading, (*faults, *missing, *liquid_faults, *failed, *working.uncertainty_faults(reading))
+    return reading, (
+        *faults,
+        *missing,
+        *liquid_faults,
+        *valve_faults,
+        *failed,
+        *working.uncertainty_faults(reading),
+    )
 
 
 _HOLE: Final = "disc.gas_hole_diameter"
 _TOGETHER: Final = (
-    ("gas.conductance", "gas.critical_ratio"),
     ("gas.critical_ratio", "gas.conductance"),
     (_HOLE, "disc.gas_hole_radius"),
     *((path, _HOLE) for path in ("disc.gas_hole_radius", "disc.gas_hole_direction", "requirement.crater")),

@@ -15,8 +15,11 @@ from typing import Final
 import numpy as np
 
 from ringbalance.reports.evidence import Progress, collect_evidence
+from ringbalance.reports.figures_page import READING_FILE
 from ringbalance.reports.page import DOCUMENTS, page_content, render_pages, terminal_lines
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
+from ringbalance.reports.pages.first_page import SECTION as SUMMARY
+from ringbalance.reports.pages.first_page import pressure_page
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, drawing_beside
@@ -126,7 +129,11 @@ def write_report(
         tables.mkdir()
         for name, text in _csv_tables(evidence).items():
             (tables / name).write_text(text, encoding="utf-8")
-        for name, page in render_pages(content).items():
+        pages = render_pages(content)
+        pressures = (views[SUMMARY.name] or {}).get("pressure")
+        if pressures is not None:
+            pages = {READING_FILE: pressure_page(evidence, pressures), **pages}
+        for name, page in pages.items():
             (stage / name).write_text(page, encoding="utf-8")
     return Report(page=folder / "report.html", evidence=evidence)
 

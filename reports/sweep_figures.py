@@ -35,7 +35,8 @@ from ringbalance.reports.figure import (
     figure_of,
     plain_number,
 )
-from ringbalance.reports.prose import input_name, typeset
+from ringbalance.reports.figures_page import READING_FILE, ReadableFigure, ReadingColumn, figures_page
+from ringbalance.reports.prose import input_name, opening, typeset
 from ringbalance.results.numbers import display_unit
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.describe import usual_name
@@ -95,12 +96,56 @@ class View:
 
 
 def sweep_figures(sweep: Sweep, folder: Path) -> tuple[Path, ...]:
-    """Write the figures of a sweep, each for the page's width and for a column of 85 mm.
+    """Write the figures of a sweep, each for the page's width and for a column of 85 mm, and a page on which
+    they answer a pointer with their values.
 
-    Returns: The files. Raises: OSError: they cannot be written.
+    Returns: The files, the page last. Raises: OSError: they cannot be written.
     """
-    drawings = [*sweep_drawings(sweep), *sweep_drawings(sweep, width=COLUMN_IN)]
-    return tuple(write_whole(folder / f"{each.name}.svg", each.standalone()) for each in drawings)
+    view, narrow = view_of(sweep), sweep_drawings(sweep, width=COLUMN_IN)
+    drawings = [*sweep_drawings(sweep), *narrow]
+    texts = {f"{each.name}.svg": each.standalone() for each in drawings}
+    if view is not None and narrow:
+        texts[READING_FILE] = _page(view, narrow)
+    return tuple(write_whole(folder / name, text) for name, text in texts.items())
+
+
+def _page(view: View, drawings: list[Drawing]) -> str:
+    """Page of figures in which a point is read out with all that is known of it."""
+    sweep, keys = view.sweep, view.keys()
+    fields = {column.name: column for column in sweep.fields()}
+    names = {"row": "row"}
+    for axis in sweep.plan.axes:
+        names |= {axis.head: axis.head} if axis.names else {}
+        names |= {path: axis_name(path) for path in axis.paths}
+    columns = []
+    for name, words in {**names, **COLUMNS, "verdict": "verdict", "finding": "reason"}.items():
+        values = np.array(fields[name].values, dtype=object)[view.shown] if name in fields else ()
+        if any(value not in (None, "") for value in values):
+            texts = [_REASONS.get(value, value) for value in values] if name == "verdict" else [*values]
+            columns.append(ReadingColumn(name=words, values=texts, unit=fields[name].unit))
+    figures = []
+    for drawing in drawings:
+        (column,) = [name for name in COLUMNS if drawing.name.startswith(_stem(name))]
+        shown = np.array(fields[column].values, dtype=np.float64)[view.shown]
+        (x, y), words = [*keys, shown][:2], COLUMNS[column]
+        label = f"{words} over {' and '.join(map(axis_name, view.paths))}"
+        caption = f"{opening(words)}."
+        figures.append(ReadableFigure(drawing=drawing, label=label, caption=caption, curves=[(x, y)]))
+    best = np.flatnonzero(np.flatnonzero(view.shown) == sweep.best_or_nearest)
+    note = f" {opening(view.note)}." if view.note else ""
+    return figures_page(
+        sweep.scene.name,
+        f"Sweep of {sweep.scene.source}, {len(sweep.points)} points.{note}",
+        columns,
+        figures,
+        start=int(best[0]) if len(best) else 0,
+        along_x=len(keys) == 1,
+        has_dark=False,
+    )
+
+
+def _stem(column: str) -> str:
+    return f"sweep-{column.replace('_', '-')}"
 
 
 def sweep_drawings(sweep: Sweep, *, width: float | None = None) -> list[Drawing]:
@@ -180,7 +225,7 @@ def _drawing(view: View, name: str, unit: str, values: list[Any], width: float |
             panel.scatter(*(each[best] for each in over), label=label, **_BEST)
 
     y = axes[1] if len(axes) > 1 else (COLUMNS[name], unit)
-    stem, page = f"sweep-{name.replace('_', '-')}", width is None
+    stem, page = _stem(name), width is None
     size: dict[str, Any] = {"height": 3.6 if page else 2.9, "columns": 4 if page else 2, "wide": page}
     return draw(stem if page else f"{stem}-85mm", paint, x=axes[0], y=y, width=width, **size)
 
@@ -263,7 +308,7 @@ def _coloured(
     empty = ~np.isfinite(z)
     for mask, hatch, label in (
         (empty, "xxxx", f"no value: {reasons}"),
-        (~inside & ~empty, "//", f"not feasible: {unmet}"),
+        (~inside & ~empty, "///", f"not feasible: {unmet}"),
     ):
         if mask.any():
             panel.add_patch(PathPatch(_outline(mask, *edges), label=label, hatch=hatch, **_HATCHED))

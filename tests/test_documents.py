@@ -37,7 +37,7 @@ BY_NAME: Final = {
     f"times.{MODELS}",
     *("findings.values", "findings.change"),
     *("verdicts", "best.changes"),
-    *("ended", "own.ended", "clipped", "along.levels.settings", "tried.settings"),
+    *("ended", "own.ended", "along.levels.ended", "clipped", "along.levels.settings", "tried.settings"),
     *(f"{each}.{key}" for each in ("remedies", "valves") for key in ("changes", "settings")),
     *(
         "quantities.causes",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, Final
@@ -17,6 +19,7 @@ from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
 from ringbalance.reports import summary
 from ringbalance.reports.figure import FOUND, INK, MUTED, PAPER, THIRD, Drawing, draw, figure_of, panels
+from ringbalance.reports.figures_page import READING_FILE, ReadableFigure, ReadingColumn, figures_page
 from ringbalance.reports.judged import (
     advice_view,
     choice_records,
@@ -26,7 +29,8 @@ from ringbalance.reports.judged import (
 )
 from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.requirements import MET, OPEN
+from ringbalance.results.numbers import percent
+from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.platform.jobs import Job
@@ -78,8 +82,12 @@ _RUN: Final = (
 )
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _MAX_DOMINANT: Final = 3
-_VERDICT_OPACITY: Final = {MET: 0.28, OPEN: 0.1}
-"""Opacity of the ground by the verdict on the fraction of devices."""
+_GROUNDS: Final[dict[str, Record]] = {
+    MET: {"facecolor": THIRD, "alpha": 0.28, "linewidth": 0},
+    OPEN: {"facecolor": "none", "edgecolor": THIRD, "alpha": 0.8, "hatch": "///", "linewidth": 0},
+}
+"""Ground by the verdict on the fraction of devices."""
+_WITHOUT_GROUND: Final[Record] = {"facecolor": "none", "edgecolor": MUTED, "linewidth": 0.6}
 
 
 def _tuning(work: Work) -> Record:
@@ -173,6 +181,7 @@ def _view(record: Record, evidence: Record) -> Record:
         "question": {name: verdicts[name] for name in _QUESTION} if answered else {},
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
         "pressure": _pressure_figure(record),
+        "values_file": READING_FILE,
         **advice_view(record),
         # Inputs that decide most of the differences between drawn devices.
         "dominant": [
@@ -208,8 +217,8 @@ def _pressure_figure(record: Record) -> Drawing | None:
         three = panels(axes, *boxes)
         for panel, title in zip(three, titles, strict=True):
             for low, high, level in zip(ends[:-1], ends[1:], levels, strict=True):
-                shade = _VERDICT_OPACITY.get(level["verdict"], 0.0)
-                panel.axvspan(low, high, color=THIRD, alpha=shade, linewidth=0)
+                if level["verdict"] in _GROUNDS:
+                    panel.axvspan(low, high, **_GROUNDS[level["verdict"]])
             panel.axvline(scene_pressure, color=INK, linewidth=1, linestyle=":", label="the scene’s pressure")
             if recommended != scene_pressure:
                 panel.axvline(recommended, color=INK, linewidth=1.4, label="recommended")
@@ -227,13 +236,67 @@ def _pressure_figure(record: Record) -> Drawing | None:
         for panel in three:
             panel.set(xlim=(pressure[0], pressure[-1]), ylim=(0, None))
             panel.tick_params(labelbottom=panel is three[2])
+        three[0].set_yticks((0, 50, 100))
         three[2].set_xlabel("gas pressure in MPa, gauge")
         handles, labels = three[0].get_legend_handles_labels()
-        grounds = [Patch(color=THIRD, alpha=shade, linewidth=0) for shade in _VERDICT_OPACITY.values()]
-        legend: Record = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0, "borderpad": 0.1}
-        figure_of(axes).legend([*handles, *grounds], [*labels, *_VERDICT_OPACITY], **legend)
+        grounds = {**_GROUNDS, MISSED: _WITHOUT_GROUND}
+        patches = [Patch(**look) for look in grounds.values()]
+        legend: Record = {"loc": "upper left", "ncols": 3, "borderaxespad": 0.0, "borderpad": 0.1}
+        figure_of(axes).legend([*handles, *patches], [*labels, *grounds], columnspacing=1.0, **legend)
 
     return draw("pressure-choice", paint, columns=0, height=3.5)
+
+
+def pressure_page(evidence: Record, drawing: Drawing) -> str:
+    """Page on which the figure over the gas pressure answers a pointer with its values."""
+    record = evidence[SECTION.name]
+    levels = record["along"]["levels"]
+    pressures = [level["value"] for level in levels]
+
+    def column(name: str, key: str, part: str, unit: str = "") -> ReadingColumn:
+        return ReadingColumn(name=name, values=[level[key][part] for level in levels], unit=unit)
+
+    fractions = [
+        ReadingColumn(name=name, values=[percent(level["fraction"][part]) for level in levels])
+        for name, part in (
+            ("devices that settle", "value"),
+            ("lower bound (95 %)", "low"),
+            ("upper bound (95 %)", "high"),
+        )
+    ]
+    columns = [
+        ReadingColumn(name="gas pressure, gauge", values=pressures, unit="Pa"),
+        *fractions,
+        column("devices drawn", "fraction", "of"),
+        ReadingColumn(name="verdict", values=[level["verdict"] for level in levels]),
+        ReadingColumn(name="ends of the others", values=[_ends_text(level.get("ended")) for level in levels]),
+        column("moment that can be corrected, median", "usable_moment_kg_m", "p50", "kg m"),
+        column("by nine tenths of the devices at least", "usable_moment_kg_m", "p10", "kg m"),
+        column("until half have settled", "settling_time_s", "p50", "s"),
+        column("until nine tenths have settled", "settling_time_s", "p90", "s"),
+    ]
+    heights = [
+        [100 * level["fraction"]["value"] for level in levels],
+        [1e6 * (level["usable_moment_kg_m"]["p50"] or math.nan) for level in levels],
+        [level["settling_time_s"]["p50"] or math.nan for level in levels],
+    ]
+    nearest = np.argmin(np.abs(np.array(pressures) - record["recommended_pressure_Pa"]))
+    figure = ReadableFigure(
+        drawing=drawing,
+        label="Devices that settle, moment and time to settle over the gas pressure",
+        caption="Drawn devices at each gas pressure, with the best settings there.",
+        curves=[(1e-6 * np.array(pressures), values) for values in heights],
+    )
+    source = f"Figure of the report of {evidence['scene']['file']}, {evidence['times']['date']}."
+    back = ("report.html", "Back to the report.")
+    look: Record = {"start": int(nearest), "along_x": True, "has_dark": True}
+    return figures_page(evidence["scene"]["name"], source, columns, [figure], back=back, **look)
+
+
+def _ends_text(ended: Record | None) -> str:
+    """Ends of runs that did not settle, with the number of devices."""
+    counts = Counter({cause: count for cause, count in (ended or {}).items() if cause != "settled"})
+    return ", ".join(f"{cause.replace('_', ' ')} {count}" for cause, count in counts.most_common())
 
 
 def _banded(panel: Axes, curves: Sequence[Any], level: tuple[float, str], **look: Any) -> None:

@@ -82,6 +82,8 @@ def test_everything_is_there(first: Report) -> None:
     folder = first.page.parent
     assert json.loads((folder / "evidence.json").read_text()) == first.evidence
     assert len(list((folder / "figures").glob("*.svg"))) >= 10
+    linked = 'href="figures.html"' in (folder / "report.html").read_text()
+    assert linked == (folder / "figures.html").exists()
     assert len(list((folder / "fields").glob("*.vtu"))) == 2
     assert [path.name for path in folder.parent.iterdir()] == ["out"]
     written = folder / "touched.txt"

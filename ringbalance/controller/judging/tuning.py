@@ -115,9 +115,7 @@ class Tuning(Result):
                     {
                         "value": each.level,
                         "settings": plain_settings(each.judgement.settings),
-                        "fraction": each.judgement.fraction.document(),
-                        "verdict": each.judgement.verdict,
-                        "settling_time_s": each.judgement.settling_times,
+                        **each.judgement.document(),
                         "usable_moment_kg_m": dict(
                             zip(("p10", "p50", "p90"), map(finite, each.usable_moment), strict=True)
                         ),

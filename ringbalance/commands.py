@@ -120,7 +120,9 @@ _OPTIONS: Final = {
     "loss": ShellOption(Literal["linear", "soft_l1"], "linear"),
     **dict.fromkeys(("parameters", "next", "template"), _TEXT),
     **dict.fromkeys(("plan", "cases", "data"), _PATH),
-    **dict.fromkeys(("pressure", "all_systems", "no_intervals", "no_figures", "list_", "mutations"), _FLAG),
+    **dict.fromkeys(
+        ("pressure", "preview", "all_systems", "no_intervals", "no_figures", "list_", "mutations"), _FLAG
+    ),
 }
 """By name; one name means the same in every command, up to a default."""
 
@@ -241,10 +243,11 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             next: the parameter that the proposed next measurement is for; default the least certain one.
             save: also write the fitted scene to this file, for all other commands.
             plot: also draw the data against the fit on one sheet, an SVG file.
+            preview: only print what was understood of the files; nothing is fitted.
             template: only print an empty file of measurements of this kind, with explanations.
         """,
         _options(
-            "scene data parameters loss next save plot json template",
+            "scene data parameters loss next save plot json preview template",
             scene=ShellOption(Path | None, kind=Parameter.POSITIONAL_OR_KEYWORD),
             data=ShellOption(Path, (), kind=Parameter.VAR_POSITIONAL),
             save=_PATH,

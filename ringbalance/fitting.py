@@ -13,9 +13,10 @@ from ringbalance.identification.criticism import Review
 from ringbalance.identification.documents import Fit
 from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
-from ringbalance.identification.reading import read_observations
+from ringbalance.identification.reading import preview, read_observations
 from ringbalance.identification.reading import template as template_of
 from ringbalance.identification.saving import save_result
 from ringbalance.interface import checked, print_result
@@ -53,19 +54,19 @@ def fit(
         ['influence_coefficient', 'lag_angle']
     """
     files = [data] if isinstance(data, str | PathLike) else data
-    return _fit(scene, [Path(each) for each in files], parameters, loss, next)
+    observations = read_observations([Path(each) for each in files], scene=scene)
+    return _fit(scene, observations, parameters, loss, next)
 
 
 def _fit(
     scene: AnyScene,
-    files: Sequence[Path],
+    observations: tuple[Observations, ...],
     parameters: Sequence[str] | None,
     loss: Loss,
     next: str | None,
     option: str = "next",
 ) -> Fit:
-    """Read, fit, test the fit, find the next measurement. Args: `option`: name of `next` in a message."""
-    observations = read_observations(files, scene=scene)
+    """Fit, test the fit, find the next measurement. Args: `option`: name of `next` in a message."""
     try:
         names = [each.name for each in problem_of(scene, observations, parameters).parameters]
         if next is not None and next not in names:
@@ -111,8 +112,15 @@ def fit_files(options: SimpleNamespace) -> int:
             raise SceneError.of_option(
                 option="--parameters", value=options.parameters, problem=problem, allowed=allowed
             )
+    understood = read_observations(options.data, scene=scene)
+    if options.preview:
+        print("\n".join(preview(each) for each in understood))
+        return 0
+    for each in understood:
+        for remark in each.remarks:
+            print_message(f"{each.file}: {remark}")
     with activity("fit", "several starts, profiles of the likelihood ..."):
-        result = _fit(scene, options.data, names, options.loss, options.next, option="--next")
+        result = _fit(scene, understood, names, options.loss, options.next, option="--next")
     print_result(result, json=options.json, headline=False)
     if options.save is not None:
         text = result.review.text

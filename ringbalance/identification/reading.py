@@ -15,14 +15,16 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.instrument import AMPLITUDE, in_columns_of, two_planes
 from ringbalance.identification.kinds.bench import BENCH
 from ringbalance.identification.kinds.eccentric_mass import ECCENTRIC_MASS
-from ringbalance.identification.kinds.kind import Kind, Observations
+from ringbalance.identification.kinds.kind import DataColumn, Kind, Observations
 from ringbalance.identification.kinds.liquid_ring import LIQUID_RING
 from ringbalance.identification.tables import (
     CsvTable,
     data_fault,
     decoded,
+    dimension_of,
     file_name,
     in_order,
     parse_table,
@@ -34,10 +36,13 @@ from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.keys.fields import LETTERS, Bounds, half_width, share
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.toml import toml_text
-from ringbalance.scene.units import FieldError, parse_quantity
+from ringbalance.scene.units import FieldError, format_quantity, parse_quantity, unit_of
 
-_AMPLITUDE: Final = "amplitude"
 _UNCERTAINTY: Final = "uncertainty"
+_SPEED: Final = "speed"
+_DERIVATIVES: Final[Mapping[str, int]] = MappingProxyType({"velocity": 1, "acceleration": 2})
+_GRAVITY: Final[Mapping[str, str]] = MappingProxyType({"g": "gn"})
+"""Unit of acceleration in scene files, where g is a gram, by that of instruments."""
 _RELATIVE: Final = share(Bounds(above=0, below=1), example=0.02)
 _TEXTS: Final = (
     *("kind", "source", "uncertainty_from", "where", "doi", "licence", "read", "conditions"),
@@ -93,18 +98,24 @@ def observations_of(
     if len(wrong) > len(faults):
         return None, tuple(wrong)
     kind = KINDS[str(table.header["kind"])]
+    table, remarks = in_columns_of(table, kind)
     wrong += _header_faults(table, kind)
-    heads = list(_head_faults(table, kind))
+    heads = [*two_planes(table)] or [*_head_faults(table, kind)]
     if heads:
         return None, (*wrong, *heads)
-    columns, cell_faults = _columns(table, kind)
-    uncertainty, stated_faults = _stated_uncertainty(table, kind, columns)
+    speed, speed_faults = _speed(table, kind, scene)
+    if speed_faults:
+        return None, (*wrong, *speed_faults)
+    columns, cell_faults = _columns(table, kind, speed)
+    for head in table.heads:
+        remarks += _turned(head, kind, columns, speed)
+    uncertainty, stated_faults = _stated_uncertainty(table, kind, columns, speed)
     wrong += [*cell_faults, *_faults_of_scene(table, kind, scene, columns), *stated_faults]
     wrong += _repeated(table) if kind.balancer else ()
     if wrong:
         return None, tuple(wrong)
     # From the file's convention of amplitudes to zero to peak.
-    factor = AMPLITUDES[str(table.header.get(_AMPLITUDE, "zero_to_peak")).lower()]
+    factor = AMPLITUDES[str(table.header.get(AMPLITUDE, "zero_to_peak")).lower()]
     letters = table.texts("chamber") if kind.has_chamber else ("",) * len(table.rows)
     used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
     return Observations(
@@ -116,6 +127,7 @@ def observations_of(
         series=table.series,
         chamber=np.array(letters, dtype=np.str_),
         columns=_zero_to_peak(used, kind, factor),
+        remarks=remarks,
         uncertainty=_zero_to_peak(uncertainty, kind, factor),
     ), ()
 
@@ -135,7 +147,7 @@ def _kind_faults(table: CsvTable, scene: AnyScene | None) -> Iterator[Fault]:
 
 
 def _header_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
-    allowed_keys = (*_TEXTS, _UNCERTAINTY, *([_AMPLITUDE] if kind.has_amplitudes else []))
+    allowed_keys = (*_TEXTS, _UNCERTAINTY, *([AMPLITUDE, _SPEED] if kind.has_amplitudes else []))
     for key, value in table.header.items():
         if key not in allowed_keys:
             problem = f"this key of the first lines is not known{did_you_mean(key, allowed_keys)}"
@@ -147,12 +159,12 @@ def _header_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
             yield data_fault(table.file, "", f'the key "{key}" is missing in the first lines, marked #')
     if not str(table.header.get("source", "-")).strip():
         yield data_fault(table.file, "source", "it is empty", allowed="rig, run and date")
-    stated = table.header.get(_AMPLITUDE)
+    stated = table.header.get(AMPLITUDE)
     if kind.has_amplitudes and not (isinstance(stated, str) and stated.lower() in AMPLITUDES):
         allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
         problem = "the first lines must say how amplitudes are counted"
         value = "missing" if stated is None else toml_text(stated)
-        yield data_fault(table.file, _AMPLITUDE, problem, value=value, allowed=allowed)
+        yield data_fault(table.file, AMPLITUDE, problem, value=value, allowed=allowed)
 
 
 def _head_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
@@ -169,8 +181,9 @@ def _head_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
             if column is None and name not in kind.texts and name.replace("_", "").islower():
                 problem = f"a file of this kind has no such column{did_you_mean(name, allowed_names)}"
                 raise FieldError(problem, ", ".join(allowed_names))
-            if column is not None and column.dimension is not None:
-                parse_quantity(f"1 {unit}", column.dimension)
+            unit, dimension, _ = _motion(column, unit)
+            if dimension is not None:
+                parse_quantity(f"1 {unit}", dimension)
             elif column is not None and unit and unit != "%":
                 raise FieldError("this column has no unit", f"{name}, or {name} [%]")
         except FieldError as error:
@@ -188,7 +201,50 @@ def _head_faults(table: CsvTable, kind: Kind) -> Iterator[Fault]:
         yield data_fault(table.file, line, f"{len(present)} of the columns {choice}, and one is needed")
 
 
-def _columns(table: CsvTable, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
+def _motion(column: DataColumn | None, unit: str) -> tuple[str, str | None, int]:
+    """Unit and dimension of a column, and its order as a derivative: 1 velocity, 2 acceleration."""
+    if column is None or not column.amplitude:
+        return unit, None if column is None else column.dimension, 0
+    unit = _GRAVITY.get(unit, unit)
+    order = _DERIVATIVES.get(dimension_of(unit) or "", 0)
+    return unit, dimension_of(unit) if order else column.dimension, order
+
+
+def _speed(table: CsvTable, kind: Kind, scene: AnyScene | None) -> tuple[FloatArray, list[Fault]]:
+    """Speed of the rotor in each row, rad/s, where amplitudes are velocities or accelerations, else 1."""
+    split = [(head, *(split_head(head) or ("", ""))) for head in table.heads]
+    if not any(_motion(kind.column(name), unit)[2] for _, name, unit in split):
+        return np.ones(len(table.rows)), []
+    for head, name, unit in split:
+        if name == _SPEED:
+            speeds, faults = table.values(head, unit, "speed")
+            return np.maximum(speeds, 1.0), faults
+    try:
+        stated = table.header.get(_SPEED)
+        value = parse_quantity(stated, "speed") if stated else getattr(getattr(scene, "rotor", 0), _SPEED, 0)
+        if not value > 0:
+            raise FieldError("amplitudes are displacements at a known speed alone", 'speed = "3000 rpm"')
+    except FieldError as error:
+        return np.ones(0), [data_fault(table.file, _SPEED, error.problem, allowed=error.allowed)]
+    return np.full(len(table.rows), value), []
+
+
+def _turned(head: str, kind: Kind, columns: dict[str, FloatArray], speed: FloatArray) -> tuple[str, ...]:
+    """Turn the phase of a velocity or an acceleration back to that of the displacement, and say so."""
+    name, unit = split_head(head) or ("", "")
+    order = _motion(kind.column(name), unit)[2]
+    phase = name.replace(AMPLITUDE, "phase", 1)
+    if not order or not name.startswith(AMPLITUDE):
+        return ()
+    shown = format_quantity(float(speed[0]), "speed", "rpm") if np.ptp(speed) == 0 else "that of its row"
+    text = f"{head} is divided by the speed{' squared' if order > 1 else ''}, {shown}"
+    if phase in columns:
+        columns[phase] = columns[phase] - order * np.pi / 2
+        text += f"; its phase is turned back by {90 * order} deg"
+    return (text,)
+
+
+def _columns(table: CsvTable, kind: Kind, speed: FloatArray) -> tuple[dict[str, FloatArray], list[Fault]]:
     """Every column of numbers, SI, and the errors of the cells."""
     columns: dict[str, FloatArray] = {}
     faults: list[Fault] = []
@@ -197,8 +253,10 @@ def _columns(table: CsvTable, kind: Kind) -> tuple[dict[str, FloatArray], list[F
         column = kind.column(name)
         if column is None:
             continue
-        dimension = "share" if unit == "%" and column.dimension is None else column.dimension
+        unit, dimension, order = _motion(column, unit)
+        dimension = "share" if unit == "%" and dimension is None else dimension
         columns[name], wrong = table.values(head, unit, dimension)
+        columns[name] = columns[name] / speed**order
         faults += wrong
         bad, rows = {fault.key for fault in wrong}, zip(table.lines, table.texts(head), strict=True)
         for (line, cell), value in zip(rows, columns[name].tolist(), strict=True):
@@ -249,7 +307,7 @@ def _zero_to_peak(columns: Mapping[str, FloatArray], kind: Kind, factor: float) 
 
 
 def _stated_uncertainty(
-    table: CsvTable, kind: Kind, columns: Mapping[str, FloatArray]
+    table: CsvTable, kind: Kind, columns: Mapping[str, FloatArray], speed: FloatArray
 ) -> tuple[dict[str, FloatArray], list[Fault]]:
     """Stated expanded uncertainty of each measured column, and errors.
 
@@ -263,7 +321,8 @@ def _stated_uncertainty(
             if name not in measured:
                 problem = f"the file measures no such column{did_you_mean(name, measured)}"
                 raise FieldError(problem, ", ".join(measured))
-            width, relative = half_width(measured[name].dimension).read(value)
+            _, dimension, order = _motion(measured[name], unit_of(value) if isinstance(value, str) else "")
+            width, relative = half_width(dimension).read(value)
             if relative and measured[name].dimension == "angle":
                 raise FieldError("an angle has no percentage", 'an angle such as "1 deg"')
             if not width > 0:
@@ -272,7 +331,7 @@ def _stated_uncertainty(
             key, text = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}", toml_text(value)
             faults.append(data_fault(table.file, key, error.problem, value=text, allowed=error.allowed))
             continue
-        result[name] = width * (np.abs(columns[name]) if relative else np.ones_like(columns[name]))
+        result[name] = width * (np.abs(columns[name]) if relative else speed**-order)
     if stated is not None and not isinstance(stated, Mapping):
         try:
             share_of_all = _RELATIVE.read(stated)
@@ -321,6 +380,18 @@ def kinds_of(balancer: str) -> tuple[str, ...]:
     """Names of the kinds that scenes of a balancer predict; for an empty name, those of test benches."""
     names = tuple(name for name, kind in KINDS.items() if balancer == kind.balancer)
     return names or tuple(name for name, kind in KINDS.items() if kind.any_rotor)
+
+
+def preview(data: Observations) -> str:
+    """Text of what was understood of a file: kind, rows, changes, and ranges of the columns."""
+    kind = KINDS[data.kind]
+    count = len(set(data.series.tolist()))
+    lines = [f"{data.file}: {kind.title} ({data.kind})", f"  {len(data)} rows, {count} series; {data.source}"]
+    for column in (each for each in kind.columns if each.name in data.columns):
+        values = data.columns[column.name]
+        ends = " to ".join(column.written(float(end)) for end in (values.min(), values.max()))
+        lines.append(f"  {column.name}: {ends}{', zero to peak' if column.amplitude else ''}")
+    return "\n".join([*lines, *(f"  {remark}" for remark in data.remarks)])
 
 
 def template(name: str) -> str:

@@ -1,8 +1,9 @@
 """Files of measurements as tables of text: TOML in the first lines, marked #, then rows below column heads.
 
 Changes by a spreadsheet are undone if they are unambiguous: a byte order mark, Windows line ends, a line
-"sep=;", semicolons or tabs between cells, first lines in quotation marks or followed by empty cells. A
-decimal comma is refused, since it may also separate thousands.
+"sep=;", semicolons or tabs between cells, first lines in quotation marks or followed by empty cells. So are
+UTF-16, units in round brackets or in a row below the names, and decimal commas. A comma that may separate
+thousands as well is refused.
 """
 
 from __future__ import annotations
@@ -37,6 +38,10 @@ _NAMED_SEPARATOR: Final = re.compile(r'"?sep=.{0,2}"?[,;\t]*', re.IGNORECASE)
 _LINE: Final = re.compile(r"line (\d+)")
 _WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx or .ods, and of .xls."""
+_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+_DECIMAL_COMMA: Final = re.compile(r"([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)")
+_THOUSANDS: Final = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_POINT: Final = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 _HEAD: Final = re.compile(r"([A-Za-z][A-Za-z0-9_ ]*?)(?: ?\[([^][]+)\])?")
 _SIZES: Final = (1e-15, 1e15)
 """Smallest and largest magnitude of a number other than zero in a cell."""
@@ -55,6 +60,8 @@ class CsvTable:
     lines: tuple[int, ...]
     """Line of each row in the file, from 1."""
     rows: tuple[tuple[str, ...], ...]
+    remarks: tuple[str, ...] = ()
+    """Changes of its text, a sentence each."""
 
     def fault(self, line: int, head: str, cell: str, problem: str, allowed: str = "") -> Fault:
         """Error of a cell."""
@@ -135,7 +142,7 @@ def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
         return "", (data_fault(file, "", problem),)
     problem, at = "", -1
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
         if "\0" in text:
             problem, at = "this is not text but binary data", content.index(b"\0")
     except UnicodeDecodeError as error:
@@ -185,6 +192,15 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTabl
     while len(names) > 1 and not names[-1]:
         names.pop()
     rows, bad_rows = _rows(data[1:], len(names), separator, file)
+    written = rows
+    rows = rows if separator == "," else _with_points(rows)
+    remarks = [] if rows == written else ["commas in numbers are decimal"]
+    names = [re.sub(r" ?\(([^[]+)\)$", r" [\1]", name) for name in names]
+    first = next(iter(rows), 0)
+    if len(rows) > 1 and "[" not in "".join(names) and _are_units(rows[first]):
+        remarks.append(f"units stand in line {first}")
+        units = [cell.strip("[]()-") for cell in rows.pop(first)]
+        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
     # Spreadsheets capitalise names; in units capitals have a meaning.
     parts = [name.partition("[") for name in names]
     table = CsvTable(
@@ -194,6 +210,7 @@ def parse_table(text: str, *, file: str, most: int = MOST_ROWS) -> tuple[CsvTabl
         heads=tuple(name.lower() + bracket + unit for name, bracket, unit in parts),
         lines=tuple(rows),
         rows=tuple(rows.values()),
+        remarks=tuple(remarks),
     )
     return table, (*faults, *bad_rows)
 
@@ -223,6 +240,24 @@ def _rows(
         else:
             rows[at] = cells[:length]
     return rows, faults
+
+
+def _with_points(rows: dict[int, tuple[str, ...]]) -> dict[int, tuple[str, ...]]:
+    """Rows with decimal points for commas, where no cell has a point and the commas part no thousands."""
+    commas = [cell for row in rows.values() for cell in row if _DECIMAL_COMMA.fullmatch(cell)]
+    points = any(_POINT.fullmatch(cell) for row in rows.values() for cell in row)
+    if points or all(_THOUSANDS.fullmatch(cell) for cell in commas):
+        return rows
+    return {
+        at: tuple(_DECIMAL_COMMA.sub(r"\1.\2", c) if _DECIMAL_COMMA.fullmatch(c) else c for c in row)
+        for at, row in rows.items()
+    }
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """True for a row of units below the names of columns."""
+    units = [cell.strip("[]()-").split(" ")[0] for cell in cells]
+    return any(units) and all(unit in ("", _NO_UNIT, "g") or dimension_of(unit) for unit in units)
 
 
 def _unmarked(line: str) -> str:

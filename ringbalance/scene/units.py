@@ -162,7 +162,8 @@ def _parsed(text: str, dimension: str) -> float:
     number, unit_text = _split(text, kind)
     unit = kind.units.get(_canonical(unit_text))
     if unit is None:
-        raise FieldError(_wrong_unit(unit_text, kind), _allowed(kind))
+        hint = _STATED_FLOWS if kind is DIMENSIONS["conductance"] and unit_text else ""
+        raise FieldError(f"{_wrong_unit(unit_text, kind)}{hint}", _allowed(kind))
     # The double is looked at first: an exponent of a thousand million must not reach the exact arithmetic.
     rough = float(number)
     scale = float(unit.factor) * (math.pi if unit.pi else 1.0)
@@ -320,15 +321,10 @@ def _wrong_unit(unit_text: str, kind: _Dimension) -> str:
         return f'"{unit}" is a unit of dynamic viscosity; divide by the density'
     for other in DIMENSIONS.values():
         if unit in other.units:
-            hint = _STATED_FLOWS if kind is DIMENSIONS["conductance"] else ""
-            return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}{hint}'
+            return f'"{unit}" is a unit of {other.noun}, not of {kind.noun}'
     problem = f"{toml_text(unit)} is not a unit of {kind.noun}"
-    if kind in (DIMENSIONS["conductance"], DIMENSIONS["flow_rate"]) and (
-        normal := _NORMAL_LITRES.fullmatch(unit)
-    ):
-        hint = _STATED_FLOWS if kind is DIMENSIONS["conductance"] else ""
-        counted = f"it counts gas at 0 degC and 101.325 kPa; 1 N{normal[1]} is 1.087 {normal[1]} ANR"
-        return f"{problem}: {counted}{hint}"
+    if kind.name.endswith(("6358)", "flow")) and (normal := _NORMAL_LITRES.fullmatch(unit)):
+        return f"{problem}: it counts gas at 0 degC and 101.325 kPa; 1 N{normal[1]} is 1.087 {normal[1]} ANR"
     # One letter more or less is another unit: only a unit with the same letters and digits is suggested.
     alike = (each for each in kind.units if _letters(each) == _letters(unit))
     return f"{problem}{meant_text(next(alike, ''))}"

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from ringbalance.scene.keys.declaration import needed, unused
 from ringbalance.scene.keys.fields import POSITIVE, OneLine, ProperFraction, Time, number, quantity
@@ -22,17 +22,6 @@ _NOMINAL_PRESSURES_PA: Final = (7e5, 6e5)
 _NORMAL_TO_ANR: Final = 101.325 / 100 * 293.15 / 273.15
 """Volume of gas at 100 kPa and 20 degC, as ISO 6358 counts it, over that at 101.325 kPa and 0 degC."""
 _KV_PER_CV: Final = 0.865
-_COLUMNS: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "conductance": ("conductance", "l/(s*bar)"),
-        "nominal_flow": ("flow_rate", "l/min"),
-        "valve_lag": ("time", "ms"),
-        "lowest_pressure": ("pressure", "bar"),
-        "highest_pressure": ("pressure", "bar"),
-        **dict.fromkeys(("Kv", "Cv", "critical_ratio"), ("", "")),
-    }
-)
-"""Dimension and unit of each column of numbers of the catalogue."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,12 +79,12 @@ class Valve:
 @cache
 def known_valves() -> Mapping[str, Valve]:
     """Valves of the catalogue, by name."""
+    dimensions = {"conductance": "conductance", "nominal_flow": "flow_rate", "valve_lag": "time"}
+    dimensions |= dict.fromkeys(("lowest_pressure", "highest_pressure"), "pressure")
     valves = {}
     for row in packaged_rows("ringbalance.scene", "data", "valves.csv"):
-        values: dict[str, Any] = {}
-        for column, (dimension, unit) in _COLUMNS.items():
-            if cell := row.get(column):
-                values[column] = parse_quantity(f"{cell} {unit}", dimension) if unit else float(cell)
+        values = {key: parse_quantity(row[key], name) for key, name in dimensions.items() if row[key]}
+        values |= {key: float(row[key]) for key in ("critical_ratio", "Cv") if row[key]}
         source = ", ".join(filter(None, (row["source"], row["date"])))
         valves[row["name"]] = Valve(name=row["name"], source=source, **values)
     return MappingProxyType(valves)

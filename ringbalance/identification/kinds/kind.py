@@ -100,6 +100,8 @@ class Observations:
     """Letter of the driven chamber; empty if the kind has none."""
     columns: Mapping[str, FloatArray]
     """Values by name, SI; amplitudes zero to peak. Optional columns that the file lacks are absent."""
+    remarks: tuple[str, ...] = ()
+    """Changes of the file's columns, a sentence each."""
     uncertainty: Mapping[str, FloatArray]
     """Expanded uncertainty (95 %), absolute, SI, by measured column; noise of absent columns is estimated."""
 

@@ -22,7 +22,9 @@ def with_valve(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
     stated = [key for key in (*FLOWS, "valve") if not reading.lacks(f"gas.{key}")]
     if len(stated) > 1:
         problem = f"{stated[0]} states the flow of the valve already"
-        fault = reading.fault(f"gas.{stated[1]}", problem=problem, allowed=f"one of {_any_flow()}")
+        fault = reading.fault(
+            f"gas.{stated[1]}", problem=problem, allowed=f"one of {', '.join(FLOWS)}, valve"
+        )
         return reading, (fault, *at_hand)
     if not stated or not reading.known(f"gas.{stated[0]}") or "gas.critical_ratio" in reading.broken:
         return reading, at_hand
@@ -47,10 +49,6 @@ def with_valve(reading: SceneReading) -> tuple[SceneReading, tuple[Fault, ...]]:
         reading = reading.adding({"gas.critical_ratio": values.pop("gas.critical_ratio")})
     text += _remarks(reading, valve)
     return reading.converting({**values, "gas.valve_source": text}), at_hand
-
-
-def _any_flow() -> str:
-    return f"{', '.join(FLOWS)}, valve"
 
 
 def _remarks(reading: SceneReading, valve: Valve) -> str:

@@ -108,7 +108,7 @@ _OPTIONS: Final = {
     "rotor": ShellOption(Literal["first", "second"] | None),
     "seed": ShellOption(int | None, limits=_SEEDS),
     "remedies": ShellOption(bool | None, parsing={"negative": "--no-remedies"}),
-    "to": ShellOption(Literal["c", "st", "csv", "python", "fmi2", "fmi3"], REQUIRED),
+    "to": ShellOption(Literal["c", "st", "csv", "python", "js", "fmi2", "fmi3"], REQUIRED),
     "block": ShellOption(Literal["law", "disc", "controller"], "law"),
     "name": ShellOption(str, ""),
     "points": ShellOption(int | None, limits=_GRID),
@@ -182,11 +182,11 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         begin="runs ...",
     ),
     "export": ShellCommand(
-        """Flow law, disc or controller for another program: C, FMI, structured text, Python, a table.
+        """Law, disc or controller for another program: C, FMI, structured text, Python, a web page, a table.
 
         Args:
             to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
-                text), python (a module without dependencies), or csv (a grid).
+                text), python or js (a module without dependencies), or csv (a grid).
             block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
                 and the rotor's vibration), or controller (the scene's algorithm with its settings).
             out: folder for the files.

@@ -10,7 +10,7 @@ from ringbalance.export.blocks import controller_block, disc_block, law_block
 from ringbalance.export.compact import CompactLaw, compact_law
 from ringbalance.export.fmu import fmu_bytes
 from ringbalance.export.grid import csv_files
-from ringbalance.export.hosts import c_files, identifier, python_files, st_files
+from ringbalance.export.hosts import c_files, identifier, js_files, python_files, st_files
 from ringbalance.export.libraries import EXTRA
 from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model.calibration import chamber_and_law
@@ -73,7 +73,8 @@ def export(options: SimpleNamespace) -> int:
                     print_message("no C compiler here: the unit holds its source alone")
             files = {f"{called}.fmu": unit}
         else:
-            texts = {"c": c_files, "st": st_files, "python": python_files}[options.to](block, called)
+            writers = {"c": c_files, "st": st_files, "python": python_files, "js": js_files}
+            texts = writers[options.to](block, called)
             files = {file: text.encode() for file, text in texts.items()}
         for file, content in files.items():
             (folder / file).write_bytes(content)

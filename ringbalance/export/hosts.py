@@ -16,6 +16,7 @@ from ringbalance.export.translate import (
     PER_PIECE,
     c_functions,
     exact_text,
+    js_functions,
     number_text,
     python_functions,
     st_functions,
@@ -126,16 +127,52 @@ def python_files(block: Block, name: str) -> dict[str, str]:
     return {f"{name}.py": text}
 
 
+def js_files(block: Block, name: str) -> dict[str, str]:
+    """A module of ES2020 that imports nothing; `name`: of the file.
+
+    It exports `NUMBERS`, an object of the typed arrays `constants`, `cells`, `pieces`, `levels` and `start`
+    (without tables the first and the last). For a disc or a controller it also has `INPUTS` and `OUTPUTS`,
+    the index in the row by name, and `Block`: `new Block(numbers = NUMBERS)` has the row `w`, `advance(time)`
+    and `step(time, inputs)`, which returns the outputs by name. For a law it also exports `flow`, and the
+    functions of one chamber, which take the arrays.
+    """
+    return {f"{name}.mjs": f"{_js_body(block)}\nexport {{ {_js_exports(block)} }};\n"}
+
+
+def js_expression(block: Block) -> str:
+    """The module as an expression of JavaScript: an object of its exports, for pages with several blocks."""
+    return f"(() => {{\n{_js_body(block)}\nreturn {{ {_js_exports(block)} }};\n}})()"
+
+
+def _js_exports(block: Block) -> str:
+    of_kind = ("flow", *_CHAMBER_FUNCTIONS) if block.kind == "law" else ("Block", "INPUTS", "OUTPUTS")
+    return ", ".join(("NUMBERS", *of_kind))
+
+
+def _js_body(block: Block) -> str:
+    law = block.kind == "law"
+    source = js_functions(block.source(("answer", *_CHAMBER_FUNCTIONS) if law else ()))
+    head = filled("head_js", block, "", source=source)
+    if law:
+        return filled("js", block, "", head=head)
+    inputs, outputs = (
+        "\n".join(f"    {v.name}: {v.index}, // {v.explained}" for v in side) for side in _sides(block)
+    )
+    arrays = f"n.constants, {'n.cells, n.pieces, n.levels, ' if block.tables else ''}this.w"
+    run = f"{block.steps}({arrays}, time);"
+    return filled("block_js", block, "", head=head, inputs=inputs, outputs=outputs, run=run, kind=block.kind)
+
+
 _C_TABLES: Final = "CONSTANTS, CELL_ROWS, PIECES, LEVELS"
-_TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text}
+_TEXT: Final = {"c": exact_text, "st": number_text, "python": number_text, "js": number_text}
 """Writer of a number by language; C's hexadecimal numbers are short and leave nothing to round."""
 _NUMBERS: Final = {
-    "Cells": {"c": "unsigned char", "st": "USINT", "st_name": "k"},
-    "Pieces": {"c": "float", "st": "REAL", "st_name": "p"},
-    "Levels": {"c": "double", "st": "LREAL", "st_name": "q"},
+    "Cells": {"c": "unsigned char", "st": "USINT", "st_name": "k", "js": "cells: new Uint8Array"},
+    "Pieces": {"c": "float", "st": "REAL", "st_name": "p", "js": "pieces: new Float32Array"},
+    "Levels": {"c": "double", "st": "LREAL", "st_name": "q", "js": "levels: new Float64Array"},
 }
 """Types and names of the numbers in a law's tables, by their types in `translate`."""
-_ROW: Final = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})"}
+_ROW: Final = {"c": "    {{{}}}", "st": "    {}", "python": "    ({})", "js": "    {}"}
 
 
 def _st_array(kind: str, rows: Sequence[Any]) -> str:
@@ -151,7 +188,7 @@ def _declared(block: Block, language: str) -> Iterator[str]:
         if kind == "Cells":
             text, width = _lines([str(row) for row in rows], per_line=20), ""
         else:
-            if (kind, language) == ("Pieces", "st"):
+            if kind == "Pieces" and language in ("st", "js"):
                 # The shortest decimals that are these numbers in single precision.
                 rows = [[float(str(np.float32(value))) for value in row] for row in rows]
             texts = (", ".join(map(_TEXT[language], row)) for row in rows)
@@ -163,6 +200,8 @@ def _declared(block: Block, language: str) -> Iterator[str]:
         elif language == "st":
             name = _NUMBERS[kind]["st_name"]
             yield f"    {name} : ARRAY{_st_array(kind, rows)} := [\n{text}\n    ];\n"
+        elif language == "js":
+            yield f"    {_NUMBERS[kind]['js']}([\n{text}\n    ]),\n"
         else:
             yield f"{name} = (\n{text},\n)\n"
 
@@ -175,12 +214,12 @@ def template(name: str) -> str:
 def filled(frame: str, block: Block, name: str, **parts: str) -> str:
     """Template filled with a block. Args: `parts`: further substitutions of that template."""
     text = template(frame)
-    language = next((each for each in ("st", "python") if frame.endswith(each)), "c")
+    language = next((each for each in ("st", "python", "js") if frame.endswith(each)), "c")
     written = _TEXT[language]
     most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
         title=f"{block.title}, made by ringbalance from {plain_name(block.scene)}.",
-        facts=block.facts,
+        facts=block.facts.replace("\n   ", "\n * ") if language == "js" else block.facts,
         name=name,
         upper=name.upper(),
         range=RANGE,

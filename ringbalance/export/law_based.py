@@ -90,7 +90,7 @@ RESTS, SAMPLES, WAIT, OPENED, FLOW_PRIMED, FIRST_CHAMBER = 0, 1, 2, 3, 4, 5
 # fmt: on
 
 HALVINGS, PARTS, GAUSS, END_STEP = 60, 64.0, 0.28867513459481287, 1e-3
-SHORTEST_PART, SLOWEST_FALL = 1e-9, 1e-12
+SHORTEST_PART, LEAST_FALL, SLOWEST_FALL = 1e-9, 1e-15, 1e-12
 
 
 def settings(c: Law) -> int:
@@ -191,7 +191,10 @@ def flow_time(
     end = larger(target, larger(0.0, c[d + TOTAL] - c[LARGEST_FILL]))
     x = fill
     part = larger(fill - end, 0.0) / PARTS
-    least = part * SHORTEST_PART
+    # A shorter part would leave the fill as it is, and the loop without an end.
+    least = larger(part * SHORTEST_PART, LEAST_FALL)
+    if part <= LEAST_FALL:
+        x = end
     time = 0.0
     while x > end and part > least and time < longest:
         primed = w[r + FLOW_PRIMED]

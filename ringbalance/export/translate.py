@@ -1,4 +1,4 @@
-"""Write functions of numbers in C99 and in structured text (IEC 61131-3), from their Python syntax tree.
+"""Write functions of numbers in C99, JavaScript and structured text (IEC 61131-3), from their syntax trees.
 
 Only what all languages evaluate alike is accepted: +, -, *, /, sqrt, comparisons, `if`, `while`, whole
 numbers that divide without remainder or towards zero, and rows of numbers.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import ModuleType
 from typing import Final
 
@@ -127,6 +127,10 @@ class Language:
     """Signs of comparisons and of `and`, `or`, `not`."""
     to_whole: str
     to_number: str
+    whole_quotient: str
+    """Format of the quotient of two whole numbers, from dividend and divisor."""
+    root: str
+    """Format of a square root."""
     truths: tuple[str, str]
     """False and true."""
     variable: str
@@ -141,6 +145,10 @@ class Language:
     close_if: str
     open_while: str
     close_while: str
+    returned: Sequence[str]
+    """Lines that end a function, from its name and its result."""
+    ended: str
+    """Line that ends a function without a result."""
     element: Mapping[str, str]
     """Format of an element of an array, by type of the array, from its name and indices."""
 
@@ -170,6 +178,8 @@ C99: Final = Language(
     },
     to_whole="(int)({})",
     to_number="(double)({})",
+    whole_quotient="{} / {}",
+    root="sqrt({})",
     truths=("0", "1"),
     variable="{}",
     function="{}",
@@ -181,12 +191,43 @@ C99: Final = Language(
     close_if="}",
     open_while="while ({}) {{",
     close_while="}",
+    returned=("return {1};",),
+    ended="return;",
     element={
         LAW: "{}[{}]",
         QUERY: "{}[{}]",
         CELLS: "{}[{}]",
         PIECES: "(double){}[{}][{}]",
         LEVELS: "{}[{}][{}]",
+    },
+)
+JAVASCRIPT: Final = replace(
+    C99,
+    types={
+        NUMBER: "{{number}} {}",
+        WHOLE: "{{number}} {}",
+        TRUTH: "{{boolean}} {}",
+        NOTHING: "{{void}} {}",
+        LAW: "{{Float64Array}} {}",
+        CELLS: "{{Uint8Array}} {}",
+        PIECES: "{{Float32Array}} {}",
+        LEVELS: "{{Float64Array}} {}",
+        QUERY: "{{Float64Array}} {}",
+    },
+    operators={**C99.operators, ast.Eq: "===", ast.NotEq: "!=="},
+    # All numbers are doubles: `| 0` cuts off the part behind the point, and the sign of a zero.
+    to_whole="(({}) | 0)",
+    to_number="{}",
+    whole_quotient="({} / {}) | 0",
+    root="Math.sqrt({})",
+    truths=("false", "true"),
+    # Rows of a table follow one another in one array.
+    element={
+        LAW: "{}[{}]",
+        QUERY: "{}[{}]",
+        CELLS: "{}[{}]",
+        PIECES: f"{{}}[{PER_PIECE} * ({{}}) + {{}}]",
+        LEVELS: f"{{}}[{PER_PIECE} * ({{}}) + {{}}]",
     },
 )
 
@@ -208,6 +249,8 @@ def structured_text(prefix: str) -> Language:
         },
         to_whole="TRUNC({})",
         to_number="DINT_TO_LREAL({})",
+        whole_quotient="{} / {}",
+        root="SQRT({})",
         truths=("FALSE", "TRUE"),
         variable="v_{}",
         function=prefix + "_{}",
@@ -219,6 +262,8 @@ def structured_text(prefix: str) -> Language:
         close_if="END_IF;",
         open_while="WHILE {} DO",
         close_while="END_WHILE;",
+        returned=(f"{prefix}_{{0}} := {{1}};", "RETURN;"),
+        ended="RETURN;",
         element={
             LAW: "{}[{}]",
             QUERY: "{}[{}]",
@@ -264,8 +309,12 @@ class Writer:
                     yield self.language.open_while.format(self._typed(test, TRUTH))
                     yield from self._inner(inner)
                     yield self.language.close_while
-                case ast.Return(value=value):
-                    yield from self._return(value)
+                case ast.Return(value=None):
+                    yield self.language.ended
+                case ast.Return(value=ast.expr() as value):
+                    text = self._typed(value, self.function.result)
+                    for line in self.language.returned:
+                        yield line.format(self.function.name, text)
                 case ast.Expr(value=ast.Call() as call) if self._expression(call)[1] == NOTHING:
                     yield f"{self._expression(call)[0]};"
                 case _:
@@ -287,15 +336,6 @@ class Writer:
                 yield self.language.otherwise
                 yield from self._inner(orelse)
         yield self.language.close_if
-
-    def _return(self, value: ast.expr | None) -> Iterator[str]:
-        text = self._typed(value, self.function.result) if value is not None else ""
-        if self.language is C99:
-            yield f"return {text};" if text else "return;"
-            return
-        if text:
-            yield self.language.assign.format(self.language.function.format(self.function.name), text)
-        yield "RETURN;"
 
     def _typed(self, node: ast.expr, kind: str) -> str:
         text, actual = self._expression(node)
@@ -338,8 +378,10 @@ class Writer:
                 if isinstance(operator, _NOT_OF.get(kind, ast.operator)):
                     raise self._refused(left)
                 # Every operation has its own brackets, so that operator precedence does not matter.
-                sign = _BINARY[type(operator)]
-                return f"{self._operand(left, kind)} {sign} {self._operand(right, kind)}", kind
+                operands = self._operand(left, kind), self._operand(right, kind)
+                if kind == WHOLE and isinstance(operator, ast.FloorDiv):
+                    return self.language.whole_quotient.format(*operands), kind
+                return f" {_BINARY[type(operator)]} ".join(operands), kind
             case ast.Compare(left=left, ops=[comparison], comparators=[right]):
                 kind = self._expression(left)[1]
                 sign = signs[type(comparison)]
@@ -364,8 +406,7 @@ class Writer:
 
     def _call(self, node: ast.expr, name: str, arguments: Sequence[ast.expr]) -> tuple[str, str]:
         if name == "sqrt" and len(arguments) == 1:
-            root = "sqrt({})" if self.language is C99 else "SQRT({})"
-            return root.format(self._typed(arguments[0], NUMBER)), NUMBER
+            return self.language.root.format(self._typed(arguments[0], NUMBER)), NUMBER
         if name == "int":
             text, kind = self._expression(arguments[0])
             if kind == WHOLE:
@@ -424,6 +465,29 @@ def c_functions(source: Source) -> str:
         body = "".join(f"    {line}\n" for line in [*variables, *lines])
         head = "static " + C99.types[function.result].format(f"{function.name}({', '.join(arguments)})")
         parts.append(f"\n/* {function.summary} */\n{head}\n{{\n{body}}}\n")
+    return "".join(parts)
+
+
+def js_functions(source: Source) -> str:
+    """Constants and functions of a source in JavaScript (ES2020), with types for JSDoc."""
+    parts = [
+        f"const {name} = {value if isinstance(value, int) else number_text(value)};\n"
+        for name, value in source.constants.items()
+    ]
+    for function in source.functions.values():
+        writer = Writer(language=JAVASCRIPT, source=source, function=function)
+        lines = writer.lines()
+        types = [
+            f" * @param {JAVASCRIPT.types[kind].format(name)}\n" for name, kind in function.arguments.items()
+        ]
+        types.append(f" * @returns {JAVASCRIPT.types[function.result].format('').strip()}\n")
+        variables = [
+            f"let {name} = {JAVASCRIPT.truths[0] if kind == TRUTH else 0};"
+            for name, kind in writer.local_variables().items()
+        ]
+        body = "".join(f"    {line}\n" for line in [*variables, *lines])
+        parts.append(f"\n/**\n * {function.summary}\n{''.join(types)} */\n")
+        parts.append(f"function {function.name}({', '.join(function.arguments)}) {{\n{body}}}\n")
     return "".join(parts)
 
 

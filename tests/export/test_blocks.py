@@ -16,7 +16,7 @@ from c_warnings import WARNINGS
 
 import ringbalance as rb
 from ringbalance.controller.simulation import Simulation
-from ringbalance.export import disc
+from ringbalance.export import disc, law_based
 from ringbalance.export.blocks import Block, controller_block, disc_block
 from ringbalance.export.hosts import c_files, python_files, st_files
 from ringbalance.export.reference import reference_files
@@ -159,6 +159,17 @@ def test_the_controller_passes_over_what_is_no_number_and_forgets_nothing(blocks
     module = block.modules[-1]
     openings = {each.index for each in block.variables if each.name.startswith("open_time")}
     assert changed <= {module.SAMPLES, module.WAIT, module.SINCE, *openings}
+
+
+@pytest.mark.parametrize("fall", [9e-16, 1e-7])
+def test_a_fall_that_a_fill_hardly_resolves_has_an_end(blocks: dict[str, Block], fall: float) -> None:
+    """Parts of the first are below the last bit of the fill; those of the second at a stall."""
+    block, fill = blocks["law_based"], 0.4662590784001067
+    row = list(block.start)
+    assert block.tables is not None
+    row[law_based.host_row(block.constants) + law_based.FLOW_PRIMED] = 1.0
+    numbers = (block.constants, *block.tables, row)
+    assert 0.0 <= law_based.flow_time(*numbers, fill, fill - fall, 5.0) < 1e-4
 
 
 def test_a_gas_line_too_fast_for_a_hosts_steps_is_refused() -> None:

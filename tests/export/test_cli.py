@@ -18,6 +18,7 @@ OIL = str(rb.bundled_scene("silicone_oil_100cst"))
         ("c", ["a.c", "a.h"]),
         ("st", ["a.st"]),
         ("python", ["a.py"]),
+        ("js", ["a.mjs"]),
         ("csv", ["a.csv"]),
         ("fmi2", ["a.fmu"]),
         ("fmi3", ["a.fmu"]),

@@ -18,7 +18,7 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.export.blocks import Block, Kind
 from ringbalance.export.fmu import fmu_bytes
-from ringbalance.export.hosts import c_files, python_files, st_files
+from ringbalance.export.hosts import c_files, js_files, python_files, st_files
 
 PAGES = Path(__file__).resolve().parents[2] / "docs"
 FENCE = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
@@ -73,6 +73,19 @@ def test_the_page_on_python(
     assert capsys.readouterr().out.splitlines()[-1] == "True A True True"
     assert names["there"].rotor.influence == pytest.approx(names["table"].at(names["there"].rotor.speed))
     assert names["pair"][0] == names["spread"][0] == names["row"].value
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no Node")
+def test_the_page_on_javascript(tmp_path: Path, paper_blocks: dict[str, Block]) -> None:
+    for name, kind in NAMES.items():
+        for file, content in js_files(paper_blocks[kind], name).items():
+            (tmp_path / file).write_text(content)
+    (example,) = examples("host-javascript.md", "js")
+    (tmp_path / "main.mjs").write_text(example)
+    told = subprocess.run(
+        ["node", "main.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
+    assert re.fullmatch(r"\d+\.\d{3} [12] \d+ 1\n", told)
 
 
 @pytest.mark.parametrize("page", ["host-simulink.md", "host-openmodelica.md"])

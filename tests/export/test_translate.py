@@ -8,7 +8,14 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from ringbalance.export.translate import Source, c_functions, exact_text, number_text, st_functions
+from ringbalance.export.translate import (
+    Source,
+    c_functions,
+    exact_text,
+    js_functions,
+    number_text,
+    st_functions,
+)
 
 HEAD = "N, X = 2, 0.5\n\ndef f(c: Law, a: float, n: int) -> float:\n"
 
@@ -38,9 +45,12 @@ def test_what_is_not_of_the_subset_is_refused(line: str) -> None:
         c_functions(Source.of_text(f"{HEAD}    {line}\n"))
 
 
-def test_both_languages_have_the_same_statements() -> None:
+def test_all_languages_have_the_same_statements() -> None:
     source = Source.of_text(f"{HEAD}    if not a > X:\n        return c[N + n // 2]\n    return -a\n")
     assert "if (!(a > X)) {\n        return c[N + (n / 2)];\n    }\n    return -a;" in c_functions(source)
+    assert "if (!(a > X)) {\n        return c[N + ((n / 2) | 0)];\n    }\n    return -a;" in js_functions(
+        source
+    )
     text = st_functions(source, prefix="p", sizes={"Law": "0..3"})
     assert "IF NOT (v_a > 0.5) THEN\n    p_f := v_c[2 + (v_n / 2)];\n    RETURN;\nEND_IF;" in text
 

@@ -35,7 +35,16 @@ def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
 
 
 def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs: bool = False) -> float:
-    """Fill ratio at which an injection moves no liquid any more; total/2 where it moves none at equal fills.
+    """Fill ratio at which an injection moves no liquid any more, of one pair: see `stalled_fill_ratios`."""
+    totals = np.array([total])
+    return float(stalled_fill_ratios(law=law, totals=totals, gas_pressure=gas_pressure, runs=runs)[0])
+
+
+def stalled_fill_ratios(
+    *, law: FlowLaw, totals: FloatArray, gas_pressure: float, runs: bool = False
+) -> FloatArray:
+    """Fill ratios at which an injection moves no liquid any more, for pairs with totals of shape (n,); half
+    of the total where it moves none at equal fills.
 
     An injection starts with the liquid that the tube holds while the gas is off. Without a column over the
     crest the limit is p_gas = rho omega^2 (a^2 - r_m^2)/2 with vented gas; for a full siphon it is that of
@@ -44,8 +53,8 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs:
     Args: `runs`: true for the fill that such a long injection reaches.
     """
 
-    def moves(_: IntArray, fills: FloatArray) -> BoolArray:
-        opposite = total - fills
+    def moves(rows: IntArray, fills: FloatArray) -> BoolArray:
+        opposite = totals[rows] - fills
         rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
         flow = law.evaluate(
             fill_ratio=fills,
@@ -55,10 +64,10 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float, runs:
         )
         return flow.velocity > 0
 
-    lowest = max(0.0, total - law.max_fill_ratio)
-    end = np.array([max(lowest, NEARLY_EMPTY * total)])
-    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end, points=_SCAN_POINTS)[0])
-    return lowest if math.isnan(stalled) else stalled
+    lowest = np.maximum(0.0, totals - law.max_fill_ratio)
+    end = np.maximum(lowest, NEARLY_EMPTY * totals)
+    stalled = first_stalled(moves, start=totals / 2, end=end, points=_SCAN_POINTS)
+    return np.where(np.isnan(stalled), lowest, stalled)
 
 
 @dataclass(frozen=True, kw_only=True)

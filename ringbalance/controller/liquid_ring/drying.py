@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
 from typing import Final, NamedTuple
 
+import numpy as np
+
+from ringbalance.controller.liquid_ring.plant import corners_of, largest_pair_moments, unreachable_moment
 from ringbalance.controller.simulation import GasUse, Simulation
 from ringbalance.physics.evaporation import carried_off
+from ringbalance.physics.gas import normal_volume
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import stalled_fill_ratios
+from ringbalance.scene.models import Scene
 
 _HOUR_S: Final = 3600.0
-_HALVINGS: Final = 20
-"""Halvings of the part of the liquid that may be lost: 1e-6 of it."""
+_DIVISIONS: Final = 32
+_ROUNDS: Final = 4
+"""Rounds that each divide the part of the liquid that may be lost: to 32^-4, 1e-6 of it."""
 
 
 class Drying(NamedTuple):
@@ -30,22 +38,39 @@ def drying(run: Simulation, held: GasUse | None, *, span: float) -> Drying:
     if each is None or held is None:
         return Drying()
     per_hour = each * (held.normal_volume - held.leaked) / span * _HOUR_S
-    volume = run.plant.total * run.model.chamber_volume * run.scene.disc.chambers / 2
-    part = per_hour / (run.scene.liquid.density * volume)
+    part = per_hour / _liquid(run.scene, run.model)
     return Drying(per_hour, part, _spare_part(run) / part * _HOUR_S if part > 0 else None)
+
+
+def part_per_gas(scene: Scene, model: BalancerModel) -> float:
+    """Part of all liquid that gas carries off at most, over the p V (Pa m^3) of the gas let off; NaN: not
+    known, or the scene states no humidity."""
+    each = None if scene.gas.relative_humidity is None else carried_off(scene)
+    if each is None:
+        return math.nan
+    volume = normal_volume(pressure_volume=1.0, temperature=scene.gas.temperature)
+    return each * volume / _liquid(scene, model)
+
+
+def _liquid(scene: Scene, model: BalancerModel) -> float:
+    """Mass of all liquid of the disc, kg."""
+    volume = 2 * scene.disc.initial_fill * model.chamber_volume * scene.disc.chambers / 2
+    return scene.liquid.density * volume
 
 
 def _spare_part(run: Simulation) -> float:
     """Largest part of its liquid without which the disc cancels the initial unbalance to the limit."""
-
-    def cancels(lost: float) -> bool:
-        plant = replace(run.plant, total=(1.0 - lost) * run.plant.total)
-        return plant.unreachable_vibration(rotor=run.scene.rotor_as_read) <= run.limit
-
-    low, high = 0.0, 1.0
-    if not cancels(low):
-        return 0.0
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if cancels(middle) else (low, middle)
+    plant, rotor, low, width = run.plant, run.scene.rotor_as_read, 0.0, 1.0
+    required = np.asarray(-rotor.initial_unbalance)
+    for _ in range(_ROUNDS):
+        width /= _DIVISIONS
+        totals = (1.0 - (low + width * np.arange(_DIVISIONS, dtype=np.float64))) * plant.total
+        stalled = stalled_fill_ratios(law=plant.model.flow, totals=totals, gas_pressure=plant.gas_pressure)
+        least = np.minimum(np.maximum(plant.residual_fill, stalled), totals / 2)
+        moments = largest_pair_moments(plant.model, total=totals, least_fill=least)
+        left = unreachable_moment(corners_of(moments, plant.chambers), required)
+        cancels = np.append(left * rotor.influence_coefficient <= run.limit, False)
+        if not cancels[0]:
+            return 0.0
+        low += width * (int(np.argmin(cancels)) - 1)
     return low

@@ -83,7 +83,9 @@ class LiquidRing:
         return float(moment_towards(corners, np.asarray(direction / abs(direction) if direction else 1.0)))
 
 
-def largest_pair_moments(model: BalancerModel, *, total: float, least_fill: FloatArray) -> ComplexArray:
+def largest_pair_moments(
+    model: BalancerModel, *, total: float | FloatArray, least_fill: FloatArray
+) -> ComplexArray:
     """Moments of a pair whose usable liquid is moved to one side, along and across, kg m.
 
     Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.

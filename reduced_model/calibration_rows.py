@@ -67,6 +67,9 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
         yield calibration.instability.finding
     if scene.disc.gas_hole_direction in ("axial", "inward"):
         yield Finding(code="gas_jet_bound", values={"direction": scene.disc.gas_hole_direction})
+    blown = calibration.quantities.get("blowing_number")
+    if blown is not None and (blown.value or 0.0) > 1.0:
+        yield Finding(code="gas_jet_droplets", values={"number": blown.value})
     yield from _direction(calibration)
     if not scene.uncertainty:
         yield Finding(code="uncertainty_unstated")

@@ -22,6 +22,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
 from ringbalance.controller.loop import simulate
+from ringbalance.physics.evaporation import exhaust_cold
 from ringbalance.physics.gas import applied_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.documents import calibration_document
@@ -159,6 +160,9 @@ def _ring_study(scene: Scene) -> Record:
         law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
         for law in (calibration.flow_law, calibration.paper_law)
     )
+    runs = {name: simulate(scene, model).to_dict() for name, model in models.items()}
+    hourly = next(row["value"] for row in runs["calibrated"]["conventions"] if row["key"] == "gas_per_hour")
+    cold = exhaust_cold(scene, gas_per_hour=hourly) if hourly else None
     return {
         "limit_m": scene.controller.limit,
         "paper": {
@@ -183,7 +187,8 @@ def _ring_study(scene: Scene) -> Record:
             "regime": [[Regime(int(value)).label for value in row] for row in calibrated.regime],
             "velocity_paper_m_s": printed.velocity.tolist(),
         },
-        "closed_loop": {name: simulate(scene, model).to_dict() for name, model in models.items()},
+        "closed_loop": runs,
+        "exhaust_cold": cold and cold._asdict(),
     }
 
 

@@ -64,6 +64,7 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
         "recommended": recommended,
         "moved": moved,
         "capacity": [each.document() for each in tuning.capacity],
+        **({"endurance": tuning.endurance.document()} if tuning.endurance else {}),
         **({"runout": [each.document() for each in tuning.runout]} if tuning.runout else {}),
         **{name: document[name] for name in ("along", "ranking", "remedies")},
         "measures": [each.document() for each in measures],

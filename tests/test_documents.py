@@ -11,6 +11,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pytest
 
 import ringbalance as rb
@@ -19,6 +20,7 @@ from ringbalance.controller.balancer import Draws
 from ringbalance.controller.judging import remedies as remedies_module
 from ringbalance.controller.judging import search as search_module
 from ringbalance.controller.judging import tune as tune_module
+from ringbalance.controller.judging.holding import Endurance
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -172,7 +174,10 @@ def few_devices() -> Iterator[None]:
 
 
 def test_keys_of_tune(folder: Path, printed: Any) -> None:
-    compare("`tune --json`", [printed("tune", folder / f"{name}.toml") for name in ("short", "line")])
+    documents = [printed("tune", folder / f"{name}.toml") for name in ("short", "line")]
+    one = {"rates": np.array([0.01]), "losses": np.zeros(1), "meets": np.ones((1, 1), dtype=np.bool_)}
+    held = Endurance(required_fraction=0.9, **one).document()
+    compare("`tune --json`", [*documents, documents[0] | {"endurance": held}])
 
 
 def test_keys_of_tune_of_eccentric_masses() -> None:

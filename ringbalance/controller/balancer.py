@@ -134,6 +134,8 @@ class RunResult:
     """Code of the finding on the end of the run."""
     crater: float = math.nan
     """Deepest crater of the gas jet at an injection, over the ring's depth there; NaN: no gas hole."""
+    lost: float = math.nan
+    """Part of its working liquid that the run has lost, at most; NaN: not known, or not required."""
     run: Any = None
     """The `Run`; None: it was not traced."""
     worst_amplitude: float = math.nan
@@ -164,6 +166,8 @@ class Outcomes:
     traced: tuple[RunResult, ...] = ()
     crater: FloatArray = field(default_factory=lambda: np.empty(0))
     """Crater of the gas jet, see `RunResult`; empty, or NaN, without a gas hole."""
+    lost: FloatArray = field(default_factory=lambda: np.empty(0))
+    """Part of the liquid that is lost, see `RunResult`; empty, or NaN, where it is not known."""
 
     @property
     def settled(self) -> BoolArray:
@@ -206,7 +210,7 @@ class Outcomes:
         )
 
 
-ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance", "crater")
+ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance", "crater", "lost")
 """Names of the arrays of `Outcomes`."""
 
 
@@ -351,6 +355,10 @@ class Balancer(ABC):
         table, _, key = name.split("[")[0].partition(".")
         declared = scene_kind(self.scene.balancer).schema.key_at((table, key))
         return DrawnInput(common=declared.common, measure=MEASURE_INPUT, path=name)
+
+    def after_loss(self, part: float) -> Self:  # noqa: ARG002
+        """This balancer without a part of its working liquid, of which its controller does not know."""
+        return self
 
     @abstractmethod
     def on_scene(self, scene: SceneFile) -> Self:

@@ -224,8 +224,9 @@ def keep_injections(
         moved = abs(fill - motion.fill_before) > NOTICEABLE_CHANGE
         filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
         leaked = plant.leak_to_ambient * run.asked[pair]
+        leaked *= motion.closing_pressure + plant.ambient_pressure
         run.gas += motion.closing_pressure * filled
-        run.gas += leaked * (motion.closing_pressure + plant.ambient_pressure)
+        run.gas, run.leaked = run.gas + leaked, run.leaked + leaked
         # Shorter injections do not count: noise keeps opening the other valve a little.
         if run.asked[pair] > longest:
             longest, working = run.asked[pair], moved

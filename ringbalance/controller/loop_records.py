@@ -111,7 +111,8 @@ _RUN_REALS: Final = (
     "before_amplitude",  # m
     "before_phase",  # law-based: rad
     "least_driven",  # least fill of a chamber whose valve opened; infinite where none did
-    "gas",  # p V above ambient that vented chambers have released, Pa m^3
+    "gas",  # p V above ambient that vented chambers have released, and that leaked to ambient, Pa m^3
+    "leaked",  # part of it that leaked, which passes no chamber
 )
 _RUN_INTEGERS: Final = (
     "loop",  # index of its settings

@@ -36,11 +36,12 @@ def design_rows(design: Design) -> Rows:
     """Rows of a design: its verdict, alternatives, and the effects of changes."""
     judgement = design.judgement
     tables = () if judgement is None else (_keys_table(design, judgement), required_table(judgement))
+    held = (design.endurance.table,) if design.endurance else ()
     return Rows(
         title=f"Design for {design.given.name} ({design.given.source})",
         quantities=tuple(_quantities(design)),
         findings=tuple(_findings(design)),
-        tables=(*tables, _effects_table(design), _front_table(design)),
+        tables=(*tables, _effects_table(design), _front_table(design), *held),
     )
 
 
@@ -94,6 +95,7 @@ def design_document(design: Design) -> dict[str, Any]:
             }
             for each in design.front
         ],
+        **({"endurance": design.endurance.document()} if design.endurance else {}),
         "ranking": design.ranking.document(),
         **design.rows().document(),
     }
@@ -133,6 +135,8 @@ def _findings(design: Design) -> Iterator[Finding]:
     if times["p50"] is not None:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
         yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+    if design.endurance is not None:
+        yield design.endurance.finding
     yield Finding(code="design_looked", values=counted)
     yield from _refusals(static.refusals, static.points)
     if design.succeeded:

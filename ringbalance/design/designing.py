@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import logit
 
 from ringbalance.controller.balancer import Draws, Settings, balancer_of
+from ringbalance.controller.judging.holding import Endurance, endurance
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, Judgement
 from ringbalance.controller.judging.ranking import Ranking, ranked
 from ringbalance.design.axes import Point
@@ -94,6 +95,8 @@ class Design(PresentedResult):
     """Alternative designs that should meet the requirements, Pareto-optimal in size, time and gas."""
     effects: tuple[Effect, ...]
     ranking: Ranking
+    endurance: Endurance | None
+    """Devices over the hours of holding; None: the loss of liquid is not known, or not required."""
 
     @property
     def succeeded(self) -> bool:
@@ -171,7 +174,7 @@ def run_design(
             # Half-width of the fraction, divided by its growth with the logarithm of the size.
             share, rise = best.race.judgement.fraction, growth(races, best)
             doubt = (share.high - share.low) / 2 / rise if rise > 0 else None
-    reach, smaller, ranking = None, None, Ranking()
+    reach, smaller, ranking, held = None, None, Ranking(), None
     if best is not None:
         reach = row_reach(static_rows(space.scene, [best.point], intervals=False)[0])
         below = [each for each in judged if each.size < best.size]
@@ -179,7 +182,8 @@ def run_design(
             next_smaller = max(below, key=lambda each: each.size)
             smaller = next_smaller.size, next_smaller.race.judgement.fraction
         if judgement is not None:
-            ranking = ranked(balancer_of(scene.with_values(best.point)), judgement)
+            designed = balancer_of(scene.with_values(best.point))
+            ranking, held = ranked(designed, judgement), endurance(designed, judgement, report_progress)
     return Design(
         presentation=presentation,
         given=scene,
@@ -195,6 +199,7 @@ def run_design(
         front=() if best is None else _front(races, required_fraction, best),
         effects=effects,
         ranking=ranking,
+        endurance=held,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import cast
 
@@ -9,7 +10,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.document import conventions
-from ringbalance.physics.evaporation import carried_off
+from ringbalance.physics.evaporation import carried_off, exhaust_cold
 from ringbalance.scene.models import Scene
 
 DENSITY = {0.0: 4.85e-3, 20.0: 17.3e-3, 40.0: 51.1e-3}
@@ -78,3 +79,35 @@ def test_holding_ends_where_the_liquid_that_is_left_no_longer_cancels_the_unbala
     calmer = rb.simulate(paper().with_values({"rotor.initial_vibration.amplitude": "9 um"}))
     longer = {row.key: row.value or 0.0 for row in conventions(calmer)}
     assert longer["liquid_part_per_hour"] * longer["holding_time"] / 3600.0 > lost + 0.03
+
+
+def test_cold_of_the_exhaust_is_bounded_by_first_law_and_drag() -> None:
+    """38.9 normal litres an hour: heat of gas let off at 20 degC by steps of a first-law balance, latent heat
+    of 2.45 MJ/kg, and the outer wall's coefficient by Reynolds' analogy with the measured drag of rotating
+    cylinders, 1/sqrt(C) = -0.6 + 4.07 log10(Re sqrt(C)).  The bound may be above by a third, not below."""
+    cold = exhaust_cold(paper(), gas_per_hour=38.9e-3)
+    assert cold is not None
+    pressure, volume, constant, gamma = 801325.0, 1.0, 287.05, 1.4
+    temperature, heat, steps = 293.15, 0.0, 20000
+    step = (pressure - 101325.0) / steps
+    for _ in range(steps):
+        mass_out = step * volume / (constant * temperature)
+        enthalpy = gamma / (gamma - 1) * constant * temperature * mass_out
+        heat += enthalpy - step * volume / (gamma - 1)
+    normal = (801325.0 - 101325.0) * volume / 101325.0 * 273.15 / temperature
+    expected = 38.9e-3 / 3600 * (heat / normal + (carried_off(paper()) or 0.0) * 2.45e6)
+    assert expected <= cold.power <= 1.02 * expected
+    radius, width, omega = 44.5e-3, 62e-3, 10000 * math.pi / 30
+    drag = 0.05
+    for _ in range(50):
+        drag = (-0.6 + 4.07 * math.log10(omega * radius**2 / 1.5e-5 * math.sqrt(drag))) ** -2
+    coefficient = 1.22 * omega * radius * 1005 * drag / 2 * 0.71 ** (-2 / 3)
+    drop = expected / (coefficient * 2 * math.pi * radius * width)
+    assert drop <= cold.drop <= 4 / 3 * drop
+    # Handbooks: 1.002 mPa s at 20 degC, 1.027 at 19.
+    assert cold.viscosity == pytest.approx(cold.drop * math.log(1.027 / 1.002), rel=0.05)
+    oil = {"liquid.name": "silicone oil 10 cSt", "liquid.temperature": "25 degC"}
+    assert (
+        exhaust_cold(paper().with_values({**oil, "liquid.vapour_pressure": "0.4 kPa"}), gas_per_hour=1.0)
+        is None
+    )

@@ -90,6 +90,14 @@ def test_a_calibration_has_the_crater_with_its_interval(holed: Scene) -> None:
         assert each.status == "ok"
         assert each.lower < each.value < each.upper  # type: ignore[operator]
         assert "model: discharge of the gas hole" in each.causes
+    told = [each.values["number"] for each in result.rows().findings if each.code == "gas_jet_droplets"]
+    assert told == [values["blowing_number"].value]
+    assert expected[2] > 1.0
+    calm = calibrate(
+        holed.with_values({"disc.gas_hole_diameter": "9 mm", "disc.gas_hole_direction": "axial"})
+    )
+    assert (calm.quantities["blowing_number"].value or 0.0) < 1.0
+    assert "gas_jet_droplets" not in [each.code for each in calm.rows().findings]
     term = result.models_used[-1]
     assert term.estimated_contribution == pytest.approx(float(half.ratio))
     assert term.model == "not modelled in this version"

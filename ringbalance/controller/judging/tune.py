@@ -9,6 +9,7 @@ from typing import Final
 
 from ringbalance.controller.balancer import Balancer, Settings
 from ringbalance.controller.judging.candidates import Tried
+from ringbalance.controller.judging.holding import endurance
 from ringbalance.controller.judging.judge import Judgement, best_of, judged_all
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
@@ -105,6 +106,7 @@ def tuned(
             tried_choices(balancer, search=find, scan_path=axis_name, progress=report) if remedies else ()
         ),
         open_choice=bool(balancer.choices()),
+        endurance=endurance(balancer, best, report),
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import ROTOR_AMPLITUDE, WATCH_TIME_S, Demand
+from ringbalance.controller.judging.holding import Endurance
 from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
@@ -72,6 +73,8 @@ class Tuning(Result):
     """Judged parts that can be bought for what the scene leaves open."""
     open_choice: bool = False
     """True if the scene leaves the choice of a part open."""
+    endurance: Endurance | None = None
+    """Devices over the hours of holding; None: the loss of liquid is not known, or not required."""
 
     @property
     def scene(self) -> Any:
@@ -135,6 +138,7 @@ class Tuning(Result):
             "valves": [each.document() for each in self.choices],
             "ranking": self.ranking.document(),
             "clipped": dict(best.outcomes.clipped),
+            **({"endurance": self.endurance.document()} if self.endurance else {}),
             **self.information.document,
             **self.rows().document(),
         }
@@ -179,6 +183,7 @@ class Tuning(Result):
                 ),
                 _remedies_table("Remedies, each with its best settings", self.remedies),
                 _remedies_table(_CHOICES_CAPTION, self.choices),
+                *((self.endurance.table,) if self.endurance else ()),
             ),
         )
 
@@ -258,6 +263,8 @@ class Tuning(Result):
         if self.longer is not None:
             values = {**self.longer.sentence_values, "time": LONG_WATCH_TIME_S, "first": WATCH_TIME_S}
             yield Finding(code="tuned_longer", values=values)
+        if self.endurance is not None:
+            yield self.endurance.finding
         if not met and best.causes:
             yield Finding(code="tuned_causes", values={"causes": best.causes})
         yield from self.capacity

@@ -39,6 +39,7 @@ from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.liquid_ring.capacity import beyond_capacity
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
+from ringbalance.controller.liquid_ring.drying import part_per_gas
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
 from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
 from ringbalance.controller.loop import simulate
@@ -63,6 +64,7 @@ from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUs
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
+from ringbalance.scene.changes import rechecked
 from ringbalance.scene.draws import BLOCK, run_noise
 from ringbalance.scene.loop_models import RequirementSettings
 from ringbalance.scene.models import Scene
@@ -93,6 +95,8 @@ class LiquidRingBalancer(Balancer):
     to_time_limit: bool = False
     rotors: Rotors | None = None
     """Rotors of drawn devices; None: their own, drawn."""
+    full: LiquidRingBalancer | None = None
+    """Balancer with all of the liquid, which controllers of untraced runs assume; None: this one."""
 
     def __post_init__(self) -> None:
         """Refuse a controller that is no algorithm."""
@@ -216,6 +220,15 @@ class LiquidRingBalancer(Balancer):
         """Balancer of another scene, with these options."""
         return replace(self, scene=liquid_ring_scene(scene))
 
+    def after_loss(self, part: float) -> LiquidRingBalancer:
+        """This balancer without a part of every chamber's liquid, of which its controller does not know."""
+        if part == 0.0:
+            return self
+        left = (1.0 - part) * self.scene.disc.max_fill_ratio
+        changes = {"disc.max_fill_ratio": left, "disc.initial_fill": left / 2}
+        less = self.on_scene(rechecked(self.scene).with_values(changes, origin="inferred"))
+        return replace(less, full=self)
+
     @property
     def limit(self) -> float:
         """Amplitude that may remain, m: the one required, else the controller's limit."""
@@ -233,6 +246,7 @@ class LiquidRingBalancer(Balancer):
             limit=self.limit,
             rotors=self.rotors,
             bare=self.flow_law == UNCHECKED,
+            full=None if self.full is None else self.full._drawn_runs,
         )
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> RunResult:
@@ -269,6 +283,7 @@ class LiquidRingBalancer(Balancer):
             usable_moment=moment * run.usable_moment,
             unbalance=moment * abs(scene.rotor.initial_unbalance),
             crater=float(largest_ratio(scene, np.array(run.state["least_driven"]))),
+            lost=part_per_gas(scene, run.model) * (run.state["gas"] - run.state["leaked"]),
         )
 
     def rotor(self, number: int | None = None) -> CommonRotor:

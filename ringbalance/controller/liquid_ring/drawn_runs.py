@@ -15,6 +15,7 @@ import numpy as np
 from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import ARRAYS, WATCH_TIME_S, Draws, Outcomes, Settings
 from ringbalance.controller.liquid_ring.devices import RingDevice, Spread, devices
+from ringbalance.controller.liquid_ring.drying import part_per_gas
 from ringbalance.controller.liquid_ring.plant import (
     corners_of,
     largest_pair_moments,
@@ -84,6 +85,8 @@ class DrawnRuns:
     """Rotors of the devices; None: their own, drawn."""
     bare: bool = False
     """True if the model's law has no uncertainties of the scene's inputs."""
+    full: DrawnRuns | None = None
+    """Runs with all of the liquid, which the controllers assume; None: these."""
 
     @cached_property
     def informed(self) -> BalancerModel:
@@ -111,10 +114,10 @@ class DrawnRuns:
         alike: dict[tuple[float, str], list[int]] = {}
         for number, each in enumerate(scenes):
             alike.setdefault((each.gas.pressure, each.controller.kind), []).append(number)
-        plans = {}
+        plans, assumed = {}, self.full or self
         for (pressure, kind), indices in alike.items():
-            model = self.informed if kind == "law_based" else self.model
-            some = [scenes[i] for i in indices]
+            model = assumed.informed if kind == "law_based" else assumed.model
+            some = [with_values_at(assumed.scene, settings[i]) for i in indices]
             controllers = [controller_of(each, model, relative_error=RELATIVE_ERROR) for each in some]
             plan = LoopPlan.of(some, controllers, most_samples=MOST_SAMPLES, watch_time=watch_time)
             plan.loops["limit"] = self.limit
@@ -287,6 +290,14 @@ class _Group:
             runout=np.array([each.sensor.runout for each in self.scenes]),
             usable_moment=factors * moment_towards(usable, towards),
             unbalance=factors * sizes,
+            part_per_gas=np.array(
+                [
+                    part_per_gas(replace(each, gas=replace(each.gas, pressure=pressure)), device.model)
+                    for each, device, pressure in zip(
+                        self.scenes, self.devices, pressures.tolist(), strict=True
+                    )
+                ]
+            ),
             work=np.array(
                 [
                     compression_work(
@@ -325,6 +336,8 @@ class _Under:
     """Usable moment in the direction of the device's own unbalance, kg m."""
     unbalance: FloatArray
     """Unbalance of the rotor, kg m."""
+    part_per_gas: FloatArray
+    """Part of all liquid that gas carries off at most, over the p V of the gas."""
     work: FloatArray
     """Least work of compressing the gas, over its p V."""
 
@@ -338,7 +351,7 @@ class _Under:
         least = np.abs(self.unreachable - np.abs(self.runout))
         numbers[0], numbers[1], numbers[2] = math.inf, least[rows], math.nan
         numbers[3], numbers[4], ends[...] = self.usable_moment[rows], self.unbalance[rows], 1
-        numbers[5] = math.nan
+        numbers[5:] = math.nan
         carried = complete | (self.beyond_disc[rows] <= _OUT_OF_REACH * limit)
         if not carried.any():
             return numbers, ends
@@ -359,6 +372,7 @@ class _Under:
         seeps = group.plants["leak_from_supply"] * group.plants["supply_pressure"]
         seeped = group.scenes[0].disc.chambers * seeps[rows] * runs["time"]
         numbers[2][:, carried] = (runs["gas"] + seeped) * self.work[rows]
+        numbers[6][:, carried] = (runs["gas"] - runs["leaked"]) * self.part_per_gas[rows]
         if group.scenes[0].disc.gas_hole_diameter is not None:
             numbers[5][:, carried] = self._crater(runs["least_driven"], rows)
         shown = (

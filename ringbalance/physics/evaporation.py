@@ -16,7 +16,7 @@ _LATENT_HEAT: Final = 2.501e6
 """J/kg, of water at 0 degC, where it is largest."""
 _AIR_CONDUCTIVITY: Final = 0.025
 """W/(m K), of air at 15 degC."""
-_AIR_VISCOSITY: Final = 1.5e-5
+_AIR_VISCOSITY_M2_S: Final = 1.5e-5
 """m^2/s, kinematic, likewise."""
 
 
@@ -67,7 +67,7 @@ def exhaust_cold(scene: Scene, *, gas_per_hour: float) -> ExhaustCold | None:
     gas, disc, warm = scene.gas, scene.disc, scene.liquid.temperature or scene.gas.temperature
     expansion = NORMAL_PRESSURE_PA * gas.temperature / NORMAL_TEMPERATURE_K
     power = gas_per_hour / 3600.0 * (expansion + vapour * _LATENT_HEAT)
-    reynolds = 2 * scene.rotor.speed * disc.outer_radius**2 / _AIR_VISCOSITY
+    reynolds = 2 * scene.rotor.speed * disc.outer_radius**2 / _AIR_VISCOSITY_M2_S
     nusselt = 0.073 * reynolds**0.7
     drop = power / (nusselt * _AIR_CONDUCTIVITY * math.pi * disc.axial_width)
     colder, warmer = (

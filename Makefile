@@ -26,7 +26,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-numbers test-faults test-heavy test-short test-units test-versions test-ends lint style format bench bench-cfd pages docs dist lock clean
+.PHONY: help env report test test-numbers test-faults test-heavy test-panel test-short test-units test-versions test-ends lint style format bench bench-cfd pages docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -54,6 +54,11 @@ test-numbers: test ## lint, types and the tests of what may differ between versi
 
 test-faults: env ## kills, damaged caches, odd environments: a few minutes, part of .ci/run
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m faults $$(grep -rl --include="*.py" "mark.faults" tests)
+
+test-panel: env ## pages in Chromium and Firefox, exported JavaScript in Node, part of .ci/run
+	@sh tools/make_browsers.sh
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m panel tests/panel
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) tests/export/test_javascript.py
 
 test-units: env ## units of `export` under FMPy, fmutool and the cross-compiler, which it fetches
 	$(VENV)/bin/uv run --no-project --python $(PYTHON_IN_VENV) --with fmpy --with fmu-manipulation-toolbox --with ziglang -- \

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import product
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import WATCH_TIME_S, Balancer, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import WATCH_TIME_S, Balancer, Outcomes
 from ringbalance.controller.judging.judge import Judgement, judged_all, plain_settings
-from ringbalance.controller.judging.remedies import tried_choices
 from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning
 from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
@@ -22,8 +20,6 @@ from ringbalance.scene.origins import SceneFile, raw_value_at, value_at
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
-_COARSE_DEVICES: Final = 16
-"""Number of devices on which settings for purchase options are chosen."""
 _MAX_CURVE_POINTS: Final = 50
 
 
@@ -69,22 +65,6 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
         **{name: document[name] for name in ("along", "ranking", "remedies")},
         "measures": [each.document() for each in measures],
     }
-
-
-def choice_records(balancer: Balancer, some: slice) -> list[Record]:
-    """Judge some purchase options for what a scene leaves open."""
-
-    def coarse_search(changed: Balancer) -> Settings:
-        """Best grid point of the first kind of controller, enough to compare the options."""
-        space = changed.trials()[0]
-        grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
-        offered = (space.settings(dict(point)) for point in grid)
-        settings = [each for each in offered if each is not None]
-        outcomes = changed.run_all(settings, Draws.first(_COARSE_DEVICES))
-        settled = [np.count_nonzero(each.settled) for each in outcomes]
-        return settings[int(np.argmax(settled))] if settings else {}
-
-    return [each.document() for each in tried_choices(balancer, search=coarse_search, some=some)]
 
 
 def judgement_record(judgement: Judgement) -> Record:

@@ -172,8 +172,8 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
 
         Args:
             pressure: search the gas pressure of a liquid ring even where the scene's meets the requirement.
-            remedies: also try commercial valves where the scene describes none. Default: changes of the scene
-                where the requirement is not met; --no-remedies tries settings only.
+            remedies: try changes of the scene where the requirement is not met, and judge commercial valves
+                where the scene describes none (default); --no-remedies: settings only, with an ideal valve.
             save: write the scene with the recommended settings.
         """,
         _options("scene law json pressure remedies valves save tolerance"),

@@ -183,9 +183,9 @@ def tune(
     """Recommend settings of the controller, chosen by runs of drawn devices and judged on others.
 
     Args: `flow_law`: as in `simulate`. `pressure`: True to search the gas pressure even where that of the
-        scene meets the requirement. `remedies`: True to try changes of the scene where it is not met, and
-        valves that can be bought where it gives none; None: the former alone. `progress`: called
-        with what is being done.
+        scene meets the requirement. `remedies`: True or None to try changes of the scene where it is not
+        met, and, where the scene gives no valve, to judge valves that can be bought; False: the verdict is
+        then that of an ideal valve. `progress`: called with what is being done.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.
 
@@ -196,4 +196,5 @@ def tune(
         ['controller.gas_time_offset', 'controller.integral_time', 'controller.proportional', 'gas.pressure']
     """
     balancer = balancer_of(scene, flow_law=flow_law)
-    return tuned(balancer, scan=pressure, remedies=remedies, progress=progress)
+    tries = remedies is not False
+    return tuned(balancer, scan=pressure, remedies=tries, choices=tries, progress=progress)

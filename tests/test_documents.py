@@ -40,6 +40,7 @@ BY_NAME: Final = {
     *("findings.values", "findings.change"),
     *("verdicts", "best.changes"),
     *("ended", "own.ended", "along.levels.ended", "clipped", "along.levels.settings", "tried.settings"),
+    *("ideal_part.ended", "ideal_part.settings"),
     *(f"{each}.{key}" for each in ("remedies", "valves") for key in ("changes", "settings")),
     *(
         "quantities.causes",

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged_all
+from ringbalance.controller.judging.remedies import tried_choices
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
@@ -22,7 +23,6 @@ from ringbalance.reports.figure import FOUND, INK, MUTED, PAPER, THIRD, Drawing,
 from ringbalance.reports.figures_page import READING_FILE, ReadableFigure, ReadingColumn, figures_page
 from ringbalance.reports.judged import (
     advice_view,
-    choice_records,
     judgement_record,
     settings_lines,
     tuning_record,
@@ -93,7 +93,7 @@ _WITHOUT_GROUND: Final[Record] = {"facecolor": "none", "edgecolor": MUTED, "line
 def _tuning(work: Work) -> Record:
     """Settings found by runs, with the scene under the recommended ones as `scene`."""
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
-    tuning = tuned(balancer, scan=True, remedies=None)
+    tuning = tuned(balancer, scan=True, remedies=True)
     chosen = liquid_ring_scene(tuning.scene)
     recommended_run = None
     if tuning.recommended.settings:
@@ -112,11 +112,18 @@ def _tuning(work: Work) -> Record:
 
 
 def _choices(some: slice, _work: Work, tuning: Record) -> list[Record]:
-    return choice_records(LiquidRingBalancer(tuning["scene"]), some)
+    choices = tried_choices(LiquidRingBalancer(tuning["scene"]), settings={}, some=some)
+    return [each.document() for each in choices]
 
 
 def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices: list[Record]) -> Record:
     scene, limit = work.ring, LiquidRingBalancer(work.ring).limit
+    parts = [choice for records in choices for choice in records]
+    best = max(parts, key=lambda each: (each["verdict"] == MET, each["fraction"]["value"]), default=None)
+    settings = tuning["settings"]
+    if best is not None and best["verdict"] == MET:
+        changed = tuning["scene"].with_values({**best["changes"], **best["settings"]}, origin="inferred")
+        settings = settings_lines(liquid_ring_scene(changed), SETTINGS)
     return {
         "limit_m": limit,
         "valve_given": scene.gas.conductance is not None,
@@ -125,8 +132,10 @@ def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices:
         **tuning["judged"],
         "noise_open": not scene.sensor.amplitude_noise
         and scene.origin_of("sensor.amplitude_noise") == "default",
-        "choices": [choice for records in choices for choice in records],
-        **{key: tuning[key] for key in ("settings", "gas_pressure_Pa", "recommended_pressure_Pa", "run")},
+        "choices": parts,
+        "best_choice": best,
+        "settings": settings,
+        **{key: tuning[key] for key in ("gas_pressure_Pa", "recommended_pressure_Pa", "run")},
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
         "requirement": _requirement_record(scene, limit=limit),
         "bore_m": scene.tube.bore,

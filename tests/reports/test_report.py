@@ -56,7 +56,7 @@ def few_cases(store: Path) -> Iterator[None]:
         patch.setattr(tune, "search", lambda *_, **__: ())
         patch.setattr(tune, "judged_all", partial(judged_all, most=16))
         patch.setattr(tune, "tried_remedies", lambda *_, **__: ())
-        patch.setattr(first_page, "choice_records", lambda *_: [])
+        patch.setattr(first_page, "tried_choices", lambda *_, **__: ())
         patch.setattr(first_page, "judged_all", partial(judged_all, most=16))
         patch.setattr(loop, "judged_all", partial(judged_all, most=16))
         yield

@@ -9,10 +9,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any, Final
 
-from ringbalance.controller.balancer import Balancer, Remedy, Settings
+import numpy as np
+
+from ringbalance.controller.balancer import Balancer, Draws, Remedy, Settings
 from ringbalance.controller.judging.judge import (
     FIRST_CHOOSING_DEVICE,
     FIRST_VERDICT_DEVICE,
@@ -33,6 +35,9 @@ _FIRST_DEVICES: Final = 16
 _GIVE_UP_SHARE: Final = 0.5
 """Ratio to the required fraction below which a remedy is given up."""
 _MAX_DEVICES: Final = 256
+_COARSE_DEVICES: Final = (4, 4, 8)
+"""Further devices in each round of the coarse grid; the best third of the settings and its
+ties go on to the next."""
 _HALFWAY_DIGITS: Final = 2
 """Significant digits of a value between two alternatives."""
 
@@ -160,16 +165,33 @@ def tried_remedies(
 def tried_choices(
     balancer: Balancer,
     *,
-    search: Search,
+    settings: Settings,
     scan_path: str = "",
     progress: Progress | None = None,
     some: slice = slice(None),
 ) -> tuple[Remedied, ...]:
-    """Judge the parts that can be bought for what a scene leaves open.
+    """Judge parts that can be bought for what a scene leaves open, each with the best of a coarse grid.
 
-    Args: `some`: slice of the balancer's choices to judge.
+    Args: `settings`: settings around which the grid lies, the best with an ideal part. `scan_path`: as in
+        `Remedied`. `some`: slice of the balancer's choices to judge.
     """
-    judge = partial(_judge, balancer, search=search, scan_path=scan_path, progress=progress)
+
+    def coarse_search(changed: Balancer) -> Settings:
+        """Best settings of the first kind of controller, by the number of devices that settle."""
+        around = _changed(changed, settings)
+        space = around.trials()[0]
+        grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
+        offered = (space.settings(dict(point)) for point in grid)
+        left = [each for each in offered if each is not None]
+        settled, start = np.zeros(len(left), dtype=np.int64), 0
+        for count in _COARSE_DEVICES if left else ():
+            outcomes = around.run_all(left, Draws.block(start, count))
+            settled += [int(np.count_nonzero(each.settled)) for each in outcomes]
+            best = np.flatnonzero(settled >= -np.sort(-settled)[(len(left) - 1) // 3])
+            left, settled, start = [left[i] for i in best], settled[best], start + count
+        return {**settings, **left[int(np.argmax(settled))]} if left else settings
+
+    judge = partial(_judge, balancer, search=coarse_search, scan_path=scan_path, progress=progress)
     rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
     return tuple(row for row in rows if row is not None)
 

@@ -34,15 +34,16 @@ def tuned(
     balancer: Balancer,
     *,
     scan: bool = False,
-    remedies: bool | None = False,
+    remedies: bool = False,
+    choices: bool = False,
     progress: Progress | None = None,
 ) -> Tuning:
     """Choose and judge settings for a balancer.
 
     Args: `scan`: scan the axis `Trials.scan_axis`, such as the supply's pressure, in any case; otherwise only
             where the scene's own level does not meet what is required.
-        `remedies`: try remedies where the requirement is not met, and things that can be bought; None:
-            the remedies alone; False: neither.
+        `remedies`: try remedies where the requirement is not met. `choices`: judge parts that can be bought
+            where the scene leaves the choice open.
     """
     report = progress or (lambda _: None)
     spaces = balancer.trials()
@@ -84,7 +85,7 @@ def tuned(
     axis_name = axis.name if axis else ""
     level = best.settings.get(axis.name) if axis else None
     final_level = value_at(balancer.scene, axis.name) if axis and level is None else level
-    mend = remedies is not False and best.verdict != MET
+    mend = remedies and best.verdict != MET
     find = partial(searched, level=level)
     return Tuning(
         given=balancer.scene,
@@ -103,7 +104,9 @@ def tuned(
             tried_remedies(balancer, best, search=find, scan_path=axis_name, progress=report) if mend else ()
         ),
         choices=(
-            tried_choices(balancer, search=find, scan_path=axis_name, progress=report) if remedies else ()
+            tried_choices(balancer, settings=best.settings, scan_path=axis_name, progress=report)
+            if choices
+            else ()
         ),
         open_choice=bool(balancer.choices()),
         endurance=endurance(balancer, best, report),

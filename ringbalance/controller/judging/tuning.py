@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import ROTOR_AMPLITUDE, WATCH_TIME_S, Demand
+from ringbalance.controller.balancer import ROTOR_AMPLITUDE, WATCH_TIME_S, Demand, Settings
 from ringbalance.controller.judging.holding import Endurance
 from ringbalance.controller.judging.judge import Judgement, plain_settings
 from ringbalance.controller.judging.ranking import Ranking
@@ -30,6 +30,7 @@ from ringbalance.scene.origins import SceneFile, raw_value_at, with_values_at
 LONG_WATCH_TIME_S: Final = 300.0
 """Time for which settled devices are watched once more under the recommended settings, s."""
 _VERDICT_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
+_PART_CODES: Final = {MET: "part_met", MISSED: "part_missed", OPEN: "part_open"}
 _EXACT: Final = "_exact"
 """Suffix of the code of a met verdict where the scene states no uncertainty."""
 _CHOICES_CAPTION: Final = (
@@ -72,14 +73,30 @@ class Tuning(Result):
     choices: tuple[Remedied, ...] = ()
     """Judged parts that can be bought for what the scene leaves open."""
     open_choice: bool = False
-    """True if the scene leaves the choice of a part open."""
+    """True if the scene leaves the choice of a part open; `recommended` then has an ideal one."""
     endurance: Endurance | None = None
     """Devices over the hours of holding; None: the loss of liquid is not known, or not required."""
 
     @property
+    def best_choice(self) -> Remedied | None:
+        """Part that can be bought with the largest fraction of devices; None: none was judged."""
+        return max(self.choices, key=lambda each: (each.met, each.judgement.fraction.value), default=None)
+
+    @property
+    def judgement(self) -> Judgement:
+        """Judgement that decides the verdict: of the best part that can be bought, else of `recommended`."""
+        return self.best_choice.judgement if self.best_choice else self.recommended
+
+    @property
+    def changes(self) -> Settings:
+        """Recommended settings by path, SI, with a part that can be bought where one meets the requirement."""
+        part = self.best_choice
+        return {**part.changes, **part.settings} if part and part.met else self.recommended.settings
+
+    @property
     def scene(self) -> Any:
         """The scene with the recommended settings, of the same type."""
-        return with_values_at(self.given, self.recommended.settings)
+        return with_values_at(self.given, self.changes)
 
     @property
     def recommended_scene(self) -> AnyScene:
@@ -88,8 +105,8 @@ class Tuning(Result):
 
     @property
     def succeeded(self) -> bool:
-        """True if the recommended settings meet what the scene requires."""
-        return self.recommended.verdict == MET
+        """True if what the scene requires is met, with a part that can be bought where one was judged."""
+        return self.judgement.verdict == MET
 
     @property
     def status(self) -> str:
@@ -104,8 +121,11 @@ class Tuning(Result):
             "balancer": scene.balancer,
             "status": self.status,
             "asked": best.required_fraction,
-            **best.document(),
-            "settings": plain_settings(best.settings),
+            **self.judgement.document(),
+            "settings": plain_settings(self.changes),
+            "ideal_part": {**best.document(), "settings": plain_settings(best.settings)}
+            if self.open_choice
+            else None,
             "own": self.own and self.own.document(),
             "further_s": WATCH_TIME_S,
             "longer": self.longer
@@ -147,7 +167,7 @@ class Tuning(Result):
         """The result as quantities, findings and tables."""
         scene, best = self.given, self.recommended
         settings = []
-        for path, value in best.settings.items():
+        for path, value in self.changes.items():
             before = setting_text(path, raw_value_at(scene, path))
             before += " (default)" if scene.origin_of(path) == "default" else ""
             settings.append((path, before, setting_text(path, value)))
@@ -189,7 +209,12 @@ class Tuning(Result):
 
     def _quantities(self) -> Iterator[Quantity]:
         for key, name, judgement in (
-            ("fraction_met", "devices that meet what is required", self.recommended),
+            ("fraction_met", "devices that meet what is required", self.judgement),
+            (
+                "fraction_met_ideal",
+                "the same with an ideal valve",
+                self.recommended if self.choices else None,
+            ),
             ("fraction_met_own", "the same with the scene's own settings", self.own),
             ("fraction_met_longer", "the same, watched longer", self.longer),
         ):
@@ -245,8 +270,13 @@ class Tuning(Result):
             for path, value in best.settings.items()
             if value is not None
         }
+        if part := self.best_choice:
+            values = {**part.judgement.sentence_values, "name": part.remedies[0].name}
+            values["parts"] = len(self.choices)
+            yield Finding(code=_PART_CODES[part.judgement.verdict], values=values, change=part.changes)
         code = _VERDICT_CODES[best.verdict] + if_exact(self.given, best)
-        yield Finding(code=code, values=best.sentence_values, change=changes)
+        values = {**best.sentence_values, "part": " and an ideal valve" if self.open_choice else ""}
+        yield Finding(code=code, values=values, change=changes)
         times = best.settling_times
         if times["p50"] is not None:
             code = "tuned_half" if times["p90"] is None else "tuned_times"
@@ -282,7 +312,7 @@ class Tuning(Result):
             if states_amplitude and (amplitude := best.amplitude_reached) is not None:
                 values = {"amplitude": amplitude, "asked": best.required_fraction}
                 yield Finding(code="amplitude_reached", values=values)
-        if self.open_choice:
+        if self.open_choice and not self.choices:
             yield Finding(code="ideal_valve")
         if clipped := best.outcomes.clipped:
             values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
@@ -320,13 +350,12 @@ def _changes_text(changes: Mapping[str, Any], separator: str = "\n") -> str:
 
 
 def _remedies_table(caption: str, remedies: tuple[Remedied, ...]) -> Table:
-    """Table of judged remedies; without a column of settings where none has any."""
-    with_settings = any(each.settings for each in remedies)
+    """Table of judged remedies with their changes and settings."""
     rows: list[Cells] = []
     for each in remedies:
         name = each.remedies[0].name or each.code.replace("_", " ")
         fraction, *times = _fraction_and_times(each.judgement)
-        settings = [_changes_text(each.settings)] if with_settings else []
-        rows.append((name, _changes_text(each.changes), fraction, each.judgement.verdict, *times, *settings))
-    heads = ["remedy", "change", "devices that meet all", "verdict", "half within", "90 % within"]
-    return Table(caption=caption, heads=[*heads, *(["settings"] if with_settings else [])], rows=rows)
+        changes = _changes_text({**each.changes, **each.settings})
+        rows.append((name, fraction, each.judgement.verdict, *times, changes))
+    heads = ("remedy", "devices that meet all", "verdict", "half within", "90 % within", "changes and settings")
+    return Table(caption=caption, heads=heads, rows=rows)

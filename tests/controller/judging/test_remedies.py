@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
-from ringbalance.controller.judging.judge import Judgement, judged_all
+from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, Judgement, judged_all
 from ringbalance.controller.judging.remedies import Remedied, tried_choices, tried_remedies
 from ringbalance.controller.liquid_ring.offers import remedies_of
+from ringbalance.controller.trials import SearchAxis, Trials
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
 from ringbalance.scene.loader import bundled_scene, load_scene
@@ -41,6 +42,11 @@ class Machine:
 
     def choices(self) -> tuple[Remedy, ...]:
         return self.offered
+
+    def trials(self) -> tuple[Trials, ...]:
+        gains = tuple(0.125 * number for number in range(1, 9))
+        axis = SearchAxis(name="gain", levels=gains, first=tuple(range(8)))
+        return (Trials(kind="toy", axes=(axis,), settings=dict),)
 
     def required_fraction(self) -> float:
         return 0.9
@@ -124,8 +130,11 @@ def test_what_makes_it_worse_is_not_carried_on(paper_scene: Scene) -> None:
 
 def test_what_can_be_bought_is_answered_in_its_own_order(paper_scene: Scene) -> None:
     machine: Any = Machine(paper_scene, (bore(1.0), bore(0.5)))
-    rows = tried_choices(machine, search=lambda _: {"gain": 1.0})
+    # Only the largest gain lets every device of the second settle.
+    rows = tried_choices(machine, settings={"controller.limit": 50e-9})
     assert [row.met for row in rows] == [False, True]
+    assert [row.settings for row in rows] == [{"controller.limit": 50e-9, "gain": 1.0}] * 2
+    assert all(min(row.judgement.outcomes.numbers) >= FIRST_VERDICT_DEVICE for row in rows)
 
 
 def test_the_amplitude_that_is_surely_reached() -> None:

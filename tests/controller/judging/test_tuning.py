@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from ball_balancer.scene_keys import EXAMPLE, BallScene
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.balancer import Draws, balancer_of
+from ringbalance.controller.balancer import Draws, Remedy, balancer_of
 from ringbalance.controller.judging.judge import judged_all
+from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import search, searched
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
@@ -142,7 +144,34 @@ def test_six_chambers_work_with_settings_of_their_own_and_with_those_that_the_co
     scene = liquid_ring_scene(rb.load_scene(target))
     settings = document["settings"]
     assert scene.controller.kind == settings["controller.kind"] == "law_based"
-    assert settings["controller.gas_time_offset"]
-    assert scene.controller.offsets(6) == pytest.approx(6 * settings["controller.gas_time_offset"])
+    assert scene.controller.offsets(6) == pytest.approx(6 * (settings["controller.gas_time_offset"] or [0.0]))
+    # The verdict and what is saved are those of the best valve on sale, and an ideal one is told apart.
+    best = max(document["valves"], key=lambda each: each["fraction"]["value"])
+    assert document["verdict"] == best["verdict"] == MET
+    assert document["fraction"] == best["fraction"]
+    assert settings == {**best["changes"], **best["settings"]}
+    assert scene.gas.conductance == settings["gas.conductance"]
+    assert document["ideal_part"]["verdict"] == MET
     assert judged_all(balancer_of(scene), [{}])[0].verdict == MET
     assert math.isfinite(document["settling_time_s"]["p90"])
+
+
+def test_the_verdict_is_that_of_the_best_part_on_sale_and_not_that_of_an_ideal_one(paper: Tuning) -> None:
+    assert paper.own is not None
+    missed = Remedied(
+        remedies=(Remedy(code="valve", name="Slow", changes={"gas.conductance": 1e-9}),),
+        judgement=paper.own,
+        size=1.0,
+    )
+    result = replace(paper, choices=(missed,))
+    assert (paper.succeeded, result.succeeded) == (True, False)
+    assert result.status.startswith("not met with any valve on sale that was tried (1): with the best, Slow, ")
+    assert " and an ideal valve 100" in result.status
+    document = result.to_dict()
+    assert document["verdict"] == document["own"]["verdict"] == "not met"
+    assert document["ideal_part"]["verdict"] == MET
+    # A part that does not suffice is not recommended.
+    assert "gas.conductance" not in document["settings"]
+    met = replace(result, choices=(missed, replace(missed, judgement=paper.recommended)))
+    assert met.succeeded
+    assert met.to_dict()["settings"]["gas.conductance"] == 1e-9

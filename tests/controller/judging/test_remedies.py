@@ -130,10 +130,11 @@ def test_what_makes_it_worse_is_not_carried_on(paper_scene: Scene) -> None:
 
 def test_what_can_be_bought_is_answered_in_its_own_order(paper_scene: Scene) -> None:
     machine: Any = Machine(paper_scene, (bore(1.0), bore(0.5)))
-    # Only the largest gain lets every device of the second settle.
+    # A gain serves in proportion; of 16 devices the nearest two of eight gains may serve as many.
     rows = tried_choices(machine, settings={"controller.limit": 50e-9})
     assert [row.met for row in rows] == [False, True]
-    assert [row.settings for row in rows] == [{"controller.limit": 50e-9, "gain": 1.0}] * 2
+    assert all(row.settings["controller.limit"] == 50e-9 for row in rows)
+    assert all(row.settings["gain"] >= 0.875 for row in rows)
     assert all(min(row.judgement.outcomes.numbers) >= FIRST_VERDICT_DEVICE for row in rows)
 
 

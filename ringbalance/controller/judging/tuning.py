@@ -89,7 +89,7 @@ class Tuning(Result):
 
     @property
     def changes(self) -> Settings:
-        """Recommended settings by path, SI, with a part that can be bought where one meets the requirement."""
+        """Recommended settings by path, SI, with the part that can be bought where it suffices."""
         part = self.best_choice
         return {**part.changes, **part.settings} if part and part.met else self.recommended.settings
 
@@ -357,5 +357,5 @@ def _remedies_table(caption: str, remedies: tuple[Remedied, ...]) -> Table:
         fraction, *times = _fraction_and_times(each.judgement)
         changes = _changes_text({**each.changes, **each.settings})
         rows.append((name, fraction, each.judgement.verdict, *times, changes))
-    heads = ("remedy", "devices that meet all", "verdict", "half within", "90 % within", "changes and settings")
-    return Table(caption=caption, heads=heads, rows=rows)
+    heads = ("remedy", "devices that meet all", "verdict", "half within", "90 % within")
+    return Table(caption=caption, heads=(*heads, "changes and settings"), rows=rows)

@@ -106,9 +106,14 @@ _OPTIONS: Final = {
         'of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.',
     ),
     "rotor": ShellOption(Literal["first", "second"] | None),
-    "seed": ShellOption(int | None, limits=_SEEDS),
+    "seed": ShellOption(
+        int | None, None, "seed of all random numbers, in place of the scene's.", limits=_SEEDS
+    ),
     "remedies": ShellOption(bool | None, parsing={"negative": "--no-remedies"}),
-    "to": ShellOption(Literal["c", "st", "csv", "python", "js", "fmi2", "fmi3"], REQUIRED),
+    "to": ShellOption(
+        Literal["c", "st", "csv", "python", "js", "fmi2", "fmi3", "simulink", "openmodelica", "twincat"],
+        REQUIRED,
+    ),
     "block": ShellOption(Literal["law", "disc", "controller"], "law"),
     "name": ShellOption(str, ""),
     "points": ShellOption(int | None, limits=_GRID),
@@ -119,7 +124,8 @@ _OPTIONS: Final = {
     "write": ShellOption(list[int] | None, parsing={"consume_multiple": 1}),
     "loss": ShellOption(Literal["linear", "soft_l1"], "linear"),
     **dict.fromkeys(("parameters", "next", "template"), _TEXT),
-    **dict.fromkeys(("plan", "cases", "data"), _PATH),
+    **dict.fromkeys(("plan", "cases"), _PATH),
+    "data": ShellOption(list[Path] | None),
     **dict.fromkeys(
         ("pressure", "preview", "all_systems", "no_intervals", "no_figures", "list_", "mutations"), _FLAG
     ),
@@ -140,7 +146,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
             level: "heavy" also runs the cases that take long.
         """,
-        _options("scene out level valves tolerance"),
+        _options("scene out level valves seed tolerance"),
         "SCENE --out out",
         "a check of the program failed (what becomes of the scene's requirements does not count)",
     ),
@@ -161,7 +167,6 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         Args:
             csv: also write every instant of the run to this file, a column for each quantity with its unit.
             plot: also draw the run's figures on one sheet, an SVG file.
-            seed: seed of all random numbers, in place of the scene's.
         """,
         _options("scene law json csv plot seed tolerance"),
         "SCENE --plot run.svg",
@@ -176,7 +181,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
                 where the scene describes none (default); --no-remedies: settings only, with an ideal valve.
             save: write the scene with the recommended settings.
         """,
-        _options("scene law json pressure remedies valves save tolerance"),
+        _options("scene law json pressure remedies valves save seed tolerance"),
         "SCENE --save tuned.toml",
         "the best settings miss a requirement of the scene, or it is undecided",
         begin="runs ...",
@@ -186,7 +191,8 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
 
         Args:
             to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
-                text), python or js (a module without dependencies), or csv (a grid).
+                text), python or js (a module without dependencies), or csv (a grid); simulink and
+                openmodelica take fmi2, twincat takes st.
             block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
                 and the rotor's vibration), or controller (the scene's algorithm with its settings).
             out: folder for the files.
@@ -214,7 +220,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             tolerance: in place of the scene's, such as "0.5 %" or 0.005; rows with a larger error are named.
         """,
         _options(
-            "scene out vary plan sample runs no_intervals check workers no_figures write tolerance json",
+            "scene out vary plan sample runs no_intervals check workers no_figures write seed tolerance json",
             out=ShellOption(Path, REQUIRED),
         ),
         "SCENE --vary tube.bore=0.5mm:2mm:30 --out sweep",
@@ -226,7 +232,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             scene: the scene file, with [requirement] and [design].
             save: write the scene of the design, with its settings.
         """,
-        _options("scene save valves workers json"),
+        _options("scene save valves seed workers json"),
         "SCENE --save designed.toml",
         "no design meets the requirement of the scene, or it is undecided",
         begin="designs ...",
@@ -266,7 +272,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
             mutations: also run each case with its deliberate errors, which must change its verdict.
             level: "heavy" runs the cases that take long too.
             workers: processes to spread the cases over.
-            data: a file of measurements (docs/measurements.md), predicted and judged instead of the cases.
+            data: a file of measurements (docs/measurements.md), judged instead of the cases; any number.
             json: print one JSON document instead of a table.
         """,
         _options(
@@ -289,7 +295,7 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
                 that is expensive.
             json: print one JSON document instead of a table.
         """,
-        _options("first second law rotor json tolerance"),
+        _options("first second law rotor json seed tolerance"),
         "SCENE other_disc.toml",
         "one of the two does not settle the required fraction of devices, or it is undecided",
         begin="both balancers on one rotor ...",

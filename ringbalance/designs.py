@@ -15,8 +15,8 @@ from ringbalance.design.axes import plan_of, plan_of_file, plan_of_texts
 from ringbalance.design.static import EMPTY, REFUSED, static_rows
 from ringbalance.design.sweep import STORE, Sweep, check_rows, run_sweep
 from ringbalance.design.work import Progress
-from ringbalance.interface import check_counts, checked, print_result
-from ringbalance.scene import AnyScene, load_scene
+from ringbalance.interface import check_counts, checked, opened, print_result
+from ringbalance.scene import AnyScene
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.kinds import scene_kind
@@ -119,7 +119,7 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
 
 def sweep_file(options: SimpleNamespace) -> int:
     """Run the command `sweep`: write the table, its document, figures and the scenes of some rows."""
-    scene = load_scene(options.scene)
+    scene = opened(options.scene, None, options.seed)
     if options.tolerance is not None:
         scene = scene.with_values({"accuracy.tolerance": read_tolerance(options.tolerance)})
     if options.plan is None:

@@ -48,9 +48,10 @@ def check_counts(command: str, **counts: int) -> None:
             raise ValueError(f"`{name}` is a whole number of at least {limits.least}, not {count!r}")
 
 
-def opened(path: Path, tolerance: str | None) -> AnyScene:
-    """The scene of a file with the tolerance of the option `--tolerance`."""
-    return with_tolerance(load_scene(path), tolerance)
+def opened(path: Path, tolerance: str | None, seed: int | None = None) -> AnyScene:
+    """The scene of a file with the tolerance and the seed of the options of these names."""
+    scene = load_scene(path)
+    return with_tolerance(scene if seed is None else scene.with_values({"run.seed": seed}), tolerance)
 
 
 def law_for(scene: AnyScene, law: str) -> str | None:

@@ -83,8 +83,9 @@ def write_report(
 def report(options: SimpleNamespace) -> int:
     """Run the command `report`. Returns: Exit code: 1 when a check of the program failed."""
     scene, text = read_scene(options.scene)
-    if options.valves:
-        scene = with_valves(scene, options.valves)
+    if options.valves or options.seed is not None:
+        scene = with_valves(scene, options.valves) if options.valves else scene
+        scene = scene if options.seed is None else scene.with_values({"run.seed": options.seed})
         text = toml_bytes(document_of(scene)).decode()
     workers = min(_MAX_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:

@@ -57,7 +57,8 @@ def run_command(name: str, /, **settings: Any) -> int:
     target = imported(TARGETS[name])
     if not command.begin:
         return int(target(SimpleNamespace(**options)))
-    options |= {key: opened(options[key], options.get("tolerance")) for key in SCENES if key in options}
+    changes = options.get("tolerance"), options.get("seed")
+    options |= {key: opened(options[key], *changes) for key in SCENES if key in options}
     if options.get("valves"):
         options["scene"] = imported("ringbalance.design.choices:with_valves")(
             options["scene"], options["valves"]

@@ -72,8 +72,8 @@ def test_the_readme_s_scene_is_one(tmp_path: Path) -> None:
     assert liquid_ring_scene(rb.load_scene(tmp_path / "my_disc.toml")).disc.chambers == 4
 
 
-def test_the_readme_s_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
+def test_the_readme_s_python_runs_outside_the_tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
     exec(compile(fenced("README.md", "python"), "README.md", "exec"), names)
     assert names["flow"].velocity > 0

@@ -27,7 +27,11 @@ _BAD_INPUT: Final = 2
 def verify(options: SimpleNamespace) -> int:
     """Run the command `verify`. Returns: Exit code."""
     if options.data is not None:
-        _print_judgement(registered("function", "data_document")(options.data), json=options.json)
+        documents = [registered("function", "data_document")(file) for file in options.data]
+        if options.json:
+            print(dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
+        for document in () if options.json else documents:
+            _print_judgement(document)
         return 0
     user_cases, errors = own_cases(options.cases) if options.cases is not None else ([], [])
     users = {case.definition.id: case for case in user_cases}
@@ -104,10 +108,7 @@ def _exit_code(results: Sequence[CaseResult]) -> int:
     )
 
 
-def _print_judgement(document: Mapping[str, Any], *, json: bool) -> None:
-    if json:
-        print(dumps(document, allow_nan=False))
-        return
+def _print_judgement(document: Mapping[str, Any]) -> None:
     series = {**document["series"], "all": document["statistics"]}
     lines = [
         (
@@ -121,7 +122,8 @@ def _print_judgement(document: Mapping[str, Any], *, json: bool) -> None:
     rows = Rows(
         title=f"{document['title']}  {document['verdict']} ({document['source']})",
         quantities=(),
-        facts=[("confirmed", f"where at least {percent(document['limit'])} lie within both intervals")],
+        facts=[("confirmed", f"where at least {percent(document['limit'])} lie within both intervals")]
+        + ([("but", document["hint"])] if document["hint"] else []),
         tables=(Table(heads=("series", "points", "bias", "within"), rows=lines),),
         listed=0,
     )

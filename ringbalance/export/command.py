@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Final
 
 from ringbalance.export.blocks import controller_block, disc_block, law_block
@@ -20,6 +20,8 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, print_message, results_console
 
+HOSTS: Final = MappingProxyType({"simulink": "fmi2", "openmodelica": "fmi2", "twincat": "st"})
+"""Format by name of a program that takes it."""
 _GRID_POINTS: Final = 41
 """Points on each axis of a grid."""
 _GRID_END: Final = 1.5
@@ -31,6 +33,7 @@ _GRID_END_WITHOUT_PRESSURE_PA: Final = 1e6
 def export(options: SimpleNamespace) -> int:
     """Run the command `export`: the flow law, the disc or the controller for another program."""
     cross = options.all_systems
+    options.to = HOSTS.get(options.to, options.to)
     if options.points is not None and options.to != "csv":
         raise _refusal("--points", options.points, f"{options.to} has no grid", "--to csv")
     if cross and options.to not in ("fmi2", "fmi3"):

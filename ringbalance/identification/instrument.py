@@ -89,10 +89,12 @@ def in_columns_of(table: CsvTable, kind: Kind) -> tuple[CsvTable, tuple[str, ...
     }
     if left_out := [str(line) for line in table.lines if rows and line not in rows]:
         said.append(f"nothing was measured in lines {', '.join(left_out)}, which are left out")
-    changed = replace(table, header=header, heads=tuple(columns))
-    if not rows:
-        return replace(changed, rows=tuple(zip(*columns.values(), strict=True))), tuple(said)
-    return replace(changed, lines=tuple(rows), rows=tuple(rows.values())), tuple(said)
+    lines, cells_of_rows = (
+        (tuple(rows), rows.values()) if rows else (table.lines, zip(*columns.values(), strict=True))
+    )
+    return replace(table, header=header, heads=tuple(columns), lines=lines, rows=tuple(cells_of_rows)), tuple(
+        said
+    )
 
 
 def _name(head: str) -> str:

@@ -48,12 +48,17 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
 
     Raises: SceneError: as `load_scene`.
     """
-    name = str(path)
+    name, bundled = str(path), _bundled()
+    # A file of the user's own precedes a scene of its name that comes with the program.
+    location = Path(name)
+    if (of_program := bundled.get(name.removesuffix(".toml"))) and not location.exists():
+        name, location = of_program.name, of_program
     file = name if name.isprintable() else toml_text(name)
-    content, problem = read_bounded(name, what="scene file", most=_LARGEST_FILE_BYTES)
+    content, problem = read_bounded(location, what="scene file", most=_LARGEST_FILE_BYTES)
     if problem:
-        raise SceneError.of_file(file, problem, "a TOML file")
-    scene = scene_from(content=content, file=file, folder=Path(name).parent)
+        hint = did_you_mean(name, bundled)
+        raise SceneError.of_file(file, problem, f"a TOML file, or a scene that comes with the program{hint}")
+    scene = scene_from(content=content, file=file, folder=location.parent)
     if scene.remark:
         LOG.warning("%s: %s", file, scene.remark)
     return scene, content.decode("utf-8-sig")
@@ -243,10 +248,15 @@ def bundled_scene(name: str) -> Path:
         >>> rb.bundled_scene("six_chamber").name
         'six_chamber.toml'
     """
+    stem, bundled = name.removesuffix(".toml"), _bundled()
+    if stem not in bundled:
+        problem = f"no scene of that name comes with the program{did_you_mean(stem, bundled)}"
+        raise SceneError.of_file(name, problem, ", ".join(bundled))
+    return bundled[stem]
+
+
+@cache
+def _bundled() -> Mapping[str, Path]:
+    """Scenes that come with the program, by name."""
     folder = Path(str(resources.files("ringbalance.scenes")))
-    names = sorted(path.stem for path in folder.glob("*.toml"))
-    stem = name.removesuffix(".toml")
-    if stem not in names:
-        problem = f"no scene of that name comes with the program{did_you_mean(stem, names)}"
-        raise SceneError.of_file(name, problem, ", ".join(names))
-    return folder / f"{stem}.toml"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}

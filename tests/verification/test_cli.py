@@ -128,7 +128,7 @@ def test_a_file_of_measurements_is_predicted_and_judged(
     code, out, err = _judged(path, rows.replace(",51,", ",80,"), capsys)
     assert code == 0, err
     assert json.loads(out)["verdict"] == "refuted"
-    assert run_command("verify", data=path) == 0
+    assert run_command("verify", data=[path]) == 0
     assert "refuted (rig 4)" in " ".join(capsys.readouterr().out.split())
 
 

@@ -267,6 +267,9 @@ def data_document(path: Path) -> dict[str, Any]:
         raise SceneError.of_file(
             data.file, f"{len(data)} point, and {_MIN_POINTS} are the fewest that can be judged"
         )
+    verdicts = [dataclasses.replace(points, measured=n * points.measured).verdict for n in (1, 4)]
+    fanning = data.kind == "friction" and verdicts == [Verdict.REFUTED, Verdict.CONFIRMED]
+    hint = "these are Fanning's factors: four times as large, as Darcy's, they are confirmed"
     series = {}
     for name in np.unique(points.series).tolist():
         part = points.where(points.series == name)
@@ -279,6 +282,7 @@ def data_document(path: Path) -> dict[str, Any]:
         "measured": kind.measured[0].name,
         "limit": PROMISED,
         "verdict": points.verdict.value,
+        "hint": hint if fanning else "",
         "statistics": vars(points.statistics),
         "series": series,
         "points": [

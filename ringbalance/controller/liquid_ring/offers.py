@@ -140,8 +140,6 @@ _SOLD: Mapping[str, float] = MappingProxyType(
     {"Festo MHA2-MS1H-3/2": 2e-3, "SMC SY3000": 12e-3, "CKD M4GA2 R": 20e-3}
 )
 """Valves of the catalogue to try, and their lags, s, which are assumed: their sources print none."""
-_DIGITS: Final = 2
-"""Significant digits of C in data sheets, m^3/(s Pa)."""
 _MEASURED: Mapping[str, str] = MappingProxyType(
     dict.fromkeys((LOSS, *MODEL_ERRORS), "measure_flow")
     | {MOMENT: "measure_moment", "draw_down_factor": "measure_residual"}
@@ -199,7 +197,7 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
     if gas.conductance is not None:
         return ()
     sold = tuple(
-        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], _DIGITS), valve_lag=lag)
+        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2), valve_lag=lag)
         for name, lag in _SOLD.items()
     )
     remedies = []

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ringbalance.identification.documents import Fit as Fit
     from ringbalance.identification.influence import InfluenceTable as InfluenceTable
     from ringbalance.identification.influence import read_influence as read_influence
+    from ringbalance.panels.document import Panel as Panel
     from ringbalance.reduced_model.calibration_record import Calibration as Calibration
     from ringbalance.reduced_model.law.files import load_law as load_law
     from ringbalance.reduced_model.law.flow_law import CompleteLaw as CompleteLaw
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from ringbalance.scene import load_scene as load_scene
     from ringbalance.scene.platform.progress_line import ProgressLine as ProgressLine
     from ringbalance.search import find_design as find_design
+    from ringbalance.showing import panel as panel
     from ringbalance.studies import extremes as extremes
     from ringbalance.studies import run_cases as run_cases
     from ringbalance.studies import trade as trade
@@ -141,7 +143,9 @@ _NAMES = {
     ),
     "search": ("find_design",),
     "fitting": ("fit",),
+    "panels.document": ("Panel",),
     "reporting": ("plot", "write_report"),
+    "showing": ("panel",),
     "studies": ("extremes", "run_cases", "trade"),
     "verification.extremes.study": ("Extremes",),
     "verification.trade": ("TradeStudy",),

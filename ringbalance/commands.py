@@ -203,6 +203,16 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
         _options("scene to block out name points all_systems"),
         "SCENE --to c --out law",
     ),
+    "panel": ShellCommand(
+        """A page on which one watches the rotor being balanced, in one file for any browser.
+
+        Args:
+            out: file of the page; it needs no network and no other file.
+            vary: axes of at most nine designs that a slider moves through, such as tube.bore=1mm:2mm:5.
+        """,
+        _options("scene out vary", out=ShellOption(Path, REQUIRED, ending=".html")),
+        "SCENE --out panel.html",
+    ),
     "sweep": ShellCommand(
         """Many designs: a row of answers for every point of a grid or a sample.
 

@@ -22,6 +22,7 @@ TARGETS: Final = {
     "simulate": "ringbalance.face:simulate_file",
     "tune": "ringbalance.face:tune",
     "export": "ringbalance.export.command:export",
+    "panel": "ringbalance.showing:panel_file",
     "sweep": "ringbalance.designs:sweep_file",
     "design": "ringbalance.search:find_design",
     "fit": "ringbalance.fitting:fit_files",

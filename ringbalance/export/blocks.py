@@ -40,7 +40,7 @@ _LONGEST_FOLLOWED_PART_S: Final = 5e-3
 """Longest part of a step of the liquid that a controller estimates, s."""
 _SHORTEST_PART_S: Final = 1e-6
 """Least value of the longest part, s: below it a host's step of 10 ms would take more than 10,000 parts."""
-_PART_OF_TIME_CONSTANT: Final = 0.04
+PART_OF_TIME_CONSTANT: Final = 0.04
 """Longest part over the line's time constant: near the end of a filling a pressure changes some fifty times
 as fast, and the method is stable for parts up to 2.8 over that rate."""
 RANGE: Final = "{:g} to {:g} m/s".format(*VELOCITIES)
@@ -148,16 +148,17 @@ def tabulation(law: CompactLaw) -> str:
     )
 
 
-def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
+def disc_block(scene: Scene, law: CalibratedLaw, *, compact: CompactLaw | None = None) -> Block:
     """Fills and gas of all chambers in time, and the vibration of the scene's rotor.
 
+    Args: `compact`: the law's compact form; None: it is made.
     Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack,
         inputs that were fitted together, or a gas line that fills a chamber too fast for a host's steps.
     """
     gas, half = scene.gas, scene.disc.chambers // 2
     terms = {FILLING: gas.conductance, LAG: gas.valve_lag}
     modelled = [term for term, value in terms.items() if value is not None]
-    compact, constants, row = _disc(scene, law, modelled)
+    compact, constants, row = _disc(scene, law, modelled, compact)
     disc.show(constants, compact.tables.cells, compact.tables.pieces, row)
 
     def index_of(offset: str, chamber: int | None) -> int:
@@ -184,7 +185,7 @@ def disc_block(scene: Scene, law: CalibratedLaw) -> Block:
 
 
 def _disc(
-    scene: Scene, law: CalibratedLaw, modelled: Collection[str]
+    scene: Scene, law: CalibratedLaw, modelled: Collection[str], compact: CompactLaw | None
 ) -> tuple[CompactLaw, list[float], list[float]]:
     """Law of a disc, the numbers of both, and its row at the start."""
     if law.moment.across is not None:
@@ -192,16 +193,16 @@ def _disc(
             scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
         )
     gas, rotor, half, fill = scene.gas, scene.rotor_as_read, scene.disc.chambers // 2, scene.disc.initial_fill
-    compact = compact_law(scene=scene, law=law)
+    compact = compact or compact_law(scene=scene, law=law)
     dynamics = dynamics_of(scene=scene, model=BalancerModel.of(law), modelled=modelled)
     longest = _LONGEST_PART_S
     if dynamics.line is not None:
         least = (1 - law.max_fill_ratio) * law.chamber_volume + dynamics.dead_volume
         constant = dynamics.line.time_constant(volume=least)
-        longest = min(longest, _PART_OF_TIME_CONSTANT * constant)
+        longest = min(longest, PART_OF_TIME_CONSTANT * constant)
         if longest < _SHORTEST_PART_S:
             took = f"gas fills a chamber with a time constant of {constant:.2g} s"
-            shortest = _SHORTEST_PART_S / _PART_OF_TIME_CONSTANT
+            shortest = _SHORTEST_PART_S / PART_OF_TIME_CONSTANT
             allowed = f"at least {shortest:.2g} s, no gas.conductance, or --block law"
             raise SceneError.of_file(scene.file, f"{took}, too short for a host's steps", allowed)
 
@@ -241,8 +242,12 @@ def _disc(
     return compact, constants, row
 
 
-def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
-    """The control algorithm with the scene's settings. Args: `law`: calibrated, for the law-based one.
+def controller_block(
+    scene: Scene, law: CalibratedLaw | None = None, *, compact: CompactLaw | None = None
+) -> Block:
+    """The control algorithm with the scene's settings.
+
+    Args: `law`: calibrated, for the law-based one. `compact`: as in `disc_block`.
 
     Raises: SceneError: as `disc_block`, for the law-based one.
     """
@@ -250,7 +255,7 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
     if scene.controller.kind == "law_based":
         if law is None:
             raise ValueError("the law-based controller needs the calibrated law")
-        return _law_based_block(scene, law)
+        return _law_based_block(scene, law, compact)
     tries = scene.controller.kind == "trial"
     steps: ModuleType = trial_steps if tries else target_steps
 
@@ -276,8 +281,8 @@ def controller_block(scene: Scene, law: CalibratedLaw | None = None) -> Block:
     )
 
 
-def _law_based_block(scene: Scene, law: CalibratedLaw) -> Block:
-    compact, constants, row = _disc(scene, law, ())
+def _law_based_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw | None) -> Block:
+    compact, constants, row = _disc(scene, law, (), compact)
     half, chambers = scene.disc.chambers // 2, scene.disc.chambers
     d, r = len(compact.constants), len(row)
     # The controller estimates whole injections: none is cut, and parts may be long.

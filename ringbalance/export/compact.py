@@ -44,6 +44,8 @@ _CHAMBER_ERROR: Final = 2e-6
 _EASES: Final = (1.0, 1.6, 2.5, 4.0)
 """Factors on the error of heads, cubed on that of a chamber, tried in turn until there is room for enough
 pieces of levels: `_MAX_LEVEL_PIECES` over the square of the factor."""
+_EASE_OF_DRAWN: Final = 8.0
+"""Such a factor for drawn devices, of which pages hold many."""
 _ROUNDING: Final = 0.2
 """Fraction of a piece's error to which coefficients are rounded: numbers of few bits make small libraries."""
 _END_BITS: Final = 18
@@ -137,14 +139,15 @@ class CompactLaw:
         return Answer(velocity=velocity, regime=int(regime), status=int(status), primed=after != 0.0)
 
 
-def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
+def compact_law(*, scene: Scene, law: CalibratedLaw, of_many: bool = False) -> CompactLaw:
     """Tabulate a calibrated law again, on as few knots as `TOLERANCE` allows.
 
-    Args: `scene`: scene of the law; its chamber gives the free surface.
+    Args: `scene`: scene of the law; its chamber gives the free surface. `of_many`: true for one of many drawn
+        devices, whose errors may be `_EASE_OF_DRAWN` times as large and are not measured.
     Raises: SceneError: a law that does not fit into `MAX_BYTES`.
     """
     tables = law.heads.tables
-    for ease in _EASES:
+    for ease in (_EASE_OF_DRAWN,) if of_many else _EASES:
         rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
         for way, table in enumerate(tables):
             _add_way(rows, law, way, table, ease)
@@ -183,6 +186,8 @@ def compact_law(*, scene: Scene, law: CalibratedLaw) -> CompactLaw:
         calibrated=law,
     )
 
+    if of_many:
+        return compact
     # Compared over fills of both chambers, pressures of six decades and both states of the tube.
     random, departure, size = np.random.default_rng(0), 0.0, _COMPARED_CONDITIONS
     fills, pressures = random.uniform(0.0, law.max_fill_ratio, (size, 2)), 10 ** random.uniform(2, 8, size)

@@ -19,6 +19,7 @@ ROOM_ORDER = (
     "identification",
     "export",
     "design",
+    "panels",
     "verification",
     "reports",
 )

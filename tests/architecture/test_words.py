@@ -85,7 +85,7 @@ RULES: Mapping[str, Callable[[ast.Module], Iterator[str]]] = {
 }
 ROOMS = (
     *("ringbalance", "scene", "results", "mesh", "physics", "reduced_model", "controller"),
-    *("identification", "export", "design", "verification", "reports"),
+    *("identification", "export", "design", "panels", "verification", "reports"),
 )
 REMAINING: Mapping[str, Mapping[str, int]] = {
     "scene": {"names": 5},

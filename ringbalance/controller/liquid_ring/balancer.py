@@ -170,7 +170,7 @@ class LiquidRingBalancer(Balancer):
         self, settings: Sequence[Settings], draws: Draws, *, watch_time: float = WATCH_TIME_S
     ) -> tuple[Outcomes, ...]:
         """Run several settings with the program's own algorithms and sensor, without traces."""
-        return self._drawn_runs.outcomes(settings, draws, watch_time=watch_time)
+        return self.drawn_runs.outcomes(settings, draws, watch_time=watch_time)
 
     def required_fraction(self) -> float:
         """Fraction of the devices that the scene requires to meet every demand."""
@@ -236,7 +236,8 @@ class LiquidRingBalancer(Balancer):
         return self.scene.controller.limit if required is None else required
 
     @cached_property
-    def _drawn_runs(self) -> DrawnRuns:
+    def drawn_runs(self) -> DrawnRuns:
+        """Runs of the scene's devices, with caches."""
         remade = self.flow_law in (None, CALIBRATED, UNCHECKED)
         spread = Spread.of(self.scene, self.model, remade=remade)
         return DrawnRuns(
@@ -251,10 +252,10 @@ class LiquidRingBalancer(Balancer):
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> RunResult:
         loop: dict[str, Any] = {"controller": self.controller}
-        informed = self._drawn_runs.informed if self.flow_law == UNCHECKED else self.model
+        informed = self.drawn_runs.informed if self.flow_law == UNCHECKED else self.model
         model, moment = informed, 1.0
         if devices:
-            device = self._drawn_runs.device(number)
+            device = self.drawn_runs.device(number)
             model, scene, moment = device.model, device.under(scene, of=self.scene), device.moment
             loop = {
                 "controller": self.controller or controller_of(scene, informed),
@@ -288,7 +289,7 @@ class LiquidRingBalancer(Balancer):
 
     def rotor(self, number: int | None = None) -> CommonRotor:
         """Rotor of the scene, or of a drawn device."""
-        scene = self.scene if number is None else self._drawn_runs.device(number).scene
+        scene = self.scene if number is None else self.drawn_runs.device(number).scene
         return CommonRotor(
             source=scene.source,
             speed=scene.rotor.speed,
@@ -341,7 +342,7 @@ class LiquidRingBalancer(Balancer):
     def information(self, scene: SceneFile) -> Information:
         """Loop factor and margins, drawn errors of the devices, and what a single run takes to hold."""
         ring = liquid_ring_scene(scene)
-        loop, document = loop_information(ring, self.model), self._drawn_runs.spread.document()
+        loop, document = loop_information(ring, self.model), self.drawn_runs.spread.document()
         rows = conventions(simulate(ring, self.model))
         consumption = [each.document() for each in rows if each.key in CONSUMPTION]
         return replace(loop, document={**loop.document, "drawn": document, "consumption": consumption})

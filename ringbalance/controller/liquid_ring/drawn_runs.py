@@ -158,6 +158,19 @@ class DrawnRuns:
         block = _group(number)
         return self._devices(block)[block.index(number)]
 
+    def least_fills(self, numbers: Sequence[int], pressure: float) -> FloatArray:
+        """Least fills of driven chambers: by stall and by gas in the port, and by the latter alone.
+
+        Args: `numbers`: those of the devices. `pressure`: gas pressure of the settings, gauge, Pa.
+        Returns: shape (2, n).
+        """
+        rows = []
+        for block, members in groupby(numbers, _group):
+            under = self._under(block, True, pressure)
+            at = {each.number: row for row, each in enumerate(under.group.devices)}
+            rows.append(under.emptied[[at[number] for number in members]])
+        return np.concatenate(rows).T
+
     def __getstate__(self) -> dict[str, Any]:
         """Fields without the caches."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
@@ -285,6 +298,7 @@ class _Group:
             supply=pressures,
             changed={name: plants[name].copy() for name in _CHANGED},
             residual=residual,
+            emptied=emptied,
             unreachable=unreachable_moment(usable, -as_read) * influence,
             beyond_disc=unreachable_moment(beyond, -as_read) * influence,
             runout=np.array([each.sensor.runout for each in self.scenes]),
@@ -326,6 +340,8 @@ class _Under:
     changed: Mapping[str, FloatArray]
     residual: FloatArray
     """Fill of a driven chamber at which gas enters its port."""
+    emptied: FloatArray
+    """Least fill of a driven chamber by stall and gas in its port, and by the latter alone, shape (n, 2)."""
     unreachable: FloatArray
     """Reading that remains with the best fills that the gas can reach, m."""
     beyond_disc: FloatArray

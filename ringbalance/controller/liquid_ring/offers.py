@@ -193,12 +193,15 @@ def remedies_of(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
 
 def valves_of(scene: Scene) -> tuple[Remedy, ...]:
     """Valves at hand, or some that can be bought; empty for a scene that gives its valve."""
-    gas, catalogue = scene.gas, known_valves()
-    if gas.conductance is not None:
-        return ()
+    return valve_choices(scene, lag=scene.gas.valve_lag) if scene.gas.conductance is None else ()
+
+
+def valve_choices(scene: Scene, *, lag: float | None = None) -> tuple[Remedy, ...]:
+    """Valves at hand, or some that can be bought. Args: `lag`: in place of their own, s; None: their own."""
+    catalogue = known_valves()
     sold = tuple(
-        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2), valve_lag=lag)
-        for name, lag in _SOLD.items()
+        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2), valve_lag=assumed)
+        for name, assumed in _SOLD.items()
     )
     remedies = []
     for valve in (each.completed for each in scene.design.valves or sold):
@@ -206,7 +209,7 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
         changes = {
             "gas.conductance": conductance,
             "gas.critical_ratio": ratio,
-            "gas.valve_lag": valve.valve_lag if gas.valve_lag is None else gas.valve_lag,
+            "gas.valve_lag": valve.valve_lag if lag is None else lag,
         }
         remedies.append(Remedy(code="valve", name=valve.name, changes=changes))
     return tuple(remedies)

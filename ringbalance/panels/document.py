@@ -1,0 +1,101 @@
+"""One file of a panel: modules of the page joined into one script, with a policy that forbids any request."""
+
+from __future__ import annotations
+
+import hashlib
+import html
+import json
+import re
+from base64 import b64encode
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from os import PathLike
+from pathlib import Path
+from string import Template
+from typing import Any, Final
+
+from ringbalance.panels.blocks import blocks_module
+from ringbalance.scene.platform.files import write_whole
+
+MODULES: Final = (
+    *("numbers", "blocks", "model", "controls", "address", "devices", "canvas", "time_plot", "polar_plot"),
+    *("disc_picture", "form", "many", "main"),
+)
+"""Modules of the page; each imports from those before it alone."""
+_IMPORT: Final = re.compile(r'^import (\{[^}]*\}) from "\./(\w+)\.js";$', re.MULTILINE)
+_EXPORT: Final = re.compile(r"^export (?=(?:const|class|(?:async )?function\*?) (\w+))", re.MULTILINE)
+
+_COMMENT: Final = re.compile(r"^ *(/\*\*(.|\n)*?\*/|//.*)\n", re.MULTILINE)
+_INDENT: Final = re.compile(r"^ +", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Panel:
+    """Page on which one watches a scene's rotor being balanced; a notebook shows it.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> panel = rb.panel(scene)
+        >>> panel.save("panel.html").name
+        'panel.html'
+    """
+
+    name: str
+    """Name of the scene."""
+    html: str
+    """The whole document."""
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the page to a file. Raises: OSError: it cannot be written."""
+        return write_whole(Path(path), self.html)
+
+    def __repr__(self) -> str:
+        return f"panel of {self.name}, {len(self.html.encode()) / 1000:.0f} kB"
+
+    def _repr_html_(self) -> str:
+        """Frame for a notebook."""
+        title, document = html.escape(repr(self)), html.escape(self.html)
+        rights = 'sandbox="allow-scripts allow-downloads" width="100%" height="900"'
+        return f'<iframe title="{title}" {rights} srcdoc="{document}"></iframe>'
+
+
+def document_of(content: Mapping[str, Any]) -> str:
+    """HTML document of a panel, which needs no other file, from all its numbers and texts."""
+    program, style = joined({name: module_text(name) for name in MODULES}), _part("page/panel.css")
+    policy = (
+        f"default-src 'none'; script-src {_digest(program)}; style-src {_digest(style)}; worker-src blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    return Template(_part("templates/panel.html")).substitute(
+        policy=policy,
+        title=html.escape(content["name"]),
+        style=style,
+        # No text of the scene can end the element that holds it.
+        content=json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        program=program,
+    )
+
+
+def module_text(name: str) -> str:
+    """Text of a module of the page; that of the blocks is made of the exported functions."""
+    return blocks_module() if name == "blocks" else _part(f"page/{name}.js")
+
+
+def joined(modules: Mapping[str, str]) -> str:
+    """One script of modules, in their order: each is a function that returns what it exports."""
+    parts = []
+    for name, text in modules.items():
+        text = _IMPORT.sub(r"const \1 = \2;", _COMMENT.sub("", text))
+        names = _EXPORT.findall(text)
+        text = _INDENT.sub("", _EXPORT.sub("", text))
+        parts.append(f"const {name} = (() => {{\n{text}return {{ {', '.join(names)} }};\n}})();\n")
+    return "".join(parts)
+
+
+def _part(name: str) -> str:
+    return files("ringbalance.panels").joinpath(name).read_text(encoding="utf-8")
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,0 +1,230 @@
+// The page: its state, its clock, and what is drawn.
+import { SPEEDS, read, written } from "./address.js";
+import { CONTROLS, digits, sceneBlocks, valueText } from "./controls.js";
+import { DevicePool, noiseOf, serve } from "./devices.js";
+import { DiscPicture } from "./disc_picture.js";
+import { Form, make } from "./form.js";
+import { CAUSES, Many } from "./many.js";
+import { PART, Run, letters, lostTime, sceneSettings } from "./model.js";
+import { normalPairs, unpack } from "./numbers.js";
+import { drawPolarPlot } from "./polar_plot.js";
+import { drawTimePlot } from "./time_plot.js";
+
+const QUIET_S = 5; // s that a run goes on after it has held its limit
+const MOST_STEPS = 2000; // in a frame
+const REFERENCE_S = 60;
+const get = (id) => document.getElementById(id);
+
+class Panel {
+  constructor(content, numbers, source) {
+    Object.assign(this, { content, numbers, scene: sceneSettings(content), playing: false, before: 0 });
+    this.state = read(location.hash, content, this.scene);
+    this.calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.form = new Form(get("controls"), content, { change: (name, value) => this.set({ [name]: value }), marks: () => this.marks() });
+    this.many = new Many(content, new DevicePool(source, content), {
+      watch: (device) => this.set({}, { device }),
+      choose: (valve) => this.set({ valve, ...this.suitedTo(valve) }),
+    });
+    this.picture = new DiscPicture(get("disc"), content.disc);
+    this.#buttons();
+    addEventListener("hashchange", () => {
+      if (location.hash.slice(1) !== written(this.state, this.scene)) this.set({}, read(location.hash, content, this.scene));
+    });
+    new ResizeObserver(() => this.draw()).observe(get("time"));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    this.set({});
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** Settings that suit a valve: for the scene's own the scene's. */
+  suitedTo(valve) {
+    const { gain, integral, offset } = this.content.valves[valve]?.settings ?? this.scene;
+    return { gain, integral, offset };
+  }
+
+  /** Marked values: the scene's, with those that suit the valve in use. */
+  marks() {
+    return { ...this.scene, ...this.suitedTo(this.state.settings.valve) };
+  }
+
+  /** Take up settings, and other parts of the state; the run begins again. */
+  set(settings, others = {}) {
+    Object.assign(this.state, others);
+    this.state.settings = { ...this.state.settings, ...settings };
+    const { content, state } = this, { design } = state.settings, changed = written(state, this.scene);
+    history.replaceState(null, "", changed ? `#${changed}` : location.pathname + location.search);
+    const run = new Run(content, this.numbers, state.settings, { noise: normalPairs(state.seed) });
+    this.reference = null;
+    if (JSON.stringify(state.settings) !== JSON.stringify({ ...this.scene, design }) || state.device !== null) this.reference = this.#reference(design);
+    this.form.show(state.settings, this.#designText(run));
+    get("which").textContent = state.device === null ? "of the device as the scene states it" : `of drawn device ${state.device + 1}`;
+    get("speed").value = state.speed;
+    get("seed").value = state.seed;
+    get("block").textContent = sceneBlocks(content, state.settings, this.scene);
+    get("facts").textContent = this.#facts();
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.many.run(state, (valve) => ({ ...state.settings, valve, ...this.suitedTo(valve) })), 120);
+    this.restart();
+  }
+
+  restart() {
+    const { device, seed, settings, loads } = this.state;
+    const noise = device === null ? normalPairs(seed) : noiseOf(seed, device);
+    this.run = new Run(this.content, this.numbers, settings, { device, noise, loads });
+    this.said = "";
+    if (this.calm) this.toEnd();
+    else this.play(true);
+    this.draw();
+  }
+
+  play(playing) {
+    this.playing = playing;
+    get("play").textContent = playing ? "Pause" : "Play";
+  }
+
+  toEnd() {
+    while (!this.#over()) this.run.advance(PART);
+    this.play(false);
+    this.draw();
+  }
+
+  #over() {
+    const { run } = this;
+    return run.ended !== "" || run.time > run.held + QUIET_S || run.time > 3600;
+  }
+
+  frame(now) {
+    const until = this.run.time + (Math.min(100, now - this.before) / 1000) * this.state.speed;
+    this.before = now;
+    if (this.playing) {
+      for (let i = 0; i < MOST_STEPS && this.run.time < until && !this.#over(); i++) this.run.advance(PART);
+      if (this.#over()) this.play(false);
+      this.draw();
+    }
+    requestAnimationFrame((next) => this.frame(next));
+  }
+
+  /** Trace under the scene's settings, for comparison; kept, as it never changes. */
+  #reference(design) {
+    this.references ??= new Map();
+    if (!this.references.has(design)) {
+      const run = new Run(this.content, this.numbers, { ...this.scene, design }, { noise: normalPairs(1) });
+      while (run.time < REFERENCE_S && run.time <= run.held + QUIET_S) run.advance(PART);
+      this.references.set(design, run.trace);
+    }
+    return this.references.get(design);
+  }
+
+  draw() {
+    const { run, content, reference } = this, view = { ...run, trace: run.trace, limit: run.limit, reference };
+    const marks = run.loads.slice(0, run.done).map(({ time }) => ({ time, label: "load" }));
+    drawTimePlot(get("time"), { ...view, letters: letters(content), marks });
+    drawPolarPlot(get("polar"), view);
+    const at = content.places.disc, { c } = run.plant, [ix, iy] = [c[at.INFLUENCE_X], c[at.INFLUENCE_Y]];
+    const [x, y] = [c[at.START_X], c[at.START_Y]], square = ix * ix + iy * iy;
+    this.picture.show({
+      fills: letters(content).map((letter) => run.value(`fill_ratio_${letter}`)),
+      pressures: letters(content).map((letter) => run.value(`gas_pressure_${letter}`) - content.disc.ambient),
+      open: letters(content).map((_, i) => run.isOpen(i)),
+      unbalance: [(x * ix + y * iy) / square, (y * ix - x * iy) / square],
+      correction: [run.value("moment_x"), run.value("moment_y")],
+      highest: run.settings.pressure,
+    });
+    get("clock").textContent = `${run.time.toFixed(1)} s`;
+    get("reading").textContent = `${digits(run.amplitude * 1e6, 3)} µm`;
+    const [code, text] = this.#sentence();
+    if (code === this.said) return;
+    this.said = code;
+    get("state").textContent = text;
+    get("time").setAttribute("aria-label", `Vibration over time: ${text}`);
+    get("disc").setAttribute("aria-label", `Liquid in the chambers: ${letters(content).map((letter) => `${letter.toUpperCase()} ${(100 * run.value(`fill_ratio_${letter}`)).toFixed(0)} %`).join(", ")}`);
+  }
+
+  #sentence() {
+    const { run } = this, { ended } = run;
+    if (ended && ended !== "settled") return [ended, `Not settled: ${CAUSES[ended]}.`];
+    const since = run.heldSince < Infinity ? run.heldSince : run.settled;
+    if (since !== null && since < Infinity) return ["held", `Settled after ${digits(since)} s: it stays within ${valueText("limit", run.limit)}.`];
+    if (run.amplitude <= run.limit) return ["within", "Within the limit."];
+    return ["above", "Above the limit: the valves correct."];
+  }
+
+  #designText(run) {
+    const { content } = this, design = content.designs[run.settings.design];
+    return `A pair corrects up to ${digits(run.largestMoment() * 1e6)} g mm; the liquid leaves at ${digits(design.velocity)} m/s.`;
+  }
+
+  #facts() {
+    const { content, state } = this, { program, lost } = content.designs[state.settings.design];
+    const own = `The program's own runs of these ${program.of} devices under the scene's settings: ${program.count} settle.`;
+    if (!content.leftOut.length) return own;
+    const time = lostTime(content, state.settings);
+    const instead = state.settings.mass ? `in their place each injection is shortened by ${digits(time * 1e3)} ms, which short ones lose to them.` : "nothing is in their place.";
+    return `${own} The exported disc leaves out ${content.leftOut.join(" and ")}; ${instead}`;
+  }
+
+  #buttons() {
+    const on = (id, act) => get(id).addEventListener("click", act);
+    for (const speed of SPEEDS) get("speed").append(make("option", { value: speed, textContent: speed === 1 ? "real time" : `${speed} ×` }));
+    on("play", () => (this.#over() ? this.restart() : this.play(!this.playing)));
+    on("step", () => {
+      const { samples } = this.run;
+      this.play(false);
+      do this.run.advance(PART);
+      while (this.run.samples === samples && !this.run.ended);
+      this.draw();
+    });
+    on("end", () => this.toEnd());
+    on("restart", () => this.restart());
+    on("reset", () => this.set(this.scene, { device: null, loads: [] }));
+    on("load", () => {
+      const { amplitude, phase } = this.state.settings, angle = phase + 2;
+      this.run.addLoad(0.4 * amplitude * Math.cos(angle), 0.4 * amplitude * Math.sin(angle));
+      this.state.loads = this.run.loads;
+      history.replaceState(null, "", `#${written(this.state, this.scene)}`);
+      if (this.calm) this.toEnd();
+      else this.play(true);
+    });
+    for (const button of document.querySelectorAll("[data-try]"))
+      button.addEventListener("click", () => {
+        const [name, factor] = button.dataset.try.split(":"), [low, high] = this.content.ranges[name], { si } = CONTROLS[name];
+        const value = Number(digits((this.state.settings[name] * Number(factor)) / si, 4)) * si;
+        this.set({ [name]: Math.min(Math.max(value, low), high) });
+      });
+    get("speed").addEventListener("change", () => {
+      this.state.speed = Number(get("speed").value);
+      history.replaceState(null, "", `#${written(this.state, this.scene)}`);
+    });
+    get("seed").addEventListener("change", () => get("seed").checkValidity() && this.set({}, { seed: Number(get("seed").value) }));
+    on("copy-link", () => this.#copy(location.href, "Link copied"));
+    on("copy-block", () => this.#copy(get("block").textContent, "Settings copied"));
+    on("save", () => this.#save());
+  }
+
+  async #copy(text, said) {
+    try {
+      await navigator.clipboard.writeText(text);
+      get("copied").textContent = said;
+    } catch {
+      get("copied").textContent = "This browser does not let a page copy: take it from the field below or the address.";
+    }
+  }
+
+  #save() {
+    const { trace } = this.run, names = letters(this.content);
+    const head = ["time_s", "vibration_x_m", "vibration_y_m", ...names.map((letter) => `fill_ratio_${letter}`)];
+    const rows = trace.time.map((time, i) => [time, trace.x[i], trace.y[i], ...trace.fill.map((fill) => fill[i])].join(","));
+    const file = new Blob([[head.join(","), ...rows, ""].join("\n")], { type: "text/csv" });
+    const link = make("a", { href: URL.createObjectURL(file), download: "trace.csv" });
+    link.click();
+    URL.revokeObjectURL(link.href);
+  }
+}
+
+/** Begin: in a worker to run devices, in a page to show them. */
+export async function begin() {
+  if (typeof document === "undefined") return serve(self);
+  const content = JSON.parse(get("content").textContent);
+  window.panel = new Panel(content, await unpack(content.numbers, content.lengths), get("program").textContent);
+}
+begin();

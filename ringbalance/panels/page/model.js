@@ -1,0 +1,312 @@
+// A run of the exported disc and controller, sample by sample, judged as the program judges its own runs.
+import { disc, law_based, moment, target_vector, trial } from "./blocks.js";
+
+const CONTROLLERS = { target_vector, trial, law_based };
+const INSTANT = 1e-9;
+export const PART = 0.02; // s, longest step of a run that is watched
+
+/** The scene's settings of a page, SI. `integral` null: no integral part. `valve` -1: as the scene has it. */
+export function sceneSettings(content) {
+  const settings = { algorithm: content.algorithm, valve: -1, design: 0, mass: true };
+  for (const [name, range] of Object.entries(content.ranges)) settings[name] = range[2];
+  return settings;
+}
+
+/** Constants and tables of a device's disc under settings. */
+export function discOf(content, numbers, settings, device) {
+  const facts = content.devices[device], at = content.places.disc, block = numbers[device];
+  const scene = sceneSettings(content), c = Float64Array.from(block.constants);
+  const valve = content.valves[settings.valve];
+  if (valve) for (const [index, value] of Object.entries(valve.constants)) c[index] = value;
+  if (settings.leak !== scene.leak) c[at.LEAK] = settings.leak * content.rules.leakPerConductance;
+  const pressure = Math.max(facts.pressure + settings.pressure - scene.pressure, 0);
+  if (settings.pressure !== scene.pressure) {
+    c[at.SUPPLY] = c[at.SUPPLY] - facts.pressure + pressure;
+    c[at.RESIDUAL] = leastFill(content, facts, settings.pressure, 1);
+  }
+  if (["amplitude", "phase", "runout"].some((name) => settings[name] !== scene[name])) {
+    const size = settings.amplitude / scene.amplitude, turn = settings.phase - scene.phase;
+    const [cosine, sine] = [size * Math.cos(turn), size * Math.sin(turn)];
+    const [x, y] = facts.vibration, [rx, ry] = runoutOf(facts, settings, scene);
+    c[at.START_X] = x * cosine - y * sine + rx;
+    c[at.START_Y] = x * sine + y * cosine + ry;
+  }
+  return { c, k: block.cells, p: block.pieces, q: block.levels, start: block.start, facts };
+}
+
+function runoutOf(facts, settings, scene) {
+  if (scene.runout === 0) return [settings.runout, 0];
+  return facts.runout.map((part) => (part * settings.runout) / scene.runout);
+}
+
+/** Least fill of a driven chamber at a gas pressure: of row 0 by stall and gas in its port, of row 1 by the latter. */
+function leastFill(content, facts, pressure, row) {
+  return between(content.pressures, facts.least[row], pressure);
+}
+
+/** Time, s, by which each injection is shortened in place of the column's mass, which the exported disc leaves out. */
+export function lostTime(content, settings) {
+  const { lost } = content.valves[settings.valve] ?? content.designs[settings.design];
+  return settings.mass ? between(content.pressures, lost, settings.pressure) : 0;
+}
+
+function between(x, y, pressure) {
+  let i = 1;
+  while (i < x.length - 1 && pressure > x[i]) i++;
+  const part = Math.min(Math.max((pressure - x[i - 1]) / (x[i] - x[i - 1]), 0), 1);
+  return y[i - 1] + part * (y[i] - y[i - 1]);
+}
+
+/** Constants, tables and row of the controller under settings. */
+function controllerOf(content, numbers, settings) {
+  const scene = sceneSettings(content), squares = [settings.noise ** 2, settings.phase_noise ** 2];
+  if (settings.algorithm !== "law_based") {
+    const { constants, start, row } = content.controllers[settings.algorithm];
+    const c = Float64Array.from(constants), at = content.places.target;
+    if (settings.algorithm === "trial") {
+      c[content.places.trialLimit] = settings.limit;
+      return { arguments: [c], w: Float64Array.from(start), row };
+    }
+    c[at.LIMIT] = settings.limit;
+    c[at.GAIN] = settings.gain;
+    c[at.PER_TIME] = settings.integral === null ? 0 : 1 / settings.integral;
+    c[at.DERIVATIVE] = settings.derivative;
+    [c[at.AMPLITUDE_SQUARE], c[at.PHASE_SQUARE]] = squares;
+    if (settings.offset !== scene.offset)
+      for (let i = 0; i < content.disc.chambers; i++) c[at.DIRECTIONS + 3 * i + 2] = settings.offset;
+    return { arguments: [c], w: Float64Array.from(start), row };
+  }
+  const design = content.designs[settings.design], law = numbers[design.device];
+  const block = numbers[content.devices.length + settings.design];
+  const c = Float64Array.from(block.constants), at = content.places.lawBased;
+  c[at.LIMIT] = settings.limit;
+  [c[at.AMPLITUDE_SQUARE], c[at.PHASE_SQUARE]] = squares;
+  if (settings.offset !== scene.offset)
+    for (let i = 0; i < content.disc.chambers; i++) c[at.OFFSETS + i] = settings.offset;
+  if (settings.pressure !== scene.pressure) {
+    c[content.places.disc.SUPPLY] += settings.pressure - scene.pressure;
+    c[at.LEAST_FILL] = leastFill(content, content.devices[design.device], settings.pressure, 1);
+  }
+  const tables = [law.cells, law.pieces, law.levels];
+  return { arguments: [c, ...tables], w: Float64Array.from(block.start), row: content.places.lawBasedRow };
+}
+
+/** A reading with noise, by + - * / and a root alone: a small phase turns it by a rational rotation. */
+export function noisy(x, y, [amplitude, phase], settings) {
+  const size = Math.sqrt(x * x + y * y), half = (phase * settings.phase_noise) / 2, square = half * half;
+  const cosine = (1 - square) / (1 + square), sine = (2 * half) / (1 + square);
+  const factor = size > 0 ? (size + amplitude * settings.noise) / size : 1;
+  return [factor * (x * cosine - y * sine), factor * (x * sine + y * cosine)];
+}
+
+/** Largest moment of a pair, kg m, with its liquid moved to one side as far as a gas can (row 0) or the disc lets (row 1). */
+function pairMoment(content, plant, settings, row) {
+  const { c, k, p } = plant, total = c[content.places.disc.TOTAL];
+  const least = Math.min(leastFill(content, plant.facts, settings.pressure, row), total / 2);
+  return moment(c, k, p, total - least) - moment(c, k, p, least);
+}
+
+/** Vibration that is left with the best fills of all pairs, m, that a gas can reach (row 0) or the disc has (row 1). */
+export function leftAtBest(content, plant, settings, row) {
+  const at = content.places.disc, { c } = plant, most = pairMoment(content, plant, settings, row);
+  const [ix, iy] = [c[at.INFLUENCE_X], c[at.INFLUENCE_Y]], square = ix * ix + iy * iy;
+  let x = (c[at.START_X] * ix + c[at.START_Y] * iy) / square, y = (c[at.START_Y] * ix - c[at.START_X] * iy) / square;
+  const pairs = content.disc.chambers / 2, parts = new Array(pairs).fill(0);
+  // Each pair in turn takes what it can of the rest.
+  for (let round = 0; round < 60; round++)
+    for (let i = 0; i < pairs; i++) {
+      const [dx, dy] = [c[at.DIRECTIONS + 2 * i], c[at.DIRECTIONS + 2 * i + 1]];
+      const wanted = Math.min(Math.max(parts[i] - (x * dx + y * dy), -most), most), change = wanted - parts[i];
+      parts[i] = wanted;
+      x += change * dx;
+      y += change * dy;
+    }
+  return Math.sqrt((x * x + y * y) * square);
+}
+
+/** One run. `noise(k)` gives two standard normal numbers for the k-th sample; `loads` are steps of the unbalance. */
+export class Run {
+  constructor(content, numbers, settings, { device = null, noise = () => [0, 0], loads = [], slack = 0 } = {}) {
+    const number = content.designs[settings.design].device + (device === null ? 0 : 1 + device);
+    Object.assign(this, { content, settings, noise, loads, slack, rules: content.rules });
+    this.plant = discOf(content, numbers, settings, number);
+    this.w = Float64Array.from(this.plant.start);
+    this.controller = controllerOf(content, numbers, settings);
+    this.shorter = lostTime(content, settings);
+    this.inputs = letters(content).map((letter) => content.places.row[`open_time_${letter}`]);
+    this.commands = letters(content).map((letter) => this.controller.row[`open_time_${letter}`]);
+    this.fills = letters(content).map((letter) => content.places.row[`fill_ratio_${letter}`]);
+    Object.assign(this, { time: 0, part: 0, samples: 0, done: 0, still: false, ended: "", settled: null });
+    Object.assign(this, { since: Infinity, held: Infinity, heldSince: Infinity, above: 0, lost: 0, rises: 0 });
+    Object.assign(this, { idle: 0, operated: false, first: NaN, last: NaN, before: null });
+    const size = this.amplitude0 = Math.hypot(this.plant.c[this.at("START_X")], this.plant.c[this.at("START_Y")]);
+    this.floor = this.rules.noiseDeviations * Math.SQRT2 * settings.noise + this.rules.roundOff * size;
+    this.limit = this.rules.required ?? settings.limit;
+    this.trace = { time: [], x: [], y: [], fill: this.fills.map(() => []) };
+    this.injections = [];
+    this.deadline = this.rules.timeLimit;
+    this.#pass(0);
+    this.#note();
+  }
+
+  at(name) {
+    return this.content.places.disc[name];
+  }
+
+  get x() {
+    return this.w[this.content.places.row.vibration_x];
+  }
+
+  get y() {
+    return this.w[this.content.places.row.vibration_y];
+  }
+
+  get amplitude() {
+    return Math.hypot(this.x, this.y);
+  }
+
+  /** Moment of a pair with its liquid moved to one side, kg m. */
+  largestMoment() {
+    return pairMoment(this.content, this.plant, this.settings, 0);
+  }
+
+  /** Value of a variable of the disc, such as "fill_ratio_a". */
+  value(name) {
+    return this.w[this.content.places.row[name]];
+  }
+
+  isOpen(chamber) {
+    const { first, each, VALVE } = this.content.places.pairs, half = this.content.disc.chambers / 2;
+    return this.w[first + each * (chamber % half) + VALVE + Math.floor(chamber / half)] !== 0;
+  }
+
+  /** Let the controller act, then a time pass of at most `most`, s, up to the next sample. */
+  advance(most = PART) {
+    const { w, row, arguments: settings } = this.controller;
+    const [x, y] = noisy(this.x, this.y, this.noise(this.samples), this.settings);
+    w[row.vibration_x] = x;
+    w[row.vibration_y] = y;
+    CONTROLLERS[this.settings.algorithm](...settings, w, this.part);
+    if (w[row.samples] > this.samples) this.#sample(Math.hypot(x, y));
+    this.part = Math.min(w[row.wait], most);
+    this.#pass(this.part);
+    this.time += this.part;
+    for (; this.done < this.loads.length && this.loads[this.done].time <= this.time + INSTANT; this.done++)
+      this.#load(this.loads[this.done]);
+    this.#note();
+  }
+
+  #load({ x, y }) {
+    const { row } = this.content.places;
+    this.plant.c[this.at("START_X")] += x;
+    this.plant.c[this.at("START_Y")] += y;
+    this.w[row.vibration_x] += x;
+    this.w[row.vibration_y] += y;
+    this.deadline = this.time + this.rules.timeLimit;
+    Object.assign(this, { ended: "", settled: null, heldSince: Infinity, held: Infinity, rises: 0, first: NaN });
+  }
+
+  /** Add a step of the unbalance, as vibration, now. */
+  addLoad(x, y) {
+    this.loads = [...this.loads.slice(0, this.done), { time: this.time, x, y }];
+  }
+
+  /** Advance the disc, unless the step before, with all valves shut, has changed no number of its pairs by more than `slack`. */
+  #pass(time) {
+    const { c, k, p, q } = this.plant, { w } = this.controller;
+    let open = false;
+    this.inputs.forEach((index, i) => {
+      this.w[index] = time > 0 ? Math.max(w[this.commands[i]] - this.shorter, 0) : 0;
+      open ||= this.w[index] > 0;
+    });
+    if (this.still && !open) return;
+    const { first } = this.content.places.pairs, before = this.w.slice(first);
+    disc(c, k, p, q, this.w, time);
+    this.still = !open && time > 0 && before.every((value, i) => Math.abs(this.w[first + i] - value) <= this.slack * Math.abs(value));
+  }
+
+  #note() {
+    const above = this.amplitude > this.limit;
+    this.since = above ? Infinity : Math.min(this.since, this.time);
+    this.trace.time.push(this.time);
+    this.trace.x.push(this.x);
+    this.trace.y.push(this.y);
+    this.fills.forEach((index, i) => this.trace.fill[i].push(this.w[index]));
+  }
+
+  /** Judge the run at a sample, by the rules of the program's own loop. */
+  #sample(seen) {
+    const { rules, controller } = this, moved = this.#moved();
+    this.samples += 1;
+    if (Number.isNaN(this.first)) this.first = seen;
+    if (this.operated) {
+      const higher = seen - this.last > this.floor;
+      this.rises = higher ? this.rises + 1 : 0;
+      this.idle = moved ? 0 : this.idle + 1;
+    }
+    this.last = seen;
+    this.#hold();
+    const most = rules.rises[this.settings.algorithm], rose = this.last - this.first > this.floor;
+    const watched = Math.min(this.since, this.heldSince) <= this.deadline && this.settled === null;
+    const more = watched ? rules.hold + rules.watch + 2 * rules.period : 0;
+    if (this.settled !== null) this.ended ||= "settled";
+    else if (this.rises > most || (this.rises === most && rose)) this.ended ||= "diverging";
+    else if (this.time >= this.deadline + more) this.ended ||= this.#late();
+    this.operated = false;
+    this.commands.forEach((index, chamber) => {
+      const duration = controller.w[index];
+      if (duration > 0) this.injections.push({ time: this.time, chamber, duration });
+      this.operated ||= duration > 0;
+    });
+    this.before = this.fills.map((index) => this.w[index]);
+  }
+
+  #moved() {
+    return this.before !== null && this.fills.some((index, i) => Math.abs(this.w[index] - this.before[i]) > 1e-12);
+  }
+
+  #late() {
+    if (this.lost > 0) return "hovering";
+    return this.idle >= this.rules.idle ? "gas_time_too_short" : "time_limit";
+  }
+
+  #hold() {
+    const { rules } = this;
+    if (this.settled !== null) return;
+    if (this.heldSince === Infinity) {
+      if (this.time - this.since >= rules.hold * (1 - 1e-9) && this.since <= this.deadline)
+        Object.assign(this, { heldSince: this.since, held: this.time, above: 0 });
+    } else if (this.amplitude > this.limit) {
+      this.above += 1;
+      if (this.above > rules.allowed) {
+        Object.assign(this, { heldSince: Infinity, held: Infinity });
+        this.lost += 1;
+      }
+    }
+    if (this.time >= this.held + rules.watch * (1 - 1e-9)) this.settled = this.heldSince;
+  }
+}
+
+export const letters = (content) => [..."abcdefghijklmnopqrstuvwxyz"].slice(0, content.disc.chambers);
+
+const COARSE = 0.1; // s, longest step of a run of many
+const LONGEST_PART = 5e-3; // s
+
+/** Longer parts of a step than a host takes, stable with the gas line: they change no outcome and save most of the time. */
+function setLongestPart(content, c) {
+  const at = content.places.disc, volume = (1 - c[content.places.largestFill]) * c[at.VOLUME] + c[at.DEAD];
+  c[at.LONGEST] = Math.min(LONGEST_PART, c[at.LINE] === 0 ? LONGEST_PART : (content.rules.partOfTimeConstant * volume) / c[at.PASSING]);
+}
+
+/** End of a device's run: whether and when it settles, and what stops it. */
+export function outcomeOf(content, numbers, settings, device, noise) {
+  const run = new Run(content, numbers, settings, { device, noise, slack: 1e-9 });
+  setLongestPart(content, run.plant.c);
+  const left = [0, 1].map((row) => leftAtBest(content, run.plant, settings, row));
+  if (left[1] > 2 * run.limit) return { device, ended: "capacity_exceeded", time: Infinity };
+  while (!run.ended) run.advance(COARSE);
+  let ended = run.ended;
+  if (ended !== "settled" && left[1] > run.limit) ended = "capacity_exceeded";
+  else if (ended !== "settled" && left[0] > run.limit) ended = "stalled";
+  return { device, ended, time: run.settled ?? Infinity };
+}

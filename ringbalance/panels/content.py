@@ -13,6 +13,7 @@ from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, Judgement
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop_plan import ALLOWED, IDLE_OPERATIONS
 from ringbalance.controller.simulation import NOISE_DEVIATIONS, ROUND_OFF
+from ringbalance.design.axes import Point
 from ringbalance.export import disc, law_based
 from ringbalance.export.blocks import PART_OF_TIME_CONSTANT, Block, controller_block
 from ringbalance.export.compact import compact_law
@@ -33,6 +34,7 @@ from ringbalance.scene.describe import setting_text, usual_name
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import raw_value_at
 
 DEVICES: Final = 64
 _DISC: Final = (
@@ -103,6 +105,7 @@ def content_of(
         "valves": valves,
         "axes": [usual_name(path) for path in paths],
         "designs": designs,
+        "design": _nearest_design(scene, paths, points),
         "devices": [each.facts for each in packed],
         "pressures": [factor * scene.gas.pressure for factor in PRESSURE_FACTORS],
         "numbers": text,
@@ -110,8 +113,17 @@ def content_of(
         "rules": _rules(unchanged[0]),
         "controllers": {kind: _controller(scene, kind) for kind in ("target_vector", "trial")},
         "places": _places(packed[0].block, controllers[0]),
-        "leftOut": [each.term for each in unchanged[0].models_used if each.term in _LEFT_OUT and each.modelled],
+        "leftOut": [
+            each.term for each in unchanged[0].models_used if each.term in _LEFT_OUT and each.modelled
+        ],
     }
+
+
+def _nearest_design(scene: Scene, paths: Sequence[str], points: Sequence[Point]) -> int:
+    """Index of the design that is the scene itself, else of the first."""
+    own_values = [setting_text(path, raw_value_at(scene, path)) for path in paths]
+    texts = [[setting_text(path, each[path]) for path in paths] for each in points]
+    return texts.index(own_values) if own_values in texts else 0
 
 
 def _law(balancer: LiquidRingBalancer) -> CalibratedLaw:

@@ -136,12 +136,13 @@ class Panel {
     if (code === this.said) return;
     this.said = code;
     get("state").textContent = text;
+    get("state").className = { above: "", within: "" }[code] ?? (code === "held" ? "good" : "bad");
     get("time").setAttribute("aria-label", `Vibration over time: ${text}`);
     get("disc").setAttribute("aria-label", `Liquid in the chambers: ${letters(content).map((letter) => `${letter.toUpperCase()} ${(100 * run.value(`fill_ratio_${letter}`)).toFixed(0)} %`).join(", ")}`);
   }
 
   #sentence() {
-    const { run } = this, { ended } = run;
+    const { run } = this, ended = run.outcome;
     if (ended && ended !== "settled") return [ended, `Not settled: ${CAUSES[ended]}.`];
     const since = run.heldSince < Infinity ? run.heldSince : run.settled;
     if (since !== null && since < Infinity) return ["held", `Settled after ${digits(since)} s: it stays within ${valueText("limit", run.limit)}.`];

@@ -9,12 +9,13 @@ export const CAUSES = {
   diverging: "the vibration grows: corrections overshoot",
   hovering: "noise or overshoot takes it above the limit again and again",
   gas_time_too_short: "valve-open times are too short to move liquid",
+  overshooting: "every correction overshoots, until the time runs out",
   time_limit: "the time runs out",
   too_late: "it settles later than required",
 };
 const FIRST = 16;
 const percent = (value) => `${(100 * value).toFixed(value > 0.995 || value < 0.005 ? 0 : 1).replace(/\.0$/, "")} %`;
-const seconds = (time) => (Number.isFinite(time) ? `${digits(time)} s` : "–");
+const times = (part, time) => (Number.isFinite(time) ? `${part} within ${digits(time)} s` : `fewer than ${part} at all`);
 
 export class Many {
   /** `watch(device)` and `choose(valve)` are called for what a reader picks. */
@@ -28,7 +29,7 @@ export class Many {
       radio.addEventListener("change", () => choose(i - 1));
       const text = make("span"), bar = make("span", { className: "bar" });
       rows.append(make("label", {}, radio, make("span", { textContent: name }), bar, text));
-      this.valves.push({ radio, text, bar });
+      this.valves.push({ radio, text, bar, result: summary([], 0) });
     });
   }
 
@@ -80,7 +81,7 @@ export class Many {
   #show(outcomes, count) {
     const { rules, designs } = this.content, result = summary(outcomes, rules.settlingTime);
     for (const { device, ended, time } of outcomes) {
-      const dot = this.dots[device], text = ended === "settled" ? `settles in ${seconds(time)}` : CAUSES[ended];
+      const dot = this.dots[device], text = ended === "settled" ? `settles in ${digits(time)} s` : CAUSES[ended];
       dot.className = ended === "settled" && time <= rules.settlingTime ? "ok" : "no";
       dot.title = `device ${device + 1}: ${text}`;
       dot.setAttribute("aria-label", dot.title);
@@ -91,15 +92,20 @@ export class Many {
       ? `settle: ${result.count} of ${result.of}${result.of < count ? " so far" : ""}, 95 % bounds ${percent(low)} to ${percent(high)}; ${percent(rules.fraction)} are required`
       : "running …";
     fill(document.getElementById("bar"), result, rules.fraction);
-    document.getElementById("times").textContent = some ? `Half settle within ${seconds(result.half)}, nine of ten within ${seconds(result.most)}.` : " ";
-    const causes = result.causes.map(([cause, times]) => make("li", { textContent: `${times} × ${CAUSES[cause]}` }));
+    document.getElementById("times").textContent = some ? `They settle: ${times("half", result.half)}, ${times("nine of ten", result.most)}.` : " ";
+    const causes = result.causes.map(([cause, number]) => make("li", { textContent: `${number} × ${CAUSES[cause]}` }));
     document.getElementById("causes").replaceChildren(...causes);
   }
 
   #row(valve, outcomes) {
-    const { text, bar } = this.valves[valve + 1], result = summary(outcomes, this.content.rules.settlingTime);
-    text.textContent = result.of ? `${result.count} of ${result.of}, half within ${seconds(result.half)}` : "…";
-    fill(bar, result, this.content.rules.fraction);
+    const row = this.valves[valve + 1], result = (row.result = summary(outcomes, this.content.rules.settlingTime));
+    row.text.textContent = result.of ? `${result.count} of ${result.of}, ${times("half", result.half)}` : "…";
+    fill(row.bar, result, this.content.rules.fraction);
+    // Of the valves that can be had, the one that serves most devices, and of equals the fastest.
+    const sold = this.valves.slice(1), part = ({ count, of }) => (of ? count / of : 0);
+    const ready = sold.every(({ result: other }) => other.of >= Math.min(FIRST, this.dots.length));
+    const best = [...sold].sort((a, b) => part(b.result) - part(a.result) || a.result.half - b.result.half)[0];
+    sold.forEach((each) => each.text.classList.toggle("best", ready && each === best && part(best.result) > 0));
   }
 }
 

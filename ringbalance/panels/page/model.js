@@ -7,7 +7,7 @@ export const PART = 0.02; // s, longest step of a run that is watched
 
 /** The scene's settings of a page, SI. `integral` null: no integral part. `valve` -1: as the scene has it. */
 export function sceneSettings(content) {
-  const settings = { algorithm: content.algorithm, valve: -1, design: 0, mass: true };
+  const settings = { algorithm: content.algorithm, valve: -1, design: content.design, mass: true };
   for (const [name, range] of Object.entries(content.ranges)) settings[name] = range[2];
   return settings;
 }
@@ -107,7 +107,7 @@ function pairMoment(content, plant, settings, row) {
 }
 
 /** Vibration that is left with the best fills of all pairs, m, that a gas can reach (row 0) or the disc has (row 1). */
-export function leftAtBest(content, plant, settings, row) {
+function leftAtBest(content, plant, settings, row) {
   const at = content.places.disc, { c } = plant, most = pairMoment(content, plant, settings, row);
   const [ix, iy] = [c[at.INFLUENCE_X], c[at.INFLUENCE_Y]], square = ix * ix + iy * iy;
   let x = (c[at.START_X] * ix + c[at.START_Y] * iy) / square, y = (c[at.START_Y] * ix - c[at.START_X] * iy) / square;
@@ -138,7 +138,7 @@ export class Run {
     this.fills = letters(content).map((letter) => content.places.row[`fill_ratio_${letter}`]);
     Object.assign(this, { time: 0, part: 0, samples: 0, done: 0, still: false, ended: "", settled: null });
     Object.assign(this, { since: Infinity, held: Infinity, heldSince: Infinity, above: 0, lost: 0, rises: 0 });
-    Object.assign(this, { idle: 0, operated: false, first: NaN, last: NaN, before: null });
+    Object.assign(this, { idle: 0, overshoots: 0, seen: [0, 0], operated: false, first: NaN, last: NaN, before: null });
     const size = this.amplitude0 = Math.hypot(this.plant.c[this.at("START_X")], this.plant.c[this.at("START_Y")]);
     this.floor = this.rules.noiseDeviations * Math.SQRT2 * settings.noise + this.rules.roundOff * size;
     this.limit = this.rules.required ?? settings.limit;
@@ -165,6 +165,17 @@ export class Run {
     return Math.hypot(this.x, this.y);
   }
 
+  /** End of the run, with the cause that formulas give where it has not settled. */
+  get outcome() {
+    if (this.ended === "" || this.ended === "settled") return this.ended;
+    if (this.leftAtBest(1) > this.limit) return "capacity_exceeded";
+    return this.leftAtBest(0) > this.limit ? "stalled" : this.ended;
+  }
+
+  leftAtBest(row) {
+    return leftAtBest(this.content, this.plant, this.settings, row);
+  }
+
   /** Moment of a pair with its liquid moved to one side, kg m. */
   largestMoment() {
     return pairMoment(this.content, this.plant, this.settings, 0);
@@ -187,7 +198,7 @@ export class Run {
     w[row.vibration_x] = x;
     w[row.vibration_y] = y;
     CONTROLLERS[this.settings.algorithm](...settings, w, this.part);
-    if (w[row.samples] > this.samples) this.#sample(Math.hypot(x, y));
+    if (w[row.samples] > this.samples) this.#sample(x, y);
     this.part = Math.min(w[row.wait], most);
     this.#pass(this.part);
     this.time += this.part;
@@ -235,8 +246,10 @@ export class Run {
   }
 
   /** Judge the run at a sample, by the rules of the program's own loop. */
-  #sample(seen) {
-    const { rules, controller } = this, moved = this.#moved();
+  #sample(x, y) {
+    const { rules, controller } = this, moved = this.#moved(), seen = Math.hypot(x, y);
+    if (seen > this.limit && x * this.seen[0] + y * this.seen[1] < 0) this.overshoots += 1;
+    this.seen = [x, y];
     this.samples += 1;
     if (Number.isNaN(this.first)) this.first = seen;
     if (this.operated) {
@@ -267,7 +280,8 @@ export class Run {
 
   #late() {
     if (this.lost > 0) return "hovering";
-    return this.idle >= this.rules.idle ? "gas_time_too_short" : "time_limit";
+    if (this.idle >= this.rules.idle) return "gas_time_too_short";
+    return 2 * this.overshoots > this.samples ? "overshooting" : "time_limit";
   }
 
   #hold() {
@@ -291,6 +305,7 @@ export const letters = (content) => [..."abcdefghijklmnopqrstuvwxyz"].slice(0, c
 
 const COARSE = 0.1; // s, longest step of a run of many
 const LONGEST_PART = 5e-3; // s
+const OUT_OF_REACH = 2; // vibration left at best over the limit beyond which a run need not be carried out
 
 /** Longer parts of a step than a host takes, stable with the gas line: they change no outcome and save most of the time. */
 function setLongestPart(content, c) {
@@ -302,11 +317,7 @@ function setLongestPart(content, c) {
 export function outcomeOf(content, numbers, settings, device, noise) {
   const run = new Run(content, numbers, settings, { device, noise, slack: 1e-9 });
   setLongestPart(content, run.plant.c);
-  const left = [0, 1].map((row) => leftAtBest(content, run.plant, settings, row));
-  if (left[1] > 2 * run.limit) return { device, ended: "capacity_exceeded", time: Infinity };
+  if (run.leftAtBest(1) > OUT_OF_REACH * run.limit) return { device, ended: "capacity_exceeded", time: Infinity };
   while (!run.ended) run.advance(COARSE);
-  let ended = run.ended;
-  if (ended !== "settled" && left[1] > run.limit) ended = "capacity_exceeded";
-  else if (ended !== "settled" && left[0] > run.limit) ended = "stalled";
-  return { device, ended, time: run.settled ?? Infinity };
+  return { device, ended: run.outcome, time: run.settled ?? Infinity };
 }

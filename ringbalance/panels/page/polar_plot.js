@@ -7,7 +7,7 @@ import { peak } from "./time_plot.js";
 export function drawPolarPlot(canvas, { trace, limit, reference }) {
   const { context, width, height, colour } = prepared(canvas);
   const most = Math.max(peak(trace), reference ? peak(reference) : 0, 3 * limit) * 1.15;
-  const size = Math.min(width, height) / 2 - 20;
+  const size = Math.min(width / 2 - 44, height / 2 - 20);
   const radius = (amplitude) => (size * Math.log1p((2 * amplitude) / limit)) / Math.log1p((2 * most) / limit);
   const place = (x, y) => {
     const amplitude = Math.hypot(x, y), factor = amplitude > 0 ? radius(amplitude) / amplitude : 0;
@@ -31,7 +31,8 @@ export function drawPolarPlot(canvas, { trace, limit, reference }) {
     context.lineTo(size * x, -size * y);
     context.stroke();
     context.fillStyle = colour("muted");
-    context.fillText(label, (size + 12) * x * (width > height ? 1.1 : 1), -(size + 9) * y + 4);
+    context.textAlign = x > 0 ? "left" : x < 0 ? "right" : "center";
+    context.fillText(label, (size + 6) * x, -(size + 9) * y + 4);
   }
   context.setLineDash([6, 4]);
   context.strokeStyle = colour("good");

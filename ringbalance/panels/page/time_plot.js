@@ -35,7 +35,7 @@ export function drawTimePlot(canvas, { trace, injections, letters, limit, refere
   line(context, [[LEFT, y(limit)], [width - RIGHT, y(limit)]], colour("good"));
   context.setLineDash([]);
   context.textAlign = "right";
-  text(context, `limit ${digits(limit * 1e6)} µm`, width - RIGHT - 4, y(limit) + 15, colour("good"));
+  text(context, `limit ${digits(limit * 1e6)} µm`, width - RIGHT - 4, y(limit) - 6, colour("good"));
 
   for (const { time, label } of marks) {
     line(context, [[x(time), TOP], [x(time), bottom]], colour("bad"));

@@ -44,8 +44,8 @@ _CHAMBER_ERROR: Final = 2e-6
 _EASES: Final = (1.0, 1.6, 2.5, 4.0)
 """Factors on the error of heads, cubed on that of a chamber, tried in turn until there is room for enough
 pieces of levels: `_MAX_LEVEL_PIECES` over the square of the factor."""
-_EASE_OF_DRAWN: Final = 8.0
-"""Such a factor for drawn devices, of which pages hold many."""
+_DRAWN_EASE: Final = 8.0
+"""Factor for drawn devices, of which a page holds many."""
 _ROUNDING: Final = 0.2
 """Fraction of a piece's error to which coefficients are rounded: numbers of few bits make small libraries."""
 _END_BITS: Final = 18
@@ -143,11 +143,11 @@ def compact_law(*, scene: Scene, law: CalibratedLaw, of_many: bool = False) -> C
     """Tabulate a calibrated law again, on as few knots as `TOLERANCE` allows.
 
     Args: `scene`: scene of the law; its chamber gives the free surface. `of_many`: true for one of many drawn
-        devices, whose errors may be `_EASE_OF_DRAWN` times as large and are not measured.
+        devices, whose errors may be `_DRAWN_EASE` times as large and are not measured.
     Raises: SceneError: a law that does not fit into `MAX_BYTES`.
     """
     tables = law.heads.tables
-    for ease in (_EASE_OF_DRAWN,) if of_many else _EASES:
+    for ease in (_DRAWN_EASE,) if of_many else _EASES:
         rows, level_rows = LawRows.of(len(tables), edge=_EDGE), LawRows.of(0)
         for way, table in enumerate(tables):
             _add_way(rows, law, way, table, ease)

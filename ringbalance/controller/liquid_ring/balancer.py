@@ -247,7 +247,7 @@ class LiquidRingBalancer(Balancer):
             limit=self.limit,
             rotors=self.rotors,
             bare=self.flow_law == UNCHECKED,
-            full=None if self.full is None else self.full._drawn_runs,
+            full=None if self.full is None else self.full.drawn_runs,
         )
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> RunResult:

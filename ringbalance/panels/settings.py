@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import product
 from typing import Any, Final, cast
 
 import numpy as np
 
-from ringbalance.controller.judging.judge import FIRST_CHOOSING_DEVICE, judged_all
+from ringbalance.controller.judging.remedies import coarse_settings
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
-from ringbalance.controller.liquid_ring.loop_factor import loop_rate
 from ringbalance.controller.liquid_ring.offers import valve_choices
-from ringbalance.controller.terms import dead_time
-from ringbalance.controller.trials import rounded
 from ringbalance.design.axes import Point, plan_of_texts
 from ringbalance.design.space import Space
 from ringbalance.export import disc
@@ -27,6 +23,7 @@ from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import with_values_at
 
 MOST_DESIGNS: Final = 9
 """Largest number of designs in one page."""
@@ -37,14 +34,6 @@ _REACH: Final = 10.0
 """Factor to either side of the scene's value up to which gain, integral time and limit are tried."""
 _LEAST_LEAK: Final = 3e-9
 """Least upper end of the conductance of a leak, m^3/(s Pa)."""
-_LOOP_FACTORS: Final = (0.3, 0.5)
-_DEAD_TIMES: Final = (0.5, 1.0, 1.25)
-_PARTS: Final = (0.2, 0.5)
-"""Loop factors, offsets over the dead time, and periods over the integral time tried with a valve."""
-_TRIED_DEVICES: Final = 16
-_TRIED_TIME_S: Final = 10.0
-"""Time for which devices are watched while settings of a valve are chosen, s."""
-_TRIED_DEADLINE_S: Final = 60.0
 _LINE: Final = (disc.LINE, disc.PASSING, disc.CRITICAL, disc.LAG, disc.LONGEST)
 """Constants of the exported disc that belong to its valve and line."""
 
@@ -69,7 +58,7 @@ def ranges_of(
         "pressure": (0.2 * gas.pressure, 3 * gas.pressure, gas.pressure),
         "leak": (0.0, max(_LEAST_LEAK, 3 * leak), leak),
         "gain": (min(gains) / _REACH, max(gains) * _REACH, settings.proportional),
-        "integral": (min(middle / _REACH, period / max(_PARTS)), middle * _REACH, integral),
+        "integral": (min(middle / _REACH, period), middle * _REACH, integral),
         "derivative": (0.0, max(4 * settings.derivative_time, period), settings.derivative_time),
         "offset": (0.0, longest, offset),
         "limit": (settings.limit / _REACH, settings.limit * _REACH, settings.limit),
@@ -102,34 +91,14 @@ def valves_of_panel(balancer: LiquidRingBalancer, compact: CompactLaw) -> list[d
 
 
 def _suited(balancer: LiquidRingBalancer) -> dict[str, Any]:
-    """Gain, integral time and offset that suit most devices, the first of equals; SI."""
-    scene, period = balancer.scene, balancer.scene.controller.period
-    rate = loop_rate(scene, balancer.model)
-    if rate <= 0.0 or scene.controller.kind != "target_vector":
-        settings = scene.controller
-        offset = max(settings.offsets(scene.disc.chambers))
-        return {"gain": settings.proportional, "integral": settings.integral_time, "offset": offset}
-    dead = dead_time(scene, balancer.model, rate=rate)
-    tried = [
-        {
-            "controller.proportional": rounded(factor / rate),
-            "controller.integral_time": rounded(period / part),
-            "controller.gas_time_offset": (round(times * dead, 4),),
-        }
-        for factor, times, part in product(_LOOP_FACTORS, _DEAD_TIMES, _PARTS)
-    ]
-    judgements = judged_all(
-        balancer,
-        tried,
-        first=_TRIED_DEVICES,
-        most=_TRIED_DEVICES,
-        start=FIRST_CHOOSING_DEVICE,
-        watch_time=_TRIED_TIME_S,
-        deadline=_TRIED_DEADLINE_S,
-    )
-    best = max(judgements, key=lambda each: (each.fraction.value, -each.time(0.5)))
-    gain, integral, (offset,) = best.settings.values()
-    return {"gain": gain, "integral": integral, "offset": offset}
+    """Gain, integral time and offset that suit most devices, SI."""
+    scene: Scene = with_values_at(balancer.scene, coarse_settings(balancer))
+    offset = max(scene.controller.offsets(scene.disc.chambers))
+    return {
+        "gain": scene.controller.proportional,
+        "integral": scene.controller.integral_time,
+        "offset": offset,
+    }
 
 
 def design_points(scene: Scene, vary: Sequence[str]) -> tuple[tuple[str, ...], list[Point]]:

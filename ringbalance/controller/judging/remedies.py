@@ -176,24 +176,27 @@ def tried_choices(
         `Remedied`. `some`: slice of the balancer's choices to judge.
     """
 
-    def coarse_search(changed: Balancer) -> Settings:
-        """Best settings of the first kind of controller, by the number of devices that settle."""
-        around = _changed(changed, settings)
-        space = around.trials()[0]
-        grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
-        offered = (space.settings(dict(point)) for point in grid)
-        left = [each for each in offered if each is not None]
-        settled, start = np.zeros(len(left), dtype=np.int64), 0
-        for count in _COARSE_DEVICES if left else ():
-            outcomes = around.run_all(left, Draws.block(start, count))
-            settled += [int(np.count_nonzero(each.settled)) for each in outcomes]
-            best = np.flatnonzero(settled >= -np.sort(-settled)[(len(left) - 1) // 3])
-            left, settled, start = [left[i] for i in best], settled[best], start + count
-        return {**settings, **left[int(np.argmax(settled))]} if left else settings
+    def search(changed: Balancer) -> Settings:
+        return {**settings, **coarse_settings(_changed(changed, settings))}
 
-    judge = partial(_judge, balancer, search=coarse_search, scan_path=scan_path, progress=progress)
+    judge = partial(_judge, balancer, search=search, scan_path=scan_path, progress=progress)
     rows = (judge([choice], start=FIRST_VERDICT_DEVICE) for choice in balancer.choices()[some])
     return tuple(row for row in rows if row is not None)
+
+
+def coarse_settings(balancer: Balancer) -> Settings:
+    """Best settings of a coarse grid for the first kind of controller, by how many devices settle."""
+    space = balancer.trials()[0]
+    grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
+    offered = (space.settings(dict(point)) for point in grid)
+    left = [each for each in offered if each is not None]
+    settled, start = np.zeros(len(left), dtype=np.int64), 0
+    for count in _COARSE_DEVICES if left else ():
+        outcomes = balancer.run_all(left, Draws.block(start, count))
+        settled += [int(np.count_nonzero(each.settled)) for each in outcomes]
+        best = np.flatnonzero(settled >= -np.sort(-settled)[(len(left) - 1) // 3])
+        left, settled, start = [left[i] for i in best], settled[best], start + count
+    return left[int(np.argmax(settled))] if left else {}
 
 
 def _judge(

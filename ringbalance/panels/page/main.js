@@ -57,13 +57,19 @@ class Panel {
     this.reference = null;
     if (JSON.stringify(state.settings) !== JSON.stringify({ ...this.scene, design }) || state.device !== null) this.reference = this.#reference(design);
     this.form.show(state.settings, this.#designText(run));
-    get("which").textContent = state.device === null ? "of the device as the scene states it" : `of drawn device ${state.device + 1}`;
+    const which = state.device === null ? "of the device as the scene states it" : `of drawn device ${state.device + 1}`;
+    get("which").textContent = this.reference ? `${which}; grey: the scene's settings` : which;
     get("speed").value = state.speed;
     get("seed").value = state.seed;
     get("block").textContent = sceneBlocks(content, state.settings, this.scene);
     get("facts").textContent = this.#facts();
-    clearTimeout(this.later);
-    this.later = setTimeout(() => this.many.run(state, (valve) => ({ ...state.settings, valve, ...this.suitedTo(valve) })), 120);
+    const many = JSON.stringify([state.settings, state.seed]);
+    if (many === this.manyOf) this.many.mark(state.device);
+    else {
+      clearTimeout(this.later);
+      this.later = setTimeout(() => this.many.run(state, (valve) => ({ ...state.settings, valve, ...this.suitedTo(valve) })), 120);
+    }
+    this.manyOf = many;
     this.restart();
   }
 
@@ -160,7 +166,8 @@ class Panel {
     const own = `The program's own runs of these ${program.of} devices under the scene's settings: ${program.count} settle.`;
     if (!content.leftOut.length) return own;
     const time = lostTime(content, state.settings);
-    const instead = state.settings.mass ? `in their place each injection is shortened by ${digits(time * 1e3)} ms, which short ones lose to them.` : "nothing is in their place.";
+    const shorter = time > 0 ? `in their place each injection is shortened by ${digits(time * 1e3)} ms, which short ones lose to them.` : "here short injections lose no time to them.";
+    const instead = state.settings.mass ? shorter : "nothing is in their place.";
     return `${own} The exported disc leaves out ${content.leftOut.join(" and ")}; ${instead}`;
   }
 

@@ -64,8 +64,13 @@ export class Many {
     this.dots.forEach((dot, device) => {
       dot.className = "";
       dot.setAttribute("aria-label", `device ${device + 1}`);
-      dot.setAttribute("aria-pressed", device === watched);
     });
+    this.mark(watched);
+  }
+
+  /** Mark the device that is watched; null: none. */
+  mark(watched) {
+    this.dots.forEach((dot, device) => dot.setAttribute("aria-pressed", device === watched));
   }
 
   #move(event) {

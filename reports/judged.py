@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import WATCH_TIME_S, Balancer, Outcomes
 from ringbalance.controller.judging.judge import Judgement, judged_all, plain_settings
-from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning
+from ringbalance.controller.judging.tuning import LONG_WATCH_TIME_S, Tuning, runout_findings
 from ringbalance.reports.prose import key_words, opening
 from ringbalance.reports.section import Record
 from ringbalance.results.requirements import MET, Proportion
@@ -55,13 +55,14 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
             if scene_judgement is not None and scene_judgement.verdict == MET
             else (Finding(code="settings_suffice"),)
         )
+    runout = [each.document() for each in runout_findings(best)]
     return {
         "own": own_document,
         "recommended": recommended,
         "moved": moved,
         "capacity": [each.document() for each in tuning.capacity],
         **({"endurance": tuning.endurance.document()} if tuning.endurance else {}),
-        **({"runout": [each.document() for each in tuning.runout]} if tuning.runout else {}),
+        **({"runout": runout} if runout else {}),
         **{name: document[name] for name in ("along", "ranking", "remedies")},
         "measures": [each.document() for each in measures],
     }

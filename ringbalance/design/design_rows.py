@@ -12,7 +12,12 @@ import numpy as np
 
 from ringbalance.controller.balancer import REQUIRED_FRACTION, Demand
 from ringbalance.controller.judging.judge import Judgement, plain_settings
-from ringbalance.controller.judging.tuning import if_exact, required_table
+from ringbalance.controller.judging.tuning import (
+    if_exact,
+    reported_findings,
+    reported_quantities,
+    required_table,
+)
 from ringbalance.design.designing import VALVE, Design
 from ringbalance.results.numbers import MISSING, format_given, percent
 from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
@@ -106,6 +111,7 @@ def _quantities(design: Design) -> Iterator[Quantity]:
     if judgement is not None:
         name = "devices that meet what is required"
         yield Quantity.of_fraction(judgement.fraction, key="fraction_met", name=name)
+        yield from reported_quantities(judgement)
         yield Quantity(
             key="size", name="cylinder around the chambers", value=design.size, unit="m^3", digits=4
         )
@@ -135,6 +141,7 @@ def _findings(design: Design) -> Iterator[Finding]:
     if times["p50"] is not None:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
         yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+    yield from reported_findings(judgement)
     if design.endurance is not None:
         yield design.endurance.finding
     yield Finding(code="design_looked", values=counted)

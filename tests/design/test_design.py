@@ -18,7 +18,7 @@ from design_answers import PROBLEMS, compared
 from design_spread import answer
 
 import ringbalance as rb
-from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.balancer import Demand, balancer_of
 from ringbalance.controller.judging.judge import MOST_DRAWS, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.design.races import deal, threshold
@@ -83,6 +83,31 @@ def test_threads_make_no_difference(design: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
         other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
     assert other.to_dict() == design.to_dict()
+
+
+def test_a_design_says_what_its_gas_jet_digs_where_nothing_limits_it(design: rb.Design) -> None:
+    """Quantity and sentence with the number that nine tenths of the devices keep to; none without a hole."""
+    assert design.judgement is not None
+    before = design.to_dict()
+    craters = np.linspace(0.1, 1.1, design.judgement.outcomes.settling_time.size)
+    outcomes = replace(design.judgement.outcomes, crater=craters)
+    limit = Demand(code="crater", outcome="crater", sense="at most", required=0.5, unit="1", stated=True)
+    said, limited = (
+        replace(design, judgement=replace(design.judgement, outcomes=outcomes, demands=demands)).to_dict()
+        for demands in (design.judgement.demands, (*design.judgement.demands, limit))
+    )
+
+    def codes(document: dict[str, Any]) -> list[str]:
+        return [each["code"] for each in document["findings"]]
+
+    def reached(document: dict[str, Any]) -> list[float]:
+        return [each["value"] for each in document["quantities"] if each["key"] == "crater_reached"]
+
+    assert "crater_not_required" not in codes(before) + codes(limited)
+    assert reached(before) == []
+    assert reached(said) == reached(limited) == pytest.approx([1.0], abs=1e-3)
+    (finding,) = (each for each in said["findings"] if each["code"] == "crater_not_required")
+    assert "the gas jet digs 100 % of the ring's depth at most in nine tenths" in finding["text"]
 
 
 @pytest.mark.heavy

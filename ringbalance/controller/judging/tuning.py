@@ -220,16 +220,7 @@ class Tuning(Result):
         ):
             if judgement is not None:
                 yield Quantity.of_fraction(judgement.fraction, key=key, name=name)
-        if self._of_rotor is not None:
-            for key, name, demand in (
-                ("fraction_reading", "devices whose reading settles in time", self.recommended.demands[0]),
-                ("fraction_rotor", "devices whose rotor is within the limit at the end", self._of_rotor),
-            ):
-                yield Quantity.of_fraction(self.recommended.fraction_of(demand), key=key, name=name)
-        crater = self.recommended.crater_reached
-        if crater is not None:
-            name = "crater over the ring in nine tenths at most"
-            yield Quantity(key="crater_reached", name=name, value=crater, origin="simulated", digits=2)
+        yield from reported_quantities(self.recommended)
         times = self.recommended.settling_times
         for part, name in (("p50", "half of them settle within"), ("p90", "nine tenths settle within")):
             yield Quantity(
@@ -241,26 +232,6 @@ class Tuning(Result):
                 status="ok" if times[part] is not None else "not_reached",
                 digits=3,
             )
-
-    @property
-    def _of_rotor(self) -> Demand | None:
-        """Demand on the vibration of the rotor itself; None where the sensor has no runout."""
-        demands = (*self.recommended.demands, *self.recommended.reported)
-        return next((each for each in demands if each.code == ROTOR_AMPLITUDE), None)
-
-    @property
-    def runout(self) -> tuple[Finding, ...]:
-        """Finding on readings and rotors of the devices; empty where the sensor has no runout."""
-        if self._of_rotor is None:
-            return ()
-        best = self.recommended
-        values: dict[str, Value] = {
-            "reading": best.fraction_of(best.demands[0]).value,
-            "rotor": best.fraction_of(self._of_rotor).value,
-            "limit": self._of_rotor.required,
-            "median": float(np.median(best.outcomes.final_amplitude)),
-        }
-        return (Finding(code="tuned_runout", values=values),)
 
     def _findings(self) -> Iterator[Finding]:
         """Sentences on the verdict, the settling times, the scene's own settings, causes and remedies."""
@@ -281,7 +252,7 @@ class Tuning(Result):
         if times["p50"] is not None:
             code = "tuned_half" if times["p90"] is None else "tuned_times"
             yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
-        yield from self.runout
+        yield from reported_findings(best)
         if unchanged is None:
             yield Finding(code="tuned_own_none")
         elif not best.settings:
@@ -322,6 +293,45 @@ class Tuning(Result):
 def if_exact(scene: SceneFile, judgement: Judgement) -> str:
     """Suffix of the code of a met verdict where the scene states no uncertainty; else empty."""
     return _EXACT if judgement.verdict == MET and not (scene.uncertainty or scene.fitted.quantities) else ""
+
+
+def reported_quantities(judgement: Judgement) -> Iterator[Quantity]:
+    """Readings and rotors apart where the sensor has a runout; the crater where the scene gives a gas hole."""
+    if (rotor := _of_rotor(judgement)) is not None:
+        for key, name, demand in (
+            ("fraction_reading", "devices whose reading settles in time", judgement.demands[0]),
+            ("fraction_rotor", "devices whose rotor is within the limit at the end", rotor),
+        ):
+            yield Quantity.of_fraction(judgement.fraction_of(demand), key=key, name=name)
+    if (crater := judgement.crater_reached) is not None:
+        name = "crater over the ring in nine tenths at most"
+        yield Quantity(key="crater_reached", name=name, value=crater, origin="simulated", digits=2)
+
+
+def reported_findings(judgement: Judgement) -> Iterator[Finding]:
+    """Findings on the runout of the sensor, and on a crater that nothing limits."""
+    yield from runout_findings(judgement)
+    crater = judgement.crater_reached
+    if crater is not None and all(each.code != "crater" for each in judgement.demands):
+        yield Finding(code="crater_not_required", values={"crater": crater})
+
+
+def runout_findings(judgement: Judgement) -> Iterator[Finding]:
+    """Finding on readings and rotors of the devices; none where the sensor has no runout."""
+    if (rotor := _of_rotor(judgement)) is not None:
+        values: dict[str, Value] = {
+            "reading": judgement.fraction_of(judgement.demands[0]).value,
+            "rotor": judgement.fraction_of(rotor).value,
+            "limit": rotor.required,
+            "median": float(np.median(judgement.outcomes.final_amplitude)),
+        }
+        yield Finding(code="tuned_runout", values=values)
+
+
+def _of_rotor(judgement: Judgement) -> Demand | None:
+    """Demand on the vibration of the rotor itself; None where the sensor has no runout."""
+    demands = (*judgement.demands, *judgement.reported)
+    return next((each for each in demands if each.code == ROTOR_AMPLITUDE), None)
 
 
 def required_table(judgement: Judgement) -> Table:

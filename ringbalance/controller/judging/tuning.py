@@ -296,7 +296,7 @@ def if_exact(scene: SceneFile, judgement: Judgement) -> str:
 
 
 def reported_quantities(judgement: Judgement) -> Iterator[Quantity]:
-    """Readings and rotors apart where the sensor has a runout; the crater where the scene gives a gas hole."""
+    """Readings and rotors apart where the sensor has a runout; the crater where the scene gives the hole."""
     if (rotor := _of_rotor(judgement)) is not None:
         for key, name, demand in (
             ("fraction_reading", "devices whose reading settles in time", judgement.demands[0]),

@@ -84,8 +84,9 @@ def terms_of(scene: Scene, *, injections_only: bool = False) -> Iterator[Term]:
     if not injections_only:
         yield from _chamber_terms(scene)
         yield from _tube_terms(scene)
-    yield from _injection_terms(scene)
-    yield _lifted_liquid(scene)
+    deciding = estimates.injection_time(scene)
+    yield from _injection_terms(scene, deciding)
+    yield _lifted_liquid(scene, deciding)
     if not injections_only:
         yield _gas_jet(scene)
 
@@ -168,9 +169,9 @@ def _tube_terms(scene: Scene) -> Iterator[Term]:
         yield Term(name, group, model, value, text, "", needed, without)
 
 
-def _injection_terms(scene: Scene) -> Iterator[Term]:
-    """Start of the column, and filling and lag of the gas line, over the shortest injection that matters."""
-    gas, flow, deciding = scene.gas, estimates.range_flow(scene), estimates.injection_time(scene)
+def _injection_terms(scene: Scene, deciding: float) -> Iterator[Term]:
+    """Start of the column, filling and lag of the gas line, over the shortest injection that matters, s."""
+    gas, flow = scene.gas, estimates.range_flow(scene)
     within = f"in the shortest injection that matters, {1e3 * deciding:.3g} ms"
     value, text = None, _NOTHING_FLOWS
     if np.any(flow.starts):
@@ -210,10 +211,9 @@ def _injection_terms(scene: Scene) -> Iterator[Term]:
             yield Term(name, group, model, None, text, unknown=unknown)
 
 
-def _lifted_liquid(scene: Scene) -> Term:
+def _lifted_liquid(scene: Scene, deciding: float) -> Term:
     """Liquid that is lifted to the crest and falls back, as in a run, at the lowest level of the range."""
-    flow, deciding = estimates.range_flow(scene), estimates.injection_time(scene)
-    tube, value, text = scene.tube, None, _NOTHING_FLOWS
+    flow, tube, value, text = estimates.range_flow(scene), scene.tube, None, _NOTHING_FLOWS
     slowest = float(np.min(flow.velocity[flow.starts], initial=np.inf))
     if tube.hump_radius is None:
         value, text = 0.0, "a tube without a crest stays full"

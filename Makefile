@@ -96,7 +96,7 @@ bench: env ## timed comparisons, each a ratio within one run
 	$(PYTHON_IN_VENV) benchmarks/moving_injection.py
 	$(PYTHON_IN_VENV) benchmarks/eccentric_mass.py
 
-bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results
+bench-cfd: env ## tube, waves and gas jet beside OpenFOAM, an hour or so; keeps the results
 	@sh tools/make_openfoam.sh
 	$(PYTHON_IN_VENV) benchmarks/openfoam.py --keep
 

@@ -1,6 +1,6 @@
-"""The program compared with OpenFOAM: the rotating tube, straight and bent, and waves on the ring.
+"""The program compared with OpenFOAM: the rotating tube, straight and bent, waves on the ring, the gas jet.
 
-    python benchmarks/openfoam.py [--out out/openfoam] [--only tube bend turbulent waves] [--keep]
+    python benchmarks/openfoam.py [--out out/openfoam] [--only tube bend turbulent waves jet] [--keep]
 
 Needs Debian's package `openfoam` (1912), which is used only here.  Every quantity is computed on three
 meshes; its uncertainty is that of the grid convergence index, and the two agree when their difference is
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import platform
 import sys
 import time
@@ -23,6 +24,8 @@ from typing import Any
 
 import numpy as np
 from openfoam_case import missing
+from openfoam_jets import GAS, LIQUID, WIDTH_M, Bath, crater
+from openfoam_jets import GRAVITY as FALL
 from openfoam_page import page
 from openfoam_tubes import bent_tube, straight_tube
 from openfoam_waves import (
@@ -39,6 +42,7 @@ from openfoam_waves import (
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence import gci
+from ringbalance.physics.gas_jet import Jet, crater_depth
 from ringbalance.physics.sloshing import sloshing_modes, sloshing_response
 from ringbalance.physics.tube.friction import rotation_reynolds_number
 from ringbalance.physics.tube.loss import model_parts
@@ -66,6 +70,8 @@ LAMINAR = ((1e4, 0.5), (1e5, 0.5))
 TURBULENT = ((1e4, 0.0), (1e4, 2356.0), (2e4, 2356.0))
 """Pairs of Re and R; R = 2356 is water in the paper's tube."""
 FILLS = (0.25, 0.45)
+PRESSURES = (0.25, 0.5, 1.0)
+"""q over (rho - rho_g) g d of the jets."""
 STEPS, WRITES, RAMP, TURNS, PUSH = 150, 25, 9.0, 14.0, 0.4
 
 
@@ -291,11 +297,42 @@ def _theory(disc: Disc, fill: float) -> dict[str, Answer]:
     return results
 
 
+def jet(_: Scene, out: Path) -> Iterator[Row]:
+    """Depth of the crater of a plane jet, as long as the surface lies in the core of the jet."""
+    for pressure in PRESSURES:
+        cells = (3, 4, 6)
+        runs = [
+            crater(folder=out / f"jet-{n}", bath=Bath(pressure=pressure, distance=3.0, cells=n))
+            for n in cells
+        ]
+        begin = time.process_time()
+        far, density = 1e3 * WIDTH_M, LIQUID - GAS
+        # A ring so large that it is a bath, and a jet that keeps its pressure.
+        ours = crater_depth(
+            Jet(
+                pressure=np.array(math.nan), momentum=np.array(math.inf),
+                stagnation=np.array(pressure * density * FALL * WIDTH_M),
+            ),
+            distance=3 * WIDTH_M, surface_radius=far, density=density, speed=math.sqrt(FALL / far),
+        )  # fmt: skip
+        answer = Answer(
+            value=float(ours) / WIDTH_M, half_width=0.0, seconds=time.process_time() - begin
+        )  # fmt: skip
+        results = row(
+            quantity=f"depth over the slot's width, q/((rho - rho_g) g d) = {pressure:g}",
+            values=[each.depth for each in runs], cells=cells, ours=answer, seconds=runs[-1].seconds,
+        )  # fmt: skip
+        # What is left of the bath's waves, which the mean over two periods contains.
+        both = float(np.hypot(results.openfoam_half_width, runs[-1].deviation))
+        yield replace(results, openfoam_half_width=both)
+
+
 STUDIES: dict[str, Callable[[Scene, Path], Iterator[Row]]] = {
     "tube": tube,
     "bend": bend,
     "turbulent": turbulent,
     "waves": waves,
+    "jet": jet,
 }
 
 
@@ -319,16 +356,19 @@ def main() -> int:
         print(needed, file=sys.stderr)
         return 1
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
-    document = {"date": date.today().isoformat(), "openfoam": "1912", "machine": platform.machine()}
-    rows = json.loads(KEPT.read_text(encoding="utf-8"))["rows"] if KEPT.exists() else {}
+    document = {"openfoam": "1912", "machine": platform.machine()}
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {"rows": {}, "dates": {}}
+    rows, dates = kept["rows"], kept["dates"]
     for name in options.only:
         rows[name] = []
         for results in STUDIES[name](scene, options.out):
             rows[name].append({**asdict(results), "agrees": results.agrees})
             print(_said(results), flush=True)
         if options.keep:
-            write_whole(KEPT, json.dumps({**document, "rows": rows}, indent=1) + "\n")
-            write_whole(PAGE, page({**document, "rows": rows}))
+            dates[name] = date.today().isoformat()
+            document |= {"dates": dates, "rows": rows}
+            write_whole(KEPT, json.dumps(document, indent=1) + "\n")
+            write_whole(PAGE, page(document))
     return 0
 
 

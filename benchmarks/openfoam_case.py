@@ -20,7 +20,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
-PROGRAMS = ("SRFSimpleFoam", "pimpleFoam", "makeFaMesh")
+PROGRAMS = ("SRFSimpleFoam", "pimpleFoam", "makeFaMesh", "interFoam")
 _DEBIAN = "/usr/share/openfoam"
 """Folder in Debian's package for the paths that OpenFOAM's own shell setup would set."""
 

@@ -180,19 +180,23 @@ def _refusals(texts: Sequence[str], points: int) -> Iterator[Finding]:
 
 
 def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
-    """Finding on the demand that most devices miss, with the value reached."""
-    worst = min(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
+    """Findings on demands that too few devices meet, the worst first, each with the value reached."""
     parts = (judgement.required_fraction, 0.5)
-    part = next((each for each in parts if math.isfinite(_reached(judgement, worst, each))), parts[0])
-    reached = _reached(judgement, worst, part)
-    values: dict[str, Value] = {
-        "what": worst.code.replace("_", " "),
-        "required": f"{worst.sense} {format_given(worst.required, worst.unit, digits=4)}",
-        "share": judgement.fraction_of(worst).value,
-        "asked": part,
-        "reached": format_given(reached, worst.unit, digits=3) if math.isfinite(reached) else MISSING,
-    }
-    yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
+    order = sorted(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
+    for i, demand in enumerate(order):
+        share = judgement.fraction_of(demand).value
+        if i and share >= judgement.required_fraction:
+            break
+        part = next((each for each in parts if math.isfinite(_reached(judgement, demand, each))), parts[0])
+        reached = _reached(judgement, demand, part)
+        values: dict[str, Value] = {
+            "what": demand.code.replace("_", " "),
+            "required": f"{demand.sense} {format_given(demand.required, demand.unit, digits=4)}",
+            "share": share,
+            "asked": part,
+            "reached": format_given(reached, demand.unit, digits=3) if math.isfinite(reached) else MISSING,
+        }
+        yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
     if causes := judgement.causes:
         yield Finding(code="tuned_causes", values={"causes": causes})
     yield from design.ranking.findings()

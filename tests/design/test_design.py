@@ -185,6 +185,23 @@ def test_the_demand_that_stands_against_every_design_is_named(late: rb.Design) -
     assert demand.values["share"] == pytest.approx(0.0)
 
 
+def test_every_demand_that_too_few_devices_meet_is_named(late: rb.Design) -> None:
+    """A crater that seven in ten devices keep to is named after the settling time, one of all is not."""
+    assert late.judgement is not None
+    craters = np.linspace(0.0, 1.0, late.judgement.outcomes.settling_time.size)
+    named = {}
+    for most in (0.7, 1.0):
+        limit = Demand(code="crater", outcome="crater", sense="at most", required=most, unit="1", stated=True)
+        judgement = replace(
+            late.judgement,
+            outcomes=replace(late.judgement.outcomes, crater=craters),
+            demands=(limit, *late.judgement.demands),
+        )
+        findings = replace(late, judgement=judgement).rows().findings
+        named[most] = [each.values["what"] for each in findings if each.code.startswith("design_demand")]
+    assert named == {0.7: ["settling time", "crater"], 1.0: ["settling time"]}
+
+
 def test_what_the_devices_come_to_is_said_where_none_is_in_time(late: rb.Design) -> None:
     (demand,) = (each for each in late.rows().findings if each.code.startswith("design_demand"))
     assert late.judgement is not None

@@ -15,7 +15,7 @@ from ringbalance.scene.platform.terminal import activity, print_message
 
 @checked
 def panel(
-    scene: AnyScene, *, vary: Sequence[str] = (), progress: Callable[[str], None] = lambda _: None
+    scene: AnyScene, *, vary: Sequence[str] = (), progress: Callable[[str], None] | None = None
 ) -> Panel:
     """Page on which one watches the scene's rotor being balanced, in one file that loads nothing.
 
@@ -31,7 +31,7 @@ def panel(
         >>> "<script" in panel.html
         True
     """
-    content = content_of(liquid_ring_scene(scene), vary=vary, progress=progress)
+    content = content_of(liquid_ring_scene(scene), vary=vary, progress=progress or (lambda _: None))
     return Panel(name=scene.name, html=document_of(content))
 
 

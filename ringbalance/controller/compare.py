@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import ROTOR_AMPLITUDE, Balancer, Demand, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE, plain_settings
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.rotor import (
@@ -30,7 +30,7 @@ from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.requirements import MET, Paired, Proportion
 from ringbalance.results.result import Cells, Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value, text_of
-from ringbalance.scene.arrays import FloatArray, finite
+from ringbalance.scene.arrays import BoolArray, FloatArray, finite
 from ringbalance.scene.describe import setting_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile, with_values_at
@@ -73,11 +73,19 @@ class Side:
     """Time from one vibration sample to the next, s."""
     models_used: tuple[ModelUsed, ...] = ()
     """Physical terms with model and estimated contribution, for a liquid ring."""
+    within: Demand | None = None
+    """Demand on the rotor itself, of which the reading differs; None: the sensor has no runout."""
+
+    @property
+    def served(self) -> BoolArray:
+        """True for each device that settles within the span, by its reading, and whose rotor is within the
+        limit where the scene requires that."""
+        return served(self.outcomes, self.within)
 
     @property
     def fraction(self) -> Proportion:
-        """Fraction of the devices that settle within the span."""
-        return Proportion.where(self.outcomes.settled)
+        """Fraction of the devices that are served."""
+        return Proportion.where(self.served)
 
     def middle(self, name: str) -> float | None:
         """Median of a device number over the devices that settle; None: none does."""
@@ -96,7 +104,14 @@ class Side:
     def quantities(self, prefix: str) -> Iterator[Quantity]:
         """The fraction that settles, then medians with minimum and maximum. Args: `prefix`: of the keys."""
         name = "devices that settle"
-        yield Quantity.of_fraction(self.fraction, key=f"{prefix}fraction_settled", name=name)
+        settled = Proportion.where(self.outcomes.settled)
+        yield Quantity.of_fraction(settled, key=f"{prefix}fraction_settled", name=name)
+        if self.within is not None:
+            rotors, name = (
+                Proportion.where(self.within.met(self.outcomes)),
+                "rotors within the limit at the end",
+            )
+            yield Quantity.of_fraction(rotors, key=f"{prefix}fraction_rotor", name=name)
         for _, name, key, words, unit in _DEVICE_NUMBERS:
             low, high = self.ends(name) or (None, None)
             yield Quantity(
@@ -148,7 +163,7 @@ class Comparison(Result):
     @property
     def paired(self) -> Paired:
         """Counts of devices that settle on both sides, on one, on neither."""
-        return Paired.of(*(side.outcomes.settled for side in self.sides))
+        return Paired.of(*(side.served for side in self.sides))
 
     @property
     def better(self) -> int | None:
@@ -216,6 +231,9 @@ class Comparison(Result):
                 ("span", "time of each run, at most", "s", self.span),
             )
         ]
+        if rotor.runout is not None:
+            size = rotor.runout.amplitude
+            of_rotor.append(Quantity(key="runout", name="runout", unit="m", value=size, origin="given"))
         of_sides = [tuple(side.quantities(f"{number}.")) for number, side in enumerate(sides, start=1)]
 
         # The verdict on both, then settling and kind of energy of each.
@@ -225,6 +243,12 @@ class Comparison(Result):
         if self.better is not None:
             code, values["source"] = "compared_better", sides[self.better].scene.source
         findings = [Finding(code=code, values=values)]
+        if rotor.runout is not None:
+            decides = (
+                "devices whose rotor is within the limit at the end" if rotor.limits_rotor else "readings"
+            )
+            values = {"runout": rotor.runout.amplitude, "decides": decides}
+            findings.append(Finding(code="compared_runout", values=values))
         for side in sides:
             share = side.fraction
             values = {"source": side.scene.source, "text": side.status}
@@ -290,9 +314,13 @@ def compare(
         span = max(each.span() for each in mounted)
         balancers = [each.lasting(span) for each in mounted]
         settings = [searched(each, progress=report) for each in balancers]
-        outcomes = _run_both(balancers, settings, most=most, progress=report)
+        within = [
+            next((d for d in (*each.demands(), *each.reported()) if d.code == ROTOR_AMPLITUDE), None)
+            for each in balancers
+        ]
+        outcomes = _run_both(balancers, settings, within, most=most, progress=report)
         sides = []
-        for balancer, chosen, ended in zip(balancers, settings, outcomes, strict=True):
+        for balancer, chosen, ended, demand in zip(balancers, settings, outcomes, within, strict=True):
             numbers = range(FIRST_VERDICT_DEVICE, FIRST_VERDICT_DEVICE + ended.settled.size)
             before = np.array([rotors(number).amplitude for number in numbers])
             draws = Draws.block(FIRST_VERDICT_DEVICE, _TRACED_DEVICES)
@@ -310,6 +338,7 @@ def compare(
                     energy_kind=balancer.energy_kind,
                     sampling_time=balancer.sampling_time(),
                     models_used=tuned.models_used,
+                    within=demand,
                 )
             )
     except SceneError as error:
@@ -322,8 +351,20 @@ def compare(
     return Comparison(rotor=common, span=span, asked=required, sides=(sides[0], sides[1]))
 
 
+def served(outcomes: Outcomes, within: Demand | None) -> BoolArray:
+    """True for each device of `Side.served`."""
+    if within is None or not within.stated:
+        return outcomes.settled
+    return outcomes.settled & within.met(outcomes)
+
+
 def _run_both(
-    balancers: Sequence[Balancer], settings: Sequence[Settings], *, most: int, progress: Callable[[str], None]
+    balancers: Sequence[Balancer],
+    settings: Sequence[Settings],
+    within: Sequence[Demand | None],
+    *,
+    most: int,
+    progress: Callable[[str], None],
 ) -> list[Outcomes]:
     """Run both balancers as the same devices, whose number doubles until a difference is shown."""
     outcomes: list[Outcomes] = []
@@ -336,6 +377,6 @@ def _run_both(
         ]
         outcomes = [a.joined(b) for a, b in zip(outcomes, new, strict=True)] if outcomes else new
         count += block
-        difference = Paired.of(outcomes[0].settled, outcomes[1].settled).better(_DIFFERENCE_LEVEL)
+        difference = Paired.of(*map(served, outcomes, within)).better(_DIFFERENCE_LEVEL)
         block = 0 if difference is not None else min(count, most - count)
     return outcomes

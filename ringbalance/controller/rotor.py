@@ -25,6 +25,7 @@ from ringbalance.scene import loop_models
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.schema import LIQUID_RING
+from ringbalance.scene.loop_models import Runout
 from ringbalance.scene.origins import SceneFile
 
 MAX_CHAMBERS: Final = len(ascii_uppercase)
@@ -118,6 +119,10 @@ class CommonRotor:
     """Standard deviation of the measured vibration, m."""
     limit: float
     """Amplitude to come below, m."""
+    runout: Runout | None = None
+    """Vector that the sensor adds to every vibration; None: nothing."""
+    limits_rotor: bool = False
+    """True if the limit is one of the rotor itself, where a runout makes the reading another."""
 
     @property
     def amplitude(self) -> float:
@@ -159,7 +164,15 @@ def joined_rotor(rotor: CommonRotor, other: CommonRotor) -> CommonRotor:
     Symmetric in both: no verdict under it depends on which is named first.
     """
     rougher = max(rotor, other, key=lambda each: (each.amplitude, each.mass or 0.0))
-    return replace(rougher, noise=max(rotor.noise, other.noise), limit=min(rotor.limit, other.limit))
+    runouts = [each.runout for each in (rotor, other) if each.runout is not None]
+    return replace(
+        rougher,
+        noise=max(rotor.noise, other.noise),
+        limit=min(rotor.limit, other.limit),
+        # Of equal runouts that whose phase is not known.
+        runout=max(runouts, key=lambda each: (each.amplitude, each.phase is None, each.phase), default=None),
+        limits_rotor=rotor.limits_rotor or other.limits_rotor,
+    )
 
 
 def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:

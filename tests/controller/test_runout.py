@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from itertools import permutations
 from typing import Any, Final, cast
 
 import numpy as np
@@ -12,9 +13,12 @@ from own_draws import drawn
 from own_plant import Run, Share, run, settings_of
 
 import ringbalance
+from ringbalance.controller import compare as compare_module
 from ringbalance.controller.balancer import Draws, balancer_of
+from ringbalance.controller.compare import compare
 from ringbalance.controller.document import simulation_history
 from ringbalance.controller.judging.judge import judged_all
+from ringbalance.controller.rotor import joined_rotor, rotors_of
 from ringbalance.export import disc
 from ringbalance.export.blocks import disc_block
 from ringbalance.reduced_model.calibration import calibrate
@@ -198,7 +202,47 @@ def test_a_broken_runout_is_one_error(name: str, runout: object, text: str) -> N
     assert len(error.value.faults) == 1
 
 
-def test_a_comparison_takes_no_runout() -> None:
-    scene = with_runout("1 um")
-    with pytest.raises(SceneError, match="under one sensor without runout"):
-        ringbalance.compare(scene, bundled("six_chamber"), rotor="second")
+@pytest.mark.parametrize("required", [False, True])
+def test_a_comparison_has_one_runout_for_both(required: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With 1 um all readings settle and no rotor comes below 0.05 um; that of one scene holds for both, with
+    the same phase of a numbered device.  A residual that one scene requires is one of the rotor."""
+    monkeypatch.setattr(compare_module, "searched", lambda *_, **__: {})
+    stated = {"requirement__residual": "0.05 um"} if required else {}
+    scenes = with_runout("1 um", **stated), bundled("liquid_ring_paper", TUNED)
+    balancers = [balancer_of(scene.with_values({"run.time_limit": "15 s"})) for scene in scenes]
+    result, reverse = compare(*balancers, most=8), compare(*balancers[::-1], most=8)
+    values = {each.key: each.value for each in result.rows().quantities}
+    assert values["runout"] == 1e-6
+    assert [values[f"{i}.fraction_settled"] for i in (1, 2)] == [1.0, 1.0]
+    assert [values[f"{i}.fraction_rotor"] for i in (1, 2)] == [0.0, 0.0]
+    assert [side.fraction.count for side in result.sides] == ([0, 0] if required else [8, 8])
+    assert [side.fraction for side in reverse.sides] == [side.fraction for side in result.sides]
+    (finding,) = [each for each in result.rows().findings if each.code == "compared_runout"]
+    assert ("rotor" in finding.text) == required
+    for side in result.sides:
+        assert np.all(np.abs(side.outcomes.final_amplitude - 1e-6) <= 1.2 * LIMIT)
+    rotors = rotors_of(
+        joined_rotor(*(each.rotor() for each in balancers)), *(each.rotor for each in balancers)
+    )
+    phases = [
+        cast(Any, each.on_rotor(rotors(3), rotors)).drawn_runs.device(3).scene.sensor.runout_phase
+        for each in balancers
+    ]
+    assert phases[0] == phases[1] != 0.0
+
+
+def test_the_larger_runout_is_that_of_both() -> None:
+    rotors = [
+        balancer_of(with_runout(*each)).rotor() for each in (("1 um", "70 deg"), ("2 um",), ("2 um", "9 deg"))
+    ]
+    for first, second in permutations(rotors, 2):
+        runout = joined_rotor(first, second).runout
+        assert runout is not None
+        assert runout.amplitude == 2e-6
+        assert (runout.phase is None) == (rotors[1] in (first, second))
+
+
+def test_eccentric_masses_take_no_runout() -> None:
+    masses = balancer_of(ringbalance.load_scene(ringbalance.bundled_scene("driven_masses_small")))
+    with pytest.raises(SceneError, match="has runout, which runs of eccentric masses do not model"):
+        masses.on_rotor(balancer_of(with_runout("1 um")).rotor())

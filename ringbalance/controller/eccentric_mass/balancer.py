@@ -236,8 +236,12 @@ class EccentricMassBalancer(Balancer):
         """Balancer on a rotor, masses opposite each other until the vibration is steady, with the rotor's
         noise.
 
-        Errors of the assumed rotor keep their ratio. Raises: SceneError: no such rotor has these masses.
+        Errors of the assumed rotor keep their ratio. Raises: SceneError: no such rotor has these masses, or
+            the sensor has runout, which is no imbalance at any speed that the filter could estimate.
         """
+        if rotor.runout is not None:
+            problem = f"the sensor of {rotor.source} has runout, which runs of eccentric masses do not model"
+            raise rotor_fault(self.scene, "sensor", problem, "a comparison without sensor.runout")
         scene, before = self.scene, self.scene.rotor
         own_mass = before.mass + 2 * scene.masses.mass
         mass = own_mass if rotor.mass is None else rotor.mass

@@ -43,7 +43,7 @@ from ringbalance.controller.liquid_ring.drying import part_per_gas
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
 from ringbalance.controller.liquid_ring.offers import drawn_input, remedies_of, trials, valves_of
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, rotor_fault, wrapped
+from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import DrawnInput, Information, Trials
@@ -66,7 +66,7 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.draws import BLOCK, run_noise
-from ringbalance.scene.loop_models import RequirementSettings
+from ringbalance.scene.loop_models import RequirementSettings, Runout
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile, with_values_at
@@ -290,6 +290,7 @@ class LiquidRingBalancer(Balancer):
     def rotor(self, number: int | None = None) -> CommonRotor:
         """Rotor of the scene, or of a drawn device."""
         scene = self.scene if number is None else self.drawn_runs.device(number).scene
+        size = self.scene.sensor.runout_amplitude
         return CommonRotor(
             source=scene.source,
             speed=scene.rotor.speed,
@@ -298,14 +299,13 @@ class LiquidRingBalancer(Balancer):
             mass=None,
             noise=scene.sensor.amplitude_noise,
             limit=self.limit,
+            runout=None if size is None else Runout(amplitude=size, phase=self.scene.sensor.runout_phase),
+            limits_rotor=size is not None and self.scene.required_amplitude is not None,
         )
 
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> LiquidRingBalancer:
         """Balancer on another rotor, with the same valve-open time per unbalance and the same errors of
-        assumptions. Raises: SceneError: the rotor is too slow to form a ring, or the sensor has runout."""
-        if self.scene.sensor.runout_amplitude is not None:
-            problem = "a comparison is of balancers under one sensor without runout"
-            raise rotor_fault(self.scene, "sensor.runout", problem, "no runout")
+        assumptions. Raises: SceneError: the rotor is too slow to form a ring."""
         before, control = self.scene.rotor, self.scene.controller
         after = rotor_like(before, rotor)
         share = after.influence_coefficient / before.influence_coefficient
@@ -316,6 +316,8 @@ class LiquidRingBalancer(Balancer):
                 self.scene.sensor,
                 amplitude_noise=rotor.noise,
                 phase_noise=min(rotor.noise / after.initial_amplitude, 1.0),
+                runout_amplitude=None if rotor.runout is None else rotor.runout.amplitude,
+                runout_phase=None if rotor.runout is None else rotor.runout.phase,
             ),
             controller=replace(
                 control,
@@ -325,7 +327,10 @@ class LiquidRingBalancer(Balancer):
                 assumed_influence_coefficient=control.assumed_influence_coefficient * share,
                 assumed_lag_angle=wrapped(control.assumed_lag_angle - before.lag_angle + after.lag_angle),
             ),
-            requirement=RequirementSettings(fraction=self.scene.requirement.fraction),
+            requirement=RequirementSettings(
+                fraction=self.scene.requirement.fraction,
+                residual=rotor.limit if rotor.limits_rotor else None,
+            ),
         )
         check_ring(scene)
         return replace(self, scene=scene, rotors=rotors)

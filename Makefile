@@ -57,8 +57,9 @@ test-faults: env ## kills, damaged caches, odd environments: a few minutes, part
 
 test-panel: env ## pages in Chromium and Firefox, exported JavaScript in Node, part of .ci/run
 	@sh tools/make_browsers.sh
-	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m panel tests/panel
-	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) tests/export/test_javascript.py
+	@# Those of Node alone, too: `make test` leaves them out on a machine without it.
+	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) -m "not heavy and not faults" tests/panel tests/panels \
+		tests/export/test_javascript.py tests/export/test_host_pages.py::test_the_page_on_javascript
 
 test-units: env ## units of `export` under FMPy, fmutool and the cross-compiler, which it fetches
 	$(VENV)/bin/uv run --no-project --python $(PYTHON_IN_VENV) --with fmpy --with fmu-manipulation-toolbox --with ziglang -- \

@@ -136,31 +136,20 @@ def js_files(block: Block, name: str) -> dict[str, str]:
     and `step(time, inputs)`, which returns the outputs by name. For a law it also exports `flow`, and the
     functions of one chamber, which take the arrays.
     """
-    return {f"{name}.mjs": f"{_js_body(block)}\nexport {{ {_js_exports(block)} }};\n"}
-
-
-def js_expression(block: Block) -> str:
-    """The module as an expression of JavaScript: an object of its exports, for pages with several blocks."""
-    return f"(() => {{\n{_js_body(block)}\nreturn {{ {_js_exports(block)} }};\n}})()"
-
-
-def _js_exports(block: Block) -> str:
-    of_kind = ("flow", *_CHAMBER_FUNCTIONS) if block.kind == "law" else ("Block", "INPUTS", "OUTPUTS")
-    return ", ".join(("NUMBERS", *of_kind))
-
-
-def _js_body(block: Block) -> str:
     law = block.kind == "law"
     source = js_functions(block.source(("answer", *_CHAMBER_FUNCTIONS) if law else ()))
-    head = filled("head_js", block, "", source=source)
+    head = filled("head_js", block, name, source=source)
     if law:
-        return filled("js", block, "", head=head)
+        return {f"{name}.mjs": filled("js", block, name, head=head)}
     inputs, outputs = (
         "\n".join(f"    {v.name}: {v.index}, // {v.explained}" for v in side) for side in _sides(block)
     )
     arrays = f"n.constants, {'n.cells, n.pieces, n.levels, ' if block.tables else ''}this.w"
     run = f"{block.steps}({arrays}, time);"
-    return filled("block_js", block, "", head=head, inputs=inputs, outputs=outputs, run=run, kind=block.kind)
+    text = filled(
+        "block_js", block, name, head=head, inputs=inputs, outputs=outputs, run=run, kind=block.kind
+    )
+    return {f"{name}.mjs": text}
 
 
 _C_TABLES: Final = "CONSTANTS, CELL_ROWS, PIECES, LEVELS"

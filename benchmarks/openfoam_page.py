@@ -36,7 +36,9 @@ interFoam in two dimensions, on a block aligned with the axes: a jet from a slot
 bath sloshes and its waves grow until liquid flies off; in a liquid of 1,000 cSt the crater keeps its
 depth, and the uncertainty contains what is left of the waves. Here: the depth whose pressure is that
 with which the jet stops, without an uncertainty of its own; a plane and a round jet keep that pressure
-on the axis over some five widths. How a round jet decays beyond is not compared.""",
+on the axis over some five widths. Depths fall with finer cells, from 2 to 3 % above on the coarsest to 4
+to 8 % below on the finest, presumably because there the jet rolls up before it meets the liquid: the
+agreement is no closer than that. How a round jet decays farther away is not compared.""",
 }
 _HEAD = """# Beside OpenFOAM
 
@@ -90,6 +92,8 @@ def _line(row: Mapping[str, Any]) -> str:
 
 
 def _with_half_width(value: float, half_width: float) -> str:
+    if half_width == 0.0:
+        return f"{value:.3g}"
     return f"{rounded(value, half_width)} ± {rounded(half_width, half_width)}"
 
 

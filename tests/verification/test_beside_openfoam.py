@@ -18,7 +18,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 def modules(monkeypatch: pytest.MonkeyPatch) -> dict[str, ModuleType]:
     """The benchmark's modules, by the last word of their names."""
     monkeypatch.syspath_prepend(str(FOLDER))
-    names = ("case", "tubes", "waves", "page")
+    names = ("case", "tubes", "waves", "jets", "page")
     return {name: importlib.import_module(f"openfoam_{name}") for name in names}
 
 
@@ -61,6 +61,26 @@ def test_a_face_between_two_cells_is_no_boundary(modules: dict[str, ModuleType],
     mesh = replace(mesh, patches={**mesh.patches, "inlet": (quads, {"type": "patch"})})
     with pytest.raises(ValueError, match="between two cells"):
         modules["case"].write_mesh(folder=tmp_path, mesh=mesh)
+
+
+def test_the_bath_below_a_jet_is_closed_and_its_level_lies_between_cells(
+    modules: dict[str, ModuleType], tmp_path: Path
+) -> None:
+    jets = modules["jets"]
+    bath = jets.Bath(pressure=0.5, distance=3.0, cells=3)
+    x, z = bath.nodes()
+    assert (x[-1], z[-1]) == pytest.approx((8.5, bath.depth + 3.0))
+    # Half the slot has cells of its own, as wide as those about the level.
+    assert x[3] == pytest.approx(0.5)
+    level = int(np.searchsorted(z, bath.depth))
+    assert np.diff(z)[level - 2 : level + 1] == pytest.approx(x[1], rel=0.2)
+    mesh = jets._mesh(x, z)
+    modules["case"].write_mesh(folder=tmp_path, mesh=mesh)
+    corner = mesh.points[mesh.cells]
+    edges = [corner[:, i] - corner[:, 0] for i in (1, 3, 4)]
+    volumes = np.einsum("ij,ij->i", np.cross(edges[0], edges[1]), edges[2])
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(8.5 * z[-1] * 0.1 * jets.WIDTH_M**3)
 
 
 def test_free_frequencies_are_found_again(modules: dict[str, ModuleType]) -> None:

@@ -127,7 +127,17 @@ _OPTIONS: Final = {
     **dict.fromkeys(("plan", "cases"), _PATH),
     "data": ShellOption(list[Path] | None),
     **dict.fromkeys(
-        ("pressure", "preview", "all_systems", "no_intervals", "no_figures", "list_", "mutations"), _FLAG
+        (
+            "pressure",
+            "preview",
+            "in_place",
+            "all_systems",
+            "no_intervals",
+            "no_figures",
+            "list_",
+            "mutations",
+        ),
+        _FLAG,
     ),
 }
 """By name; one name means the same in every command, up to a default."""
@@ -240,9 +250,11 @@ COMMANDS: Final[dict[str, ShellCommand]] = {
 
         Args:
             scene: the scene file, with [requirement] and [design].
+            in_place: keep the disc's size, and choose bore, pressure, siphon crest, gas hole and valve;
+                [design] may be left out, and a later report shows the answer.
             save: write the scene of the design, with its settings.
         """,
-        _options("scene save valves seed workers json"),
+        _options("scene in_place save valves seed workers json"),
         "SCENE --save designed.toml",
         "no design meets the requirement of the scene, or it is undecided",
         begin="designs ...",

@@ -7,23 +7,28 @@ from concurrent.futures import Executor
 
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import Design, run_design
+from ringbalance.design.in_place import keep_design, within_disc
 from ringbalance.interface import checked
 from ringbalance.results.result import Presentation
 from ringbalance.scene import AnyScene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 
 @checked
 def find_design(
     scene: AnyScene,
     *,
+    in_place: bool = False,
     executor: Executor | None = None,
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Design:
     """Design what a scene's table [design] leaves open: the smallest disc that meets [requirement].
 
-    Args: `executor`: any `concurrent.futures.Executor`; default `workers` processes of its own. `progress`:
-        called with the present step.
+    Args: `in_place`: True to keep the disc's size and choose bore, pressure, siphon crest, gas hole and valve
+        alone, within what [design] states or usual ranges; a report then shows the answer. `executor`: any
+        `concurrent.futures.Executor`; default `workers` processes of its own. `progress`: called with the
+        present step.
     Returns: The design, judged on drawn devices as `tune` judges; where none meets the requirement, the
         nearest one, and the reasons.
     Raises: SceneError: a scene that cannot be used, or that leaves nothing to choose.
@@ -34,10 +39,14 @@ def find_design(
         >>> design.judgement.verdict
         'met'
     """
-    return run_design(
-        scene,
+    searched = within_disc(liquid_ring_scene(scene)) if in_place else scene
+    design = run_design(
+        searched,
         presentation=Presentation(document=design_document, rows=design_rows),
         executor=executor,
         workers=workers,
         progress=progress,
     )
+    if in_place and design.judgement is not None:
+        keep_design(scene, design)
+    return design

@@ -18,6 +18,7 @@ from ringbalance.controller.judging.remedies import tried_choices
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
+from ringbalance.design.in_place import kept_design
 from ringbalance.reports import summary
 from ringbalance.reports.figure import FOUND, INK, MUTED, PAPER, THIRD, Drawing, draw, figure_of, panels
 from ringbalance.reports.figures_page import READING_FILE, ReadableFigure, ReadingColumn, figures_page
@@ -134,6 +135,7 @@ def _collect(work: Work, tuning: Record, other_reading: Record | None, *choices:
         and scene.origin_of("sensor.amplitude_noise") == "default",
         "choices": parts,
         "best_choice": best,
+        "in_place": kept_design(work.scene),
         "settings": settings,
         **{key: tuning[key] for key in ("gas_pressure_Pa", "recommended_pressure_Pa", "run")},
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
@@ -192,6 +194,9 @@ def _view(record: Record, evidence: Record) -> Record:
         "pressure": _pressure_figure(record),
         "values_file": READING_FILE,
         **advice_view(record),
+        "in_place": advice_view({"remedies": [record["in_place"]]})["remedies"][0]
+        if record.get("in_place")
+        else "",
         # Inputs that decide most of the differences between drawn devices.
         "dominant": [
             i for i, each in enumerate(record["ranking"][:_MAX_DOMINANT]) if each["index"] > each["noise"]

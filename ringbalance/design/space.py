@@ -27,7 +27,8 @@ _DIGITS: Final = 3
 """Significant digits of a tried value, as in a drawing."""
 _HASTY_FACTOR: Final = 2.0
 """Run time over the required settling time: any later settling is too late."""
-_VALVE: Final = ("gas.conductance", "gas.critical_ratio", "gas.valve_lag")
+VALVE_KEYS: Final = ("conductance", "critical_ratio", "valve_lag")
+_VALVE: Final = tuple(f"gas.{key}" for key in VALVE_KEYS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +50,7 @@ class Space:
         if not any((keys.outer_radius, keys.axial_width, keys.pressure, taken)):
             allowed = (
                 "a table [design] with the space (outer_radius, axial_width), the highest pressure, valves, "
-                "valve_file or vary; for a given disc, `ringbalance tune` recommends pressure and controller"
+                "valve_file or vary; for a given disc, --in-place, or `ringbalance tune` for its controller"
             )
             raise SceneError.of_file(scene.file, "[design] leaves nothing to choose", allowed)
         return cls(scene=scene, axes=tuple(axes))

@@ -191,6 +191,15 @@ def remedies_of(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
             yield Remedy(code="limit", changes=changes, continuous=True)
 
 
+def valves_on_sale() -> tuple[Valve, ...]:
+    """Some valves of the catalogue, with assumed lags."""
+    catalogue = known_valves()
+    return tuple(
+        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2), valve_lag=lag)
+        for name, lag in _SOLD.items()
+    )
+
+
 def valves_of(scene: Scene) -> tuple[Remedy, ...]:
     """Valves at hand, or some that can be bought; empty for a scene that gives its valve."""
     return valve_choices(scene, lag=scene.gas.valve_lag) if scene.gas.conductance is None else ()
@@ -198,13 +207,8 @@ def valves_of(scene: Scene) -> tuple[Remedy, ...]:
 
 def valve_choices(scene: Scene, *, lag: float | None = None) -> tuple[Remedy, ...]:
     """Valves at hand, or some that can be bought. Args: `lag`: in place of their own, s; None: their own."""
-    catalogue = known_valves()
-    sold = tuple(
-        Valve(name=name, conductance=rounded(catalogue[name].iso_6358[0], 2), valve_lag=assumed)
-        for name, assumed in _SOLD.items()
-    )
     remedies = []
-    for valve in (each.completed for each in scene.design.valves or sold):
+    for valve in (each.completed for each in scene.design.valves or valves_on_sale()):
         conductance, ratio = valve.iso_6358
         changes = {
             "gas.conductance": conductance,

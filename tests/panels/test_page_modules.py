@@ -47,7 +47,7 @@ def noisy(
     size, half = math.sqrt(x * x + y * y), deviates[1] * phase_noise / 2
     square = half * half
     cosine, sine = (1 - square) / (1 + square), 2 * half / (1 + square)
-    factor = (size + deviates[0] * noise) / size if size > 0 else 1.0
+    factor = abs(size + deviates[0] * noise) / size if size > 0 else 1.0
     return factor * (x * cosine - y * sine), factor * (x * sine + y * cosine)
 
 

@@ -1,8 +1,8 @@
 // State in the address: what differs from the scene, so that a link reproduces a run. Anything else is ignored.
-import { ALGORITHMS, CONTROLS, digits } from "./controls.js";
+import { CONTROLS, digits } from "./controls.js";
 
 const MOST_LOADS = 20;
-export const SPEEDS = [1, 2, 5, 10, 20, 60];
+const SPEEDS = [1, 2, 5, 10, 20, 60];
 
 /** Text behind "#" for a state. */
 export function written(state, scene) {
@@ -37,7 +37,7 @@ function take(state, name, text, content) {
     const [low, high] = content.ranges[name], { si, none } = CONTROLS[name];
     if (none && text === none) settings[name] = null;
     else if (value * si >= low * (1 - 1e-3) && value * si <= high * (1 + 1e-3)) settings[name] = value * si;
-  } else if (name === "algorithm" && Object.hasOwn(ALGORITHMS, text)) settings.algorithm = text;
+  } else if (name === "algorithm" && Object.hasOwn(content.rules.rises, text)) settings.algorithm = text;
   else if (name === "valve" && whole(-1, content.valves.length - 1)) settings.valve = value;
   else if (name === "design" && whole(0, content.designs.length - 1)) settings.design = value;
   else if (name === "mass" && value === 0) settings.mass = false;

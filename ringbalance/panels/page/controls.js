@@ -15,7 +15,6 @@ export const CONTROLS = {
   offset: { group: "Controller", label: "Added to every valve-open time", unit: "ms", si: 1e-3, key: "controller.gas_time_offset", of: ["target_vector", "law_based"] },
   limit: { group: "Controller", label: "Limit below which it rests", unit: "um", si: 1e-6, key: "controller.limit", log: true },
 };
-export const ALGORITHMS = { target_vector: "target vector", law_based: "law based", trial: "trial" };
 export const STEPS = 1000;
 
 /** Units as a reader knows them. */

@@ -1,5 +1,5 @@
 // The form of settings: a slider with unit, range and the scene's mark for every control.
-import { ALGORITHMS, CONTROLS, STEPS, shownUnit, stepOf, valueAt, valueText } from "./controls.js";
+import { CONTROLS, STEPS, shownUnit, stepOf, valueAt, valueText } from "./controls.js";
 
 /** Element with properties and children. */
 export function make(tag, properties = {}, ...children) {
@@ -10,39 +10,20 @@ export function make(tag, properties = {}, ...children) {
 
 export class Form {
   /** `change(name, value)` is called for each value that a reader sets; `marks()` gives the values that are marked. */
-  constructor(root, content, { change, marks }) {
+  constructor(content, { change, marks }) {
     Object.assign(this, { content, change, marks, sliders: {} });
-    const further = make("details", {}, make("summary", { textContent: "More" }));
-    for (const group of ["Rotor", "Air", "Controller"]) {
-      const field = make("fieldset", { className: "group" }, make("legend", { textContent: group }));
-      if (group === "Controller") field.append(this.#algorithm());
-      for (const [name, control] of Object.entries(CONTROLS))
-        if (control.group === group) (control.further ? further : field).append(this.#slider(name, control));
-      root.append(field);
-    }
-    this.mass = make("input", { type: "checkbox", id: "mass" });
+    const get = (id) => document.getElementById(id);
+    for (const [name, control] of Object.entries(CONTROLS))
+      get(control.further ? "further" : `controls-${control.group}`).append(this.#slider(name, control));
+    for (const name of ["algorithm", "design", "mass"]) this[name] = get(name);
+    this.algorithm.addEventListener("change", () => change("algorithm", this.algorithm.value));
     this.mass.addEventListener("change", () => change("mass", this.mass.checked));
-    further.append(make("label", {}, this.mass, " injections shortened in place of the column's mass"));
-    if (content.designs.length > 1) root.prepend(this.#designs());
-    root.append(further);
-  }
-
-  #algorithm() {
-    this.algorithm = make("select", { id: "algorithm" });
-    for (const [value, textContent] of Object.entries(ALGORITHMS)) this.algorithm.append(make("option", { value, textContent }));
-    this.algorithm.addEventListener("change", () => this.change("algorithm", this.algorithm.value));
-    return make("div", { className: "choice" }, make("label", { htmlFor: "algorithm", textContent: "Algorithm" }), this.algorithm);
-  }
-
-  #designs() {
-    const { designs, axes } = this.content;
-    this.design = make("input", { type: "range", id: "design", min: 0, max: designs.length - 1, step: 1 });
-    this.design.addEventListener("input", () => this.change("design", Number(this.design.value)));
-    this.designText = make("output", { htmlFor: "design" });
-    this.designFacts = make("p", { className: "note" });
-    const label = make("label", { htmlFor: "design", textContent: `Design: ${axes.join(", ")}` });
-    const track = make("span", { className: "track" }, this.design);
-    return make("fieldset", { className: "group" }, make("legend", { textContent: "Design" }), make("div", { className: "control" }, label, this.designText, track), this.designFacts);
+    this.design.addEventListener("input", () => change("design", Number(this.design.value)));
+    this.design.max = content.designs.length - 1;
+    get("design-label").textContent = content.axes.join(", ");
+    get("designs").hidden = content.designs.length < 2;
+    this.designText = get("design-text");
+    this.designFacts = get("design-facts");
   }
 
   #slider(name, { label, unit, note }) {
@@ -76,7 +57,6 @@ export class Form {
     }
     this.algorithm.value = settings.algorithm;
     this.mass.checked = settings.mass;
-    if (!this.design) return;
     this.design.value = settings.design;
     this.designText.textContent = this.content.designs[settings.design].name;
     this.design.setAttribute("aria-valuetext", this.designText.textContent);

@@ -1,5 +1,5 @@
 // The page: its state, its clock, and what is drawn.
-import { SPEEDS, read, written } from "./address.js";
+import { read, written } from "./address.js";
 import { CONTROLS, digits, sceneBlocks, valueText } from "./controls.js";
 import { DevicePool, noiseOf, serve } from "./devices.js";
 import { DiscPicture } from "./disc_picture.js";
@@ -20,7 +20,7 @@ class Panel {
     Object.assign(this, { content, numbers, scene: sceneSettings(content), playing: false, before: 0 });
     this.state = read(location.hash, content, this.scene);
     this.calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.form = new Form(get("controls"), content, { change: (name, value) => this.set({ [name]: value }), marks: () => this.marks() });
+    this.form = new Form(content, { change: (name, value) => this.set({ [name]: value }), marks: () => this.marks() });
     this.many = new Many(content, new DevicePool(source, content), {
       watch: (device) => this.set({}, { device }),
       choose: (valve) => this.set({ valve, ...this.suitedTo(valve) }),
@@ -173,7 +173,6 @@ class Panel {
 
   #buttons() {
     const on = (id, act) => get(id).addEventListener("click", act);
-    for (const speed of SPEEDS) get("speed").append(make("option", { value: speed, textContent: speed === 1 ? "real time" : `${speed} ×` }));
     on("play", () => (this.#over() ? this.restart() : this.play(!this.playing)));
     on("step", () => {
       const { samples } = this.run;

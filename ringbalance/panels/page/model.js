@@ -27,16 +27,11 @@ export function discOf(content, numbers, settings, device) {
   if (["amplitude", "phase", "runout"].some((name) => settings[name] !== scene[name])) {
     const size = settings.amplitude / scene.amplitude, turn = settings.phase - scene.phase;
     const [cosine, sine] = [size * Math.cos(turn), size * Math.sin(turn)];
-    const [x, y] = facts.vibration, [rx, ry] = runoutOf(facts, settings, scene);
-    c[at.START_X] = x * cosine - y * sine + rx;
-    c[at.START_Y] = x * sine + y * cosine + ry;
+    const [x, y] = facts.vibration, runout = scene.runout ? settings.runout / scene.runout : 0;
+    c[at.START_X] = x * cosine - y * sine + (scene.runout ? facts.runout[0] * runout : settings.runout);
+    c[at.START_Y] = x * sine + y * cosine + facts.runout[1] * runout;
   }
   return { c, k: block.cells, p: block.pieces, q: block.levels, start: block.start, facts };
-}
-
-function runoutOf(facts, settings, scene) {
-  if (scene.runout === 0) return [settings.runout, 0];
-  return facts.runout.map((part) => (part * settings.runout) / scene.runout);
 }
 
 /** Least fill of a driven chamber at a gas pressure: of row 0 by stall and gas in its port, of row 1 by the latter. */
@@ -95,7 +90,7 @@ function controllerOf(content, numbers, settings) {
 export function noisy(x, y, [amplitude, phase], settings) {
   const size = Math.sqrt(x * x + y * y), half = (phase * settings.phase_noise) / 2, square = half * half;
   const cosine = (1 - square) / (1 + square), sine = (2 * half) / (1 + square);
-  const factor = size > 0 ? (size + amplitude * settings.noise) / size : 1;
+  const factor = size > 0 ? Math.abs(size + amplitude * settings.noise) / size : 1;
   return [factor * (x * cosine - y * sine), factor * (x * sine + y * cosine)];
 }
 

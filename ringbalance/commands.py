@@ -106,9 +106,7 @@ _OPTIONS: Final = {
         'of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.',
     ),
     "rotor": ShellOption(Literal["first", "second"] | None),
-    "seed": ShellOption(
-        int | None, None, "seed of all random numbers, in place of the scene's.", limits=_SEEDS
-    ),
+    "seed": ShellOption(int | None, None, "in place of the scene's seed.", limits=_SEEDS),
     "remedies": ShellOption(bool | None, parsing={"negative": "--no-remedies"}),
     "to": ShellOption(
         Literal["c", "st", "csv", "python", "js", "fmi2", "fmi3", "simulink", "openmodelica", "twincat"],

@@ -109,8 +109,7 @@ def with_valves(scene: AnyScene, file: Path) -> AnyScene:
         {NAME: name, **{key: value for key, value in row.items() if value is not None}}
         for name, row in zip(names, rows.rows, strict=True)
     ]
-    changes = {"design.valves": valves, "design.valve_file": None}
-    return liquid_ring_scene(scene).with_values(changes)
+    return liquid_ring_scene(scene).with_values({"design.valves": valves, "design.valve_file": None})
 
 
 def as_toml(text: str, reader: ValueReader) -> Any:

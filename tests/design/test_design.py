@@ -19,6 +19,7 @@ from design_spread import answer
 
 import ringbalance as rb
 from ringbalance.controller.balancer import Demand, balancer_of
+from ringbalance.controller.judging.holding import Endurance
 from ringbalance.controller.judging.judge import MOST_DRAWS, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.design.races import deal, threshold
@@ -83,6 +84,32 @@ def test_threads_make_no_difference(design: rb.Design) -> None:
     with ThreadPoolExecutor(2) as pool:
         other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
     assert other.to_dict() == design.to_dict()
+
+
+def test_a_design_says_how_long_it_holds_where_liquid_is_lost(design: rb.Design) -> None:
+    """Like devices that lose 1 % an hour and work without a tenth: 10 to 20 hours; else none."""
+    one = {
+        "losses": np.array([0.0, 0.1, 0.2]),
+        "meets": np.array([[True], [True], [False]]).repeat(64, axis=1),
+    }
+    held = Endurance(required_fraction=0.7, rates=np.full(64, 0.01), **one)
+    before, said = design.to_dict(), replace(design, endurance=held).to_dict()
+    assert design.endurance is None
+    assert "endurance" not in before
+    assert said["endurance"]["interval_s"] == pytest.approx([36e3, 72e3])
+    (finding,) = [each for each in said["findings"] if each["code"] == "endures_until"]
+    assert finding["text"] == said["endurance"]["text"]
+    assert len(said["findings"]) == len(before["findings"]) + 1
+
+
+def test_a_design_with_a_humidity_runs_over_the_hours() -> None:
+    """Of these two designs no device takes gas while it holds: none loses liquid, and that is said."""
+    two = ("disc.axial_width=26mm,38mm", *WIDTHS[1:])
+    design = rb.find_design(open_scene(two, requirement__fraction=0.7, gas__relative_humidity=0))
+    assert design.endurance is not None
+    assert not design.endurance.rates.any()
+    assert design.to_dict()["endurance"]["interval_s"] == [None, None]
+    assert "endures_without_gas" in [each.code for each in design.rows().findings]
 
 
 def test_a_design_says_what_its_gas_jet_digs_where_nothing_limits_it(design: rb.Design) -> None:

@@ -63,7 +63,9 @@ class Endurance:
     @property
     def interval(self) -> tuple[float | None, float | None]:
         """Time of holding up to which the requirement is met, s, None where that is undecided from the start;
-        and from which on it is missed, None where it may never be."""
+        and from which on it is missed, None where it may never be; neither where no gas takes liquid."""
+        if not self.rates.any():
+            return None, None
         (sure, missed), count = (np.sort(each)[::-1] for each in self.lives), self.rates.size
         verdicts = [Proportion(count=i, of=count).verdict(self.required_fraction) for i in range(count + 1)]
         first = sure[verdicts.index(MET) - 1] if MET in verdicts else -1.0
@@ -74,6 +76,8 @@ class Endurance:
     def over_time(self) -> list[tuple[float, Proportion]]:
         """Fraction that meets every demand for certain by time, s, from the last of most devices to the first
         of fewest."""
+        if not self.rates.any():
+            return []
         rows = [(time, Proportion.where(self.lives[0] >= time)) for time in _TIMES_S]
         changing = [i for i in range(1, len(rows)) if rows[i][1] != rows[i - 1][1]]
         return rows[changing[0] - 1 : changing[-1] + 1] if changing else rows[-1:]
@@ -90,6 +94,8 @@ class Endurance:
         """Finding on the interval and the rates."""
         first, last = self.interval
         code = "endures_undecided" if first is None else "endures" if last is None else "endures_until"
+        if not self.rates.any():
+            return Finding(code="endures_without_gas", values={"of": self.rates.size})
         values: dict[str, Value] = {**self._rates, "first": first, "last": last}
         return Finding(code=code, values=values)
 
@@ -131,8 +137,6 @@ def endurance(
     settled = before.settled & after.settled
     rates = np.where(settled, after.lost - before.lost, 0.0)
     rates = np.where(settled, rates, rates.max())
-    if rates.max() <= 0.0:
-        return None
     levels: dict[float, BoolArray] = {}
 
     def verdict(lost: float) -> str:
@@ -145,7 +149,7 @@ def endurance(
         return Proportion.where(levels[lost]).verdict(required)
 
     verdicts = [verdict(0.0)]
-    for lost in _LOSSES:
+    for lost in _LOSSES if rates.any() else ():
         verdicts.append(verdict(lost))
         # Half a step less where the verdict changes.
         if verdicts[-2:] != [MET, MET]:

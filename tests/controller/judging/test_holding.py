@@ -83,6 +83,14 @@ def test_a_device_without_an_injection_in_its_hour_counts_as_the_mean() -> None:
     assert devices(few, np.full(100, 0.2)).interval[1] is None
 
 
+def test_without_gas_nothing_is_lost() -> None:
+    result = devices(np.zeros(100), np.full(100, 0.2))
+    document = result.document()
+    assert (document["interval_s"], document["over_time"]) == ([None, None], [])
+    assert result.finding.code == "endures_without_gas"
+    assert len(result.table.rows) == 4
+
+
 def test_devices_that_miss_from_the_start_never_count() -> None:
     last = np.where(np.arange(100) < 10, -1.0, 0.2)
     result = devices(np.full(100, 0.01), last)

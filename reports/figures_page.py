@@ -14,13 +14,14 @@ import jinja2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ringbalance.panels.document import joined, module_text
 from ringbalance.reports.figure import DARK, LIGHT, Drawing
 from ringbalance.results.numbers import display_unit, short
 
 READING_FILE: Final = "figures.html"
 """Name of the file, beside a report or in the folder of a sweep."""
 _DIGITS: Final = 4
-_START: Final = 'start(document, JSON.parse(document.getElementById("content").textContent));\n'
+_START: Final = 'figures.start(document, JSON.parse(document.getElementById("content").textContent));\n'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,9 +91,8 @@ def figures_page(
         "along": along_x,
         "figures": [figure.document() for figure in figures],
     }
-    room = files("ringbalance.reports")
-    script = room.joinpath("page_modules", "figures.js").read_text(encoding="utf-8") + _START
-    template = room.joinpath("templates", READING_FILE).read_text(encoding="utf-8")
+    script = joined({"figures": module_text("figures")}) + _START
+    template = files("ringbalance.reports").joinpath("templates", READING_FILE).read_text(encoding="utf-8")
     page: str = jinja2.Template(template, autoescape=True, undefined=jinja2.StrictUndefined).render(
         title=title,
         source=source,

@@ -7,7 +7,7 @@ import html
 import json
 import re
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from os import PathLike
@@ -23,6 +23,11 @@ MODULES: Final = (
     *("disc_picture", "form", "many", "main"),
 )
 """Modules of the page; each imports from those before it alone."""
+REPLAY_MODULES: Final = (
+    *("controls", "canvas", "time_plot", "polar_plot", "disc_picture"),
+    *("replay", "mass_picture", "replay_page"),
+)
+"""Modules of the page that replays runs, in such an order."""
 _IMPORT: Final = re.compile(r'^import (\{[^}]*\}) from "\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(?:const|class|(?:async )?function\*?) (\w+))", re.MULTILINE)
 
@@ -60,14 +65,19 @@ class Panel:
         return f'<iframe title="{title}" {rights} srcdoc="{document}"></iframe>'
 
 
-def document_of(content: Mapping[str, Any]) -> str:
-    """HTML document of a panel, which needs no other file, from all its numbers and texts."""
-    program, style = joined({name: module_text(name) for name in MODULES}), _part("page/panel.css")
+def document_of(
+    content: Mapping[str, Any], *, page: str = "panel.html", modules: Sequence[str] = MODULES
+) -> str:
+    """HTML document of a panel, which needs no other file, from all its numbers and texts.
+
+    Args: `page`: template. `modules`: names of its modules, in their order.
+    """
+    program, style = joined({name: module_text(name) for name in modules}), _part("page/panel.css")
     policy = (
         f"default-src 'none'; script-src {_digest(program)}; style-src {_digest(style)}; worker-src blob:; "
         "base-uri 'none'; form-action 'none'"
     )
-    return Template(_part("templates/panel.html")).substitute(
+    return Template(_part(f"templates/{page}")).substitute(
         policy=policy,
         title=html.escape(content["name"]),
         style=style,

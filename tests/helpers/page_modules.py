@@ -14,7 +14,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.panels.content import content_of
-from ringbalance.panels.document import MODULES, module_text
+from ringbalance.panels.document import MODULES, REPLAY_MODULES, module_text
 from ringbalance.scene.models import Scene
 
 NODE: Final = shutil.which("node")
@@ -40,7 +40,7 @@ def page_folder() -> Path:
     """Folder with all modules of the page."""
     folder = Path(mkdtemp(prefix="panel"))
     (folder / "package.json").write_text('{"type": "module"}')
-    for name in MODULES:
+    for name in {*MODULES, *REPLAY_MODULES}:
         (folder / f"{name}.js").write_text(module_text(name))
     return folder
 
@@ -65,6 +65,11 @@ _EXPORTS: Final = {
     "address": ("read", "written"),
     "devices": ("bounds", "summary", "noiseOf"),
     "disc_picture": ("surfaceRadius", "sector"),
+    "replay": (
+        *("unpackRuns", "stateAt", "halfPrecision", "instantAt", "stageAt", "stageMarks", "profileAt"),
+        *("replayAddress", "replayState"),
+    ),
+    "mass_picture": ("moments",),
 }
 
 

@@ -9,7 +9,6 @@ import json
 import re
 import shutil
 import subprocess
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +17,7 @@ import pytest
 from report_texts import kept_evidence
 
 import ringbalance as rb
+from ringbalance.panels.document import module_text
 from ringbalance.reports.figures_page import ReadableFigure, ReadingColumn, figures_page
 from ringbalance.reports.pages.first_page import SECTION, pressure_page
 from ringbalance.scene.models import Scene
@@ -57,7 +57,7 @@ def content_of(page: str) -> Record:
 
 def in_node(script: str, content: object) -> Any:
     """Value of an expression of the module's functions and `content`."""
-    module = files("ringbalance.reports").joinpath("page_modules", "figures.js").read_text(encoding="utf-8")
+    module = module_text("figures")
     address = "data:text/javascript;base64," + base64.b64encode(module.encode()).decode()
     lines = (
         f"import {{ nearest, next, reading, marks, frameAt }} from {json.dumps(address)};",

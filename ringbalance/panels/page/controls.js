@@ -27,6 +27,9 @@ export function digits(value, count = 3) {
   return String(Number(value.toFixed(places)));
 }
 
+/** Text of a length, m, in micrometres or, from one on, in millimetres. */
+export const lengthText = (metres, count = 3) => (metres < 1e-3 ? `${digits(metres * 1e6, count)} µm` : `${digits(metres * 1e3, count)} mm`);
+
 /** Text of a control's value, SI, with its unit. */
 export function valueText(name, value) {
   const { unit, si, none } = CONTROLS[name];

@@ -1,6 +1,6 @@
 // Path of the vibration in the frame of the disc; the distance from the centre is logarithmic beyond the limit.
 import { decades, prepared } from "./canvas.js";
-import { digits } from "./controls.js";
+import { lengthText } from "./controls.js";
 import { peak } from "./time_plot.js";
 
 /** Draw a trace. `view`: `trace` (x, y, m), `limit`, and optionally `reference`, another trace. */
@@ -23,7 +23,7 @@ export function drawPolarPlot(canvas, { trace, limit, reference }) {
     circle(context, radius(mark));
     context.stroke();
     context.fillStyle = colour("muted");
-    context.fillText(`${digits(mark * 1e6)} µm`, 0, radius(mark) - 4);
+    context.fillText(lengthText(mark), 0, radius(mark) - 4);
   }
   for (const [x, y, label] of [[1, 0, "0°"], [0, 1, "90°"], [-1, 0, "180°"], [0, -1, "270°"]]) {
     context.beginPath();

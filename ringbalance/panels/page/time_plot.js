@@ -1,6 +1,6 @@
 // Vibration over time on a logarithmic axis, with the limit and the injections of each chamber below.
 import { decades, evenStep, prepared } from "./canvas.js";
-import { digits } from "./controls.js";
+import { digits, lengthText } from "./controls.js";
 
 const LEFT = 62, RIGHT = 14, TOP = 14, LANE = 15, AXIS = 26;
 const LEAST_SPAN = 8;
@@ -23,7 +23,7 @@ export function drawTimePlot(canvas, { trace, injections, letters, limit, refere
   context.textAlign = "right";
   for (const mark of decades(least, most)) {
     line(context, [[LEFT, y(mark)], [width - RIGHT, y(mark)]], colour("grid"));
-    text(context, `${digits(mark * 1e6)} µm`, LEFT - 8, y(mark) + 4, colour("muted"));
+    text(context, lengthText(mark), LEFT - 8, y(mark) + 4, colour("muted"));
   }
   context.textAlign = "center";
   const step = evenStep(span, Math.max(3, width / 110));
@@ -37,10 +37,10 @@ export function drawTimePlot(canvas, { trace, injections, letters, limit, refere
   context.textAlign = "right";
   text(context, `limit ${digits(limit * 1e6)} µm`, width - RIGHT - 4, y(limit) - 6, colour("good"));
 
-  for (const { time, label } of marks) {
-    line(context, [[x(time), TOP], [x(time), bottom]], colour("bad"));
+  for (const { time, label, tone = "bad" } of marks) {
+    line(context, [[x(time), TOP], [x(time), bottom]], colour(tone));
     context.textAlign = "left";
-    text(context, label, x(time) + 4, TOP + 11, colour("bad"));
+    text(context, label, x(time) + 4, TOP + 11, colour(tone));
   }
   context.save();
   context.beginPath();

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
-import subprocess
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -24,7 +21,6 @@ from ringbalance.controller.judging.judge import FIRST_VERDICT_DEVICE
 from ringbalance.panels.document import REPLAY_MODULES, document_of
 from ringbalance.panels.replay import DEVICES, replay_content
 
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 MOST_BYTES = 300_000
 """As of every panel: it is sent by mail."""
 
@@ -161,37 +157,6 @@ def test_instants_profiles_and_stages() -> None:
         """
     )
     assert answer == [[0, 0, 0, 2, 2, 3], ["a", "c", "d"], ["c"], [1, 1, 1, 1, 2, 3, 3]]
-
-
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
-def test_the_page_shows_the_state_of_its_address(tmp_path: Path) -> None:
-    """Its script runs under its own policy, from a local disk."""
-    run, time = drawn_run(), 6.0
-    file = tmp_path / "panel.html"
-    page = document_of(content(), page="replay.html", modules=REPLAY_MODULES)
-    file.write_text(page, encoding="utf-8")
-    done = subprocess.run(
-        [
-            *(str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"),
-            *("--virtual-time-budget=2000", f"--user-data-dir={tmp_path / 'browser'}"),
-            f"{file.as_uri()}#device=2&time={time}",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    shown = dict(re.findall(r'<(?:output|span|p)[^>]* id="(\w+)"[^>]*>([^<]*)<', done.stdout))
-    assert shown["clock"] == "6.0 s"
-    assert (
-        shown["count"]
-        == f"{sum(each['settled'] is not None for each in content()['runs'][1:3])} of 2 drawn devices settle."
-    )
-    stage = next(each.name for each in reversed(run.stages) if each.start <= time)
-    assert shown["state"].startswith(f"{stage}, ")
-    value, unit = shown["reading"].split(" ")
-    assert unit == "µm"
-    assert float(value) == pytest.approx(1e6 * np.interp(time, run.time, run.amplitude), rel=0.05)
 
 
 def test_the_page_of_all_devices_is_small() -> None:

@@ -82,7 +82,7 @@ def _packed(run: EccentricRun, samples: IntArray) -> tuple[dict[str, Any], bytes
     middle = (angles.max(axis=1) + angles.min(axis=1)) / 2
     half = np.maximum(np.ptp(angles, axis=1) / 2, 1e-3)
     end = run.end or 1.0
-    whole = [run.time[samples] / end, *((angles - middle[:, None]) / half[:, None])]
+    integers = [run.time[samples] / end, *((angles - middle[:, None]) / half[:, None])]
     whirl = run.whirl[samples] / run.limit
     halves = [whirl.real, whirl.imag, *(_peaks(each, samples) / most_torque for each in torque)]
     facts = {
@@ -100,7 +100,7 @@ def _packed(run: EccentricRun, samples: IntArray) -> tuple[dict[str, Any], bytes
         "settled": run.settling_time,
         "status": f"{run.status[:1].upper()}{run.status[1:].replace(' um', ' µm')}.",
     }
-    numbers = [np.round(_FULL_SCALE * each).astype("<i2") for each in whole]
+    numbers = [np.round(_FULL_SCALE * each).astype("<i2") for each in integers]
     return facts, b"".join(each.tobytes() for each in [*numbers, *(each.astype("<f2") for each in halves)])
 
 

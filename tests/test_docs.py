@@ -63,7 +63,7 @@ def test_the_readme_opens_with_two_small_pictures_that_pages_draw() -> None:
     pictures = re.findall(r"^!\[[^\]]+\]\(([^)]+)\)$", text("README.md"), re.MULTILINE)
     assert len(pictures) == 2
     assert sum((ROOT / each).stat().st_size for each in pictures) < 300_000
-    pages_text = text("docs/gallery.md") + text("docs/tutorials/first-report.md")
+    pages_text = text("docs/tutorials/watch-it-balance.md") + text("docs/tutorials/first-report.md")
     assert all(Path(each).name in pages_text for each in pictures)
 
 

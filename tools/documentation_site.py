@@ -11,6 +11,8 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from typesetting import typeset, typeset_inline
 
+import ringbalance as rb
+
 LIST_OF_PAGES: Final = "docs/README"
 _SECTION: Final = re.compile(r"^## (.+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
 _ENTRY: Final = re.compile(r"^\* \[[^\]]+\]\(([^)]+)\.md\)", re.MULTILINE)
@@ -52,9 +54,17 @@ def add_index(app: Sphinx, error: Exception | None) -> None:
         shutil.copyfile(Path(app.outdir, "README.html"), Path(app.outdir, "index.html"))
 
 
+def add_panel(app: Sphinx, error: Exception | None) -> None:
+    """Write the panel of the paper's disc beside the tutorial that speaks of it."""
+    if error is None:
+        scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        rb.panel(scene).save(Path(app.outdir, "docs/tutorials/panel.html"))
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the additions with Sphinx."""
     app.add_html_math_renderer("typeset", (inline_math, None), (display_math, None))
     app.connect("source-read", add_order)
     app.connect("build-finished", add_index)
+    app.connect("build-finished", add_panel)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

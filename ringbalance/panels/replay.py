@@ -50,7 +50,6 @@ def replay_content(
         "name": scene.name,
         "limit": scene.supervisor.limit,
         "profile": [np.asarray(each).tolist() for each in scene.rotor.profile],
-        "radius": scene.masses.guide_radius,
         "runs": [*runs, facts],
         "numbers": b64encode(zlib.compress(packed + numbers, 9)).decode("ascii"),
     }

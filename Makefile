@@ -96,6 +96,8 @@ bench: env ## timed comparisons, each a ratio within one run
 	$(PYTHON_IN_VENV) benchmarks/closed_loop.py
 	$(PYTHON_IN_VENV) benchmarks/moving_injection.py
 	$(PYTHON_IN_VENV) benchmarks/eccentric_mass.py
+	@sh tools/make_browsers.sh
+	$(PYTHON_IN_VENV) benchmarks/panel_frames.py
 
 bench-cfd: env ## tube, waves and gas jet beside OpenFOAM, an hour or so; keeps the results
 	@sh tools/make_openfoam.sh

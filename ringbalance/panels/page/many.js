@@ -33,7 +33,7 @@ export class Many {
     });
   }
 
-  /** Run the devices of a state, and then a first part of them with each other valve. */
+  /** Run the devices of a state, then with each other valve a first part of them and the rest. */
   run(state, suited) {
     const { settings, seed } = state, { count } = this.content.designs[settings.design];
     this.pool.stop();
@@ -44,12 +44,18 @@ export class Many {
       this.#show(outcomes, count);
       this.#row(settings.valve, outcomes);
     });
+    const others = this.valves.map((_, i) => i - 1).filter((valve) => valve !== settings.valve), first = new Map();
     this.valves.forEach(({ radio }, i) => {
       radio.checked = i - 1 === settings.valve;
-      if (i - 1 === settings.valve) return this.#row(i - 1, []);
       this.#row(i - 1, []);
-      this.pool.run(suited(i - 1), all.slice(0, FIRST), seed, (outcomes) => this.#row(i - 1, outcomes));
     });
+    for (const valve of others)
+      this.pool.run(suited(valve), all.slice(0, FIRST), seed, (outcomes) => {
+        first.set(valve, outcomes);
+        this.#row(valve, outcomes);
+      });
+    for (const valve of others)
+      this.pool.run(suited(valve), all.slice(FIRST), seed, (more) => this.#row(valve, [...(first.get(valve) ?? []), ...more]));
   }
 
   #grid(count, watched) {
@@ -108,7 +114,7 @@ export class Many {
     fill(row.bar, result, this.content.rules.fraction);
     // Of the valves that can be had, the one that serves most devices, and of equals the fastest.
     const sold = this.valves.slice(1), part = ({ count, of }) => (of ? count / of : 0);
-    const ready = sold.every(({ result: other }) => other.of >= Math.min(FIRST, this.dots.length));
+    const ready = sold.every(({ result: other }) => other.of === this.dots.length);
     const best = [...sold].sort((a, b) => part(b.result) - part(a.result) || a.result.half - b.result.half)[0];
     sold.forEach((each) => each.text.classList.toggle("best", ready && each === best && part(best.result) > 0));
   }

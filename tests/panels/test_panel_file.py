@@ -126,7 +126,7 @@ def test_designs_are_those_of_the_axes() -> None:
 @pytest.mark.parametrize(
     ("scene", "options", "part"),
     [
-        ("eccentric_mass_paper", [], "balancer liquid_ring"),
+        ("eccentric_mass_paper", ["--vary", "tube.bore=1mm:2mm:5"], "a scene of a liquid ring"),
         ("liquid_ring_paper", ["--vary", "tube.bore=1mm:2mm:50"], "50 designs; allowed: at most 9"),
         ("liquid_ring_paper", ["--vary", "tube.bor=1mm:2mm:5"], 'did you mean "tube.bore"?'),
         ("liquid_ring_paper", ["--out", "panel.txt"], "a file name that ends in .html"),

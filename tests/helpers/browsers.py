@@ -101,11 +101,13 @@ class Firefox:
         return self.command("WebDriver:ExecuteScript", script=script, args=list(args))
 
     def messages(self) -> list[str]:
-        """Errors of scripts and of content security policies in pages from files."""
+        """Errors of scripts and policies in pages from files, since they were last asked for."""
         self.command("Marionette:SetContext", value="chrome")
-        script = """return Services.console.getMessageArray().filter((each) =>
+        script = """const told = Services.console.getMessageArray().filter((each) =>
             each instanceof Ci.nsIScriptError && /^(file|blob|about:blank)/.test(each.sourceName)
-            && !(each.flags & Ci.nsIScriptError.warningFlag)).map(String);"""
+            && !(each.flags & Ci.nsIScriptError.warningFlag)).map(String);
+            Services.console.reset();
+            return told;"""
         told = self.run(script)
         self.command("Marionette:SetContext", value="content")
         return [str(each) for each in told]

@@ -45,6 +45,7 @@ def test_an_example_gives_what_it_shows(name: str, tmp_path: Path, monkeypatch: 
         "EccentricScene",
         "Extremes",
         "Fit",
+        "Panel",
         "Scene",
         "Simulation",
         "Sweep",

@@ -34,6 +34,8 @@ from ringbalance.results.numbers import percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.draws import BLOCK
+from ringbalance.scene.errors import MODEL_KINDS
+from ringbalance.scene.fitted import MODEL
 from ringbalance.scene.platform.jobs import Job
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
@@ -201,6 +203,8 @@ def _view(record: Record, evidence: Record) -> Record:
         "dominant": [
             i for i, each in enumerate(record["ranking"][:_MAX_DOMINANT]) if each["index"] > each["noise"]
         ],
+        # An error of a model in the words of what it acts on.
+        "acts_on": {f"{MODEL}{name}": kind.acts_on for name, kind in MODEL_KINDS.items()},
         "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],
     }
 
@@ -250,6 +254,9 @@ def _pressure_figure(record: Record) -> Drawing | None:
         for panel in three:
             panel.set(xlim=(pressure[0], pressure[-1]), ylim=(0, None))
             panel.tick_params(labelbottom=panel is three[2])
+        # Room above the highest mark.
+        highest = max((time for row in times.values() for time in row if time), default=1.0)
+        three[2].set_ylim(0, 1.15 * highest)
         three[0].set_yticks((0, 50, 100))
         three[2].set_xlabel("gas pressure in MPa, gauge")
         handles, labels = three[0].get_legend_handles_labels()

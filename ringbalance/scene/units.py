@@ -93,6 +93,10 @@ _READS_BACK = 1e-6
 """Relative tolerance of a value that is written and read again."""
 _TINY = 0.01
 """Value in the usual unit below which SI reads easier, such as 0.06 s for 0.001 min."""
+_PLAIN_SI = (0.1, 1000.0)
+"""Values in SI that read easily."""
+_SMALL = 0.1
+"""Value in the usual unit below which such a value in SI reads easier: 0.714 s for 0.0119 min."""
 _SAVED_CHARACTERS = 4
 """Characters that SI must save to replace the usual unit."""
 _NUMBER = re.compile(
@@ -256,7 +260,9 @@ def shortest_quantity(value: float, usual: str) -> str:
     """Text of an SI value to 1e-6, in its usual unit; in SI where it is tiny or SI saves digits."""
     si = next(kind.si_unit for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
-    tiny = abs(value) < _TINY * unit_factor(usual) and len(other) < len(plain)
+    plain_si = _PLAIN_SI[0] <= abs(value) < _PLAIN_SI[1]
+    small = abs(value) < (_SMALL if plain_si else _TINY) * unit_factor(usual)
+    tiny = small and len(other) < len(plain)
     return other if value == 0.0 or tiny or len(other) + _SAVED_CHARACTERS <= len(plain) else plain
 
 

@@ -305,7 +305,9 @@ def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, messag
 
 
 def test_a_given_disc_is_for_tune() -> None:
-    with pytest.raises(rb.SceneError, match=r"outer_radius.*vary.*`ringbalance tune` recommends") as caught:
+    with pytest.raises(
+        rb.SceneError, match=r"outer_radius.*vary.*--in-place, or `ringbalance tune`"
+    ) as caught:
         rb.find_design(rb.load_scene(rb.bundled_scene("liquid_ring_paper")))
     assert len(caught.value.faults) == 1
 

@@ -29,7 +29,10 @@ def _gain(law: str, k: float, share: float) -> Record:
 
 
 def test_both_laws_stand_beside_each_other(evidence: Record, said: Said) -> None:
-    judged = {**evidence["summary"]["own"], "fraction": {"value": 0.97, "low": 0.9, "high": 0.99}}
+    judged = {
+        **evidence["summary"]["own"],
+        "fraction": {"value": 0.97, "low": 0.9, "high": 0.99, "count": 62, "of": 64},
+    }
     gains = [_gain("paper", 50.0, 0.6), _gain("calibrated", 3.5, 1.94)]
     text = said({**evidence, "consequences": {"gain": gains, "paper": judged}}, "consequences")
     assert re.search(r"the paper’s law \| 50.0 \|.*60.0 % \| 97 % of drawn", text, re.IGNORECASE)

@@ -129,7 +129,7 @@ def test_the_inputs_that_decide_most_come_first(evidence: Record, said: Said) ->
     ]
     text = said(evidence, "summary")
     first = "Bore of the tube (assumed): 30 %, varies between devices"
-    second = "Loss: 20 %, not known, but common to all devices"
+    second = "Error of the model, loss: 20 %, not known, but common to all devices"
     assert f"settling time. {first}. {second}." in text
 
 
@@ -166,7 +166,7 @@ def test_what_is_met_without_uncertainties_is_met_if_the_parts_are_exact(
     assert "states no uncertainty" not in stated
     evidence["scene"]["states_uncertainty"] = False
     unstated = said(evidence, "summary")
-    assert "met if the parts are exact" in unstated
+    assert "The verdict holds if the parts are exact" in unstated
     assert "states no uncertainty" in unstated
 
 

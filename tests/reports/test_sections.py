@@ -32,6 +32,7 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
         "report.html",
         "macros.html",
         "decided.html",
+        "figures.html",
         "tallies.html",
     }
 

@@ -6,7 +6,7 @@ Inputs are drawn by name and number, so a device is the same under every remedy.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import combinations, product
@@ -36,8 +36,9 @@ _GIVE_UP_SHARE: Final = 0.5
 """Ratio to the required fraction below which a remedy is given up."""
 _MAX_DEVICES: Final = 256
 _COARSE_DEVICES: Final = (4, 4, 8)
-"""Further devices in each round of the coarse grid; the best third of the settings and its
-ties go on to the next."""
+"""Further devices in each round of a coarse grid; the best third of the settings and its ties go on."""
+_NEAR_DEVICES: Final = (8, 40)
+"""Further devices in each round of the levels beside its best."""
 _HALFWAY_DIGITS: Final = 2
 """Significant digits of a value between two alternatives."""
 
@@ -185,18 +186,38 @@ def tried_choices(
 
 
 def coarse_settings(balancer: Balancer) -> Settings:
-    """Best settings of a coarse grid for the first kind of controller, by how many devices settle."""
+    """Best settings for the first kind of controller, by how many devices settle: of a coarse grid, then of
+    the levels beside its best on one or two axes, each raced over devices of its own.
+    """
     space = balancer.trials()[0]
-    grid = product(*([(axis.name, axis.levels[i]) for i in axis.first] for axis in space.axes))
-    offered = (space.settings(dict(point)) for point in grid)
-    left = [each for each in offered if each is not None]
-    settled, start = np.zeros(len(left), dtype=np.int64), 0
-    for count in _COARSE_DEVICES if left else ():
-        outcomes = balancer.run_all(left, Draws.block(start, count))
-        settled += [int(np.count_nonzero(each.settled)) for each in outcomes]
-        best = np.flatnonzero(settled >= -np.sort(-settled)[(len(left) - 1) // 3])
-        left, settled, start = [left[i] for i in best], settled[best], start + count
-    return left[int(np.argmax(settled))] if left else {}
+
+    def at(point: tuple[int, ...]) -> Settings | None:
+        levels = {axis.name: axis.levels[i] for axis, i in zip(space.axes, point, strict=True)}
+        return space.settings(levels)
+
+    def race(points: Iterable[tuple[int, ...]], rounds: Sequence[int], start: int) -> tuple[int, ...] | None:
+        left = [point for point in points if at(point) is not None]
+        counts = np.zeros(len(left), dtype=np.int64)
+        for count in rounds if left else ():
+            outcomes = balancer.run_all([at(point) or {} for point in left], Draws.block(start, count))
+            counts += [int(np.count_nonzero(each.settled)) for each in outcomes]
+            leading = np.flatnonzero(counts >= -np.sort(-counts)[(len(left) - 1) // 3])
+            left, counts, start = [left[i] for i in leading], counts[leading], start + count
+        return left[int(np.argmax(counts))] if left else None
+
+    best = race(product(*(axis.first for axis in space.axes)), _COARSE_DEVICES, 0)
+    if best is None:
+        return {}
+    near = [
+        range(max(i - 1, 0), min(i + 2, len(axis.levels))) for axis, i in zip(space.axes, best, strict=True)
+    ]
+    neighbours = [
+        point for point in product(*near) if sum(i != j for i, j in zip(point, best, strict=True)) <= 2
+    ]
+    best = (
+        race(sorted(neighbours, key=lambda point: point != best), _NEAR_DEVICES, sum(_COARSE_DEVICES)) or best
+    )
+    return at(best) or {}
 
 
 def _judge(

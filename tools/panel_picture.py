@@ -14,8 +14,8 @@ from playwright.sync_api import ViewportSize, sync_playwright
 import ringbalance as rb
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "pictures" / "panel.png"
-SIZE: ViewportSize = {"width": 1280, "height": 800}
-COLOURS = 64
+SIZE: ViewportSize = {"width": 1280, "height": 960}
+COLOURS = 128
 SAMPLES = 3
 """Samples after which the run is paused, as soon as a valve is open."""
 
@@ -45,7 +45,9 @@ def main() -> None:
         page.screenshot(path=shot)
         browser.close()
         with Image.open(shot) as picture:
-            picture.convert("RGB").quantize(COLOURS).save(PICTURE, optimize=True)
+            # An octree keeps the few colours that stand for valves, limits and devices.
+            few = picture.convert("RGB").quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
+            few.save(PICTURE, optimize=True)
     print(f"{PICTURE}: {PICTURE.stat().st_size / 1000:.0f} kB")
 
 

@@ -63,7 +63,7 @@ _EXPORTS: Final = {
     "model": ("Run", "discOf", "lostTime", "noisy", "outcomeOf", "sceneSettings"),
     "controls": ("CONTROLS", "sceneBlocks", "stepOf", "valueAt", "digits"),
     "address": ("read", "written"),
-    "devices": ("bounds", "summary", "noiseOf"),
+    "devices": ("bounds", "summary", "noiseOf", "verdict"),
     "disc_picture": ("surfaceRadius", "sector"),
     "replay": (
         *("unpackRuns", "stateAt", "halfPrecision", "instantAt", "stageAt", "stageMarks", "profileAt"),

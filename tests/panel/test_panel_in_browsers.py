@@ -196,6 +196,31 @@ def test_a_double_click_returns_to_the_marked_value(panel: Path, open_page: Open
     assert page.evaluate("panel.state.settings.gain === panel.scene.gain")
 
 
+def test_a_load_after_the_end_lets_the_run_go_on(panel: Path, open_page: OpenPage) -> None:
+    page = open_page(panel)
+    settled(page)
+    assert page.inner_text("#state").startswith("Settled after")
+    end = page.evaluate("panel.run.time")
+    assert page.inner_text("#load") == "a load of 4 µm now"
+    page.locator("#load").click()
+    page.locator("#end").click()
+    assert page.evaluate("panel.run.time") > end
+    assert "after the load" in page.inner_text("#state")
+
+
+def test_pictures_without_room_are_left_out(panel: Path, open_page: OpenPage) -> None:
+    """Nothing is reported; the largest circle of a picture narrower than its labels has no radius."""
+    page = open_page(panel)
+    for width in ("0px", "60px"):
+        page.evaluate(
+            """(width) => {
+                for (const id of ["time", "polar"]) document.getElementById(id).style.width = width;
+                panel.draw();
+            }""",
+            width,
+        )
+
+
 def test_a_link_gives_back_what_is_seen(panel: Path, open_page: OpenPage) -> None:
     page = open_page(panel, fragment="#amplitude=8&gain=0.02&seed=9&device=2&load=1.5,2,0")
     settled(page)

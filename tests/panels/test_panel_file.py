@@ -68,9 +68,9 @@ def test_a_scenes_name_ends_no_element(page: str) -> None:
 
 def test_a_page_of_64_devices_stays_below_300_kb() -> None:
     """The numbers of one drawn device, 64 times, with all else that a page holds."""
-    few, more = (panel_content("liquid_ring_paper", devices=count) for count in (4, 8))
-    each = (len(more["numbers"]) - len(few["numbers"])) / 4
-    assert len(document_of(few).encode()) + 60 * (each + 400) < 300e3
+    few, more = (panel_content("liquid_ring_paper", devices=count) for count in (2, 4))
+    each = (len(more["numbers"]) - len(few["numbers"])) / 2
+    assert len(document_of(few).encode()) + 62 * (each + 400) < 300e3
 
 
 def test_modules_import_from_those_before_them_and_are_joined_in_this_order() -> None:

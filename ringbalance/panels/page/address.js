@@ -12,7 +12,7 @@ export function written(state, scene) {
   for (const name of ["algorithm", "valve", "design"])
     if (settings[name] !== scene[name]) parts.push([name, settings[name]]);
   if (!settings.mass) parts.push(["mass", 0]);
-  if (state.device !== null) parts.push(["device", state.device]);
+  if (state.device !== null) parts.push(["device", state.device + 1]);
   if (state.seed !== 1) parts.push(["seed", state.seed]);
   if (state.speed !== 5) parts.push(["speed", state.speed]);
   for (const { time, x, y } of state.loads) parts.push(["load", [time, x * 1e6, y * 1e6].map((part) => digits(part, 6)).join(",")]);
@@ -41,7 +41,7 @@ function take(state, name, text, content) {
   else if (name === "valve" && whole(-1, content.valves.length - 1)) settings.valve = value;
   else if (name === "design" && whole(0, content.designs.length - 1)) settings.design = value;
   else if (name === "mass" && value === 0) settings.mass = false;
-  else if (name === "device" && whole(0, 63)) state.device = value;
+  else if (name === "device" && whole(1, 64)) state.device = value - 1;
   else if (name === "seed" && whole(1, 999999)) state.seed = value;
   else if (name === "speed" && SPEEDS.includes(value)) state.speed = value;
   else if (name === "load" && state.loads.length < MOST_LOADS) {

@@ -13,6 +13,17 @@ export function prepared(canvas) {
   return { context, width, height, colour };
 }
 
+/** Draw again after changes of size and palette, and in print, which has the light palette. */
+export function whenSeenAnew(canvas, draw) {
+  new ResizeObserver(draw).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  for (const type of ["beforeprint", "afterprint"])
+    addEventListener(type, () => {
+      document.documentElement.classList.toggle("paper", type === "beforeprint");
+      draw();
+    });
+}
+
 /** Powers of ten and their halves, so that a logarithmic axis has few and round numbers. */
 export function decades(low, high) {
   const marks = [];

@@ -3,17 +3,17 @@
 /** Every slider: group, label, unit as shown, SI value of the unit, path in a scene file; `log`, `further`, `none`. */
 export const CONTROLS = {
   amplitude: { group: "Rotor", label: "Unbalance, as vibration before balancing", unit: "um", si: 1e-6, key: "rotor.initial_vibration.amplitude" },
-  phase: { group: "Rotor", label: "Its direction", unit: "deg", si: Math.PI / 180, key: "rotor.initial_vibration.phase", further: true },
+  phase: { group: "Rotor", label: "Direction of the unbalance", unit: "deg", si: Math.PI / 180, key: "rotor.initial_vibration.phase", further: true },
   noise: { group: "Rotor", label: "Sensor noise", unit: "um", si: 1e-6, key: "sensor.amplitude_noise", note: "standard deviation of a reading" },
   phase_noise: { group: "Rotor", label: "Noise of the phase", unit: "deg", si: Math.PI / 180, key: "sensor.phase_noise", further: true },
   runout: { group: "Rotor", label: "Runout of the sensor's track", unit: "um", si: 1e-6, key: "sensor.runout.amplitude", further: true },
   pressure: { group: "Air", label: "Gas pressure", unit: "MPa", si: 1e6, key: "gas.pressure", note: "gauge" },
   leak: { group: "Air", label: "Leak of the distributor", unit: "l/(s*bar)", si: 1e-8, key: "gas.leak_to_ambient", further: true, note: "without effect while the valve acts at once" },
-  gain: { group: "Controller", label: "Gain Kc", unit: "s/um", si: 1e6, key: "controller.proportional", log: true, of: ["target_vector"], note: "seconds of gas per micrometre of vibration" },
+  gain: { group: "Controller", label: "Gain Kc (valve-open time per µm)", unit: "s/um", si: 1e6, key: "controller.proportional", log: true, of: ["target_vector"] },
   integral: { group: "Controller", label: "Integral time Ti", unit: "s", si: 1, key: "controller.integral_time", log: true, none: "none", of: ["target_vector"] },
   derivative: { group: "Controller", label: "Derivative time Td", unit: "s", si: 1, key: "controller.derivative_time", further: true, of: ["target_vector"] },
   offset: { group: "Controller", label: "Added to every valve-open time", unit: "ms", si: 1e-3, key: "controller.gas_time_offset", of: ["target_vector", "law_based"] },
-  limit: { group: "Controller", label: "Limit below which it rests", unit: "um", si: 1e-6, key: "controller.limit", log: true },
+  limit: { group: "Controller", label: "Limit: no correction below", unit: "um", si: 1e-6, key: "controller.limit", log: true },
 };
 export const STEPS = 1000;
 

@@ -14,6 +14,9 @@ export function bounds(count, of) {
   return [Math.max(centre - half, 0), Math.min(centre + half, 1)];
 }
 
+/** Verdict on a fraction by its bounds, in the program's words. */
+export const verdict = ({ low, high }, required) => (low >= required ? "met" : high < required ? "not met" : "undecided");
+
 /** Summary of outcomes: how many settle in time, with bounds, and when; what stops the others. */
 export function summary(outcomes, settlingTime) {
   const times = outcomes.map((each) => each.time).sort((a, b) => a - b), causes = new Map();
@@ -49,9 +52,7 @@ export class DevicePool {
   constructor(source, content) {
     const address = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
     const count = Math.max(1, Math.min(MOST_WORKERS, (navigator.hardwareConcurrency ?? 2) - 1));
-    this.queue = [];
-    this.jobs = new Map();
-    this.number = 0;
+    Object.assign(this, { queue: [], jobs: new Map(), number: 0 });
     this.idle = Array.from({ length: count }, () => {
       const worker = new Worker(address);
       worker.postMessage({ content });
@@ -65,10 +66,10 @@ export class DevicePool {
     this.jobs.clear();
   }
 
-  /** Run devices under settings; `seen` is called with the outcomes so far. */
+  /** Run devices under settings; `seen` is called with each outcome. */
   run(settings, devices, seed, seen) {
     const job = (this.number += 1);
-    this.jobs.set(job, { outcomes: [], seen });
+    this.jobs.set(job, seen);
     this.queue.push(...devices.map((device) => ({ job, settings, device, seed })));
     while (this.idle.length && this.queue.length) this.idle.pop().postMessage(this.queue.shift());
   }
@@ -76,9 +77,6 @@ export class DevicePool {
   #take(worker, { job, outcome }) {
     if (this.queue.length) worker.postMessage(this.queue.shift());
     else this.idle.push(worker);
-    const state = this.jobs.get(job);
-    if (!state) return;
-    state.outcomes.push(outcome);
-    state.seen(state.outcomes);
+    this.jobs.get(job)?.(outcome);
   }
 }

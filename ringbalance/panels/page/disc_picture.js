@@ -35,14 +35,17 @@ export class DiscPicture {
       const middle = (2 * Math.PI * i) / chambers, [from, to] = [middle - half, middle + half];
       const gas = element(svg, "path", { d: sector(this.inner, this.outer, from, to), class: "gas" });
       const liquid = element(svg, "path", { class: "liquid" });
-      const [x, y] = [Math.cos(middle), -Math.sin(middle)], mean = (this.inner + this.outer) / 2;
+      const [x, y] = [Math.cos(middle), -Math.sin(middle)];
       const valve = element(svg, "circle", { cx: (this.inner + 13) * x, cy: (this.inner + 13) * y, r: 6, class: "valve" });
-      const label = element(svg, "text", { x: mean * x, y: mean * y + 6, class: "letter" }, String.fromCharCode(65 + i));
-      const pressure = element(svg, "text", { x: mean * x, y: mean * y + 22, class: "pressure" });
-      return { gas, liquid, valve, label, pressure, from, to };
+      return { gas, liquid, valve, from, to };
     });
     const port = Math.min(disc.port * scale, this.outer);
     for (let i = 0; i < chambers / 2; i++) this.#tube(svg, i, half, port, disc.crest === null ? null : disc.crest * scale);
+    this.chambers.forEach((chamber, i) => {
+      const middle = (2 * Math.PI * i) / chambers, [x, y] = [(0.6 * this.inner + 0.4 * this.outer) * Math.cos(middle), (-(this.inner + this.outer) / 2) * Math.sin(middle)];
+      element(svg, "text", { x, y: y + 2, class: "letter" }, String.fromCharCode(65 + i));
+      chamber.pressure = element(svg, "text", { x, y: y + 18, class: "pressure" });
+    });
     element(svg, "circle", { r: this.inner - 8, class: "shaft" });
     this.unbalance = element(svg, "path", { class: "unbalance" });
     this.correction = element(svg, "path", { class: "correction" });

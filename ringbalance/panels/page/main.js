@@ -1,11 +1,12 @@
 // The page: its state, its clock, and what is drawn.
 import { read, written } from "./address.js";
-import { CONTROLS, digits, sceneBlocks, valueText } from "./controls.js";
+import { CONTROLS, digits, lengthText, sceneBlocks, valueText } from "./controls.js";
 import { DevicePool, noiseOf, serve } from "./devices.js";
 import { DiscPicture } from "./disc_picture.js";
 import { Form, make } from "./form.js";
 import { CAUSES, Many } from "./many.js";
 import { PART, Run, letters, lostTime, sceneSettings } from "./model.js";
+import { whenSeenAnew } from "./canvas.js";
 import { normalPairs, unpack } from "./numbers.js";
 import { drawPolarPlot } from "./polar_plot.js";
 import { drawTimePlot } from "./time_plot.js";
@@ -13,6 +14,8 @@ import { drawTimePlot } from "./time_plot.js";
 const QUIET_S = 5; // s that a run goes on after it has held its limit
 const MOST_STEPS = 2000; // in a frame
 const REFERENCE_S = 60;
+const TERMS = { "tube inertia": "the inertia of the liquid in the tube" };
+const LOAD = 0.4; // vibration of a load over that of the unbalance
 const get = (id) => document.getElementById(id);
 
 class Panel {
@@ -30,8 +33,7 @@ class Panel {
     addEventListener("hashchange", () => {
       if (location.hash.slice(1) !== written(this.state, this.scene)) this.set({}, read(location.hash, content, this.scene));
     });
-    new ResizeObserver(() => this.draw()).observe(get("time"));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    whenSeenAnew(get("time"), () => this.draw());
     this.set({});
     requestAnimationFrame((now) => this.frame(now));
   }
@@ -55,19 +57,22 @@ class Panel {
     history.replaceState(null, "", changed ? `#${changed}` : location.pathname + location.search);
     const run = new Run(content, this.numbers, state.settings, { noise: normalPairs(state.seed) });
     this.reference = null;
-    if (JSON.stringify(state.settings) !== JSON.stringify({ ...this.scene, design }) || state.device !== null) this.reference = this.#reference(design);
-    this.form.show(state.settings, this.#designText(run));
+    const changedSettings = JSON.stringify(state.settings) !== JSON.stringify({ ...this.scene, design });
+    if (changedSettings || state.device !== null) this.reference = this.#reference(design);
+    this.form.show(state.settings, `A pair corrects up to ${digits(run.largestMoment() * 1e6)} g mm; the liquid leaves at ${digits(content.designs[design].velocity)} m/s.`);
     const which = state.device === null ? "of the device as the scene states it" : `of drawn device ${state.device + 1}`;
     get("which").textContent = this.reference ? `${which}; grey: the scene's settings` : which;
-    get("speed").value = state.speed;
-    get("seed").value = state.seed;
+    for (const name of ["speed", "seed"]) get(name).value = state[name];
     get("block").textContent = sceneBlocks(content, state.settings, this.scene);
     get("facts").textContent = this.#facts();
+    get("load").textContent = `a load of ${lengthText(LOAD * state.settings.amplitude)} now`;
+    for (const button of document.querySelectorAll("[data-try^=gain]")) button.disabled = state.settings.algorithm !== "target_vector";
     const many = JSON.stringify([state.settings, state.seed]);
     if (many === this.manyOf) this.many.mark(state.device);
     else {
       clearTimeout(this.later);
-      this.later = setTimeout(() => this.many.run(state, (valve) => ({ ...state.settings, valve, ...this.suitedTo(valve) })), 120);
+      const suited = (valve) => ({ ...state.settings, valve, ...this.suitedTo(valve) });
+      this.later = setTimeout(() => this.many.run(state, suited, changedSettings ? null : content.designs[design].program), 120);
     }
     this.manyOf = many;
     this.restart();
@@ -96,7 +101,7 @@ class Panel {
 
   #over() {
     const { run } = this;
-    return run.ended !== "" || run.time > run.held + QUIET_S || run.time > 3600;
+    return run.time > 3600 || (run.done === run.loads.length && (run.ended !== "" || run.time > run.held + QUIET_S));
   }
 
   frame(now) {
@@ -142,33 +147,29 @@ class Panel {
     if (code === this.said) return;
     this.said = code;
     get("state").textContent = text;
-    get("state").className = { above: "", within: "" }[code] ?? (code === "held" ? "good" : "bad");
+    get("state").className = { above: "", within: "" }[code] ?? (code.startsWith("held") ? "good" : "bad");
     get("time").setAttribute("aria-label", `Vibration over time: ${text}`);
     get("disc").setAttribute("aria-label", `Liquid in the chambers: ${letters(content).map((letter) => `${letter.toUpperCase()} ${(100 * run.value(`fill_ratio_${letter}`)).toFixed(0)} %`).join(", ")}`);
   }
 
   #sentence() {
-    const { run } = this, ended = run.outcome;
-    if (ended && ended !== "settled") return [ended, `Not settled: ${CAUSES[ended]}.`];
-    const since = run.heldSince < Infinity ? run.heldSince : run.settled;
-    if (since !== null && since < Infinity) return ["held", `Settled after ${digits(since)} s: it stays within ${valueText("limit", run.limit)}.`];
+    const { run } = this, ended = run.outcome, load = run.done ? run.loads[run.done - 1].time : 0;
+    if (ended && ended !== "settled") {
+      const late = run.time >= run.deadline ? ` in ${digits(run.rules.timeLimit)} s` : "", after = run.done ? " after the load" : "";
+      const advice = ended === "overshooting" && run.settings.algorithm === "target_vector" ? "; lower the gain" : "";
+      return [ended, `Not settled${late}${after}: ${CAUSES[ended]}${advice} (${digits(run.amplitude * 1e6)} µm at the end, limit ${valueText("limit", run.limit)}).`];
+    }
+    const since = Math.min(run.heldSince, run.settled ?? Infinity), passed = `${digits(since - load)} s`;
+    const within = `it stays within ${valueText("limit", run.limit)}.`;
+    if (since < Infinity) return [`held ${load}`, run.done ? `Back within ${passed} after the load: ${within}` : `Settled after ${passed}: ${within}`];
     if (run.amplitude <= run.limit) return ["within", "Within the limit."];
     return ["above", "Above the limit: the valves correct."];
   }
 
-  #designText(run) {
-    const { content } = this, design = content.designs[run.settings.design];
-    return `A pair corrects up to ${digits(run.largestMoment() * 1e6)} g mm; the liquid leaves at ${digits(design.velocity)} m/s.`;
-  }
-
   #facts() {
-    const { content, state } = this, { program, lost } = content.designs[state.settings.design];
-    const own = `The program's own runs of these ${program.of} devices under the scene's settings: ${program.count} settle.`;
-    if (!content.leftOut.length) return own;
-    const time = lostTime(content, state.settings);
-    const shorter = time > 0 ? `in their place each injection is shortened by ${digits(time * 1e3)} ms, which short ones lose to them.` : "here short injections lose no time to them.";
-    const instead = state.settings.mass ? shorter : "nothing is in their place.";
-    return `${own} The exported disc leaves out ${content.leftOut.join(" and ")}; ${instead}`;
+    const time = lostTime(this.content, this.state.settings) * 1e3, terms = this.content.leftOut.map((term) => TERMS[term] ?? `the ${term}`).join(" and ");
+    if (!terms) return "";
+    return `This page simplifies: ${time > 0 ? `in place of ${terms} it shortens each injection by ${digits(time)} ms.` : `it leaves out ${terms}.`}`;
   }
 
   #buttons() {
@@ -186,7 +187,7 @@ class Panel {
     on("reset", () => this.set(this.scene, { device: null, loads: [] }));
     on("load", () => {
       const { amplitude, phase } = this.state.settings, angle = phase + 2;
-      this.run.addLoad(0.4 * amplitude * Math.cos(angle), 0.4 * amplitude * Math.sin(angle));
+      this.run.addLoad(LOAD * amplitude * Math.cos(angle), LOAD * amplitude * Math.sin(angle));
       this.state.loads = this.run.loads;
       history.replaceState(null, "", `#${written(this.state, this.scene)}`);
       if (this.calm) this.toEnd();
@@ -194,7 +195,9 @@ class Panel {
     });
     for (const button of document.querySelectorAll("[data-try]"))
       button.addEventListener("click", () => {
-        const [name, factor] = button.dataset.try.split(":"), [low, high] = this.content.ranges[name], { si } = CONTROLS[name];
+        const [name, factor] = button.dataset.try.split(":");
+        if (name === "algorithm") return this.set({ algorithm: factor });
+        const [low, high] = this.content.ranges[name], { si } = CONTROLS[name];
         const value = Number(digits((this.state.settings[name] * Number(factor)) / si, 4)) * si;
         this.set({ [name]: Math.min(Math.max(value, low), high) });
       });

@@ -1,61 +1,68 @@
 // The section of drawn devices: fraction that settles, times, causes, a dot for each device, and the valves.
 import { digits } from "./controls.js";
-import { summary } from "./devices.js";
+import { summary, verdict } from "./devices.js";
 import { make } from "./form.js";
 
 export const CAUSES = {
   capacity_exceeded: "the unbalance is beyond what the disc can correct",
+  emptied: "a chamber is empty before the unbalance is cancelled; a lower pressure may help",
   stalled: "the gas pressure does not move enough liquid",
-  diverging: "the vibration grows: corrections overshoot",
   hovering: "noise or overshoot takes it above the limit again and again",
   gas_time_too_short: "valve-open times are too short to move liquid",
-  overshooting: "every correction overshoots, until the time runs out",
+  overshooting: "every correction overshoots",
   time_limit: "the time runs out",
   too_late: "it settles later than required",
 };
-const FIRST = 16;
+const BLOCK = 16;
+const get = (id) => document.getElementById(id);
 const percent = (value) => `${(100 * value).toFixed(value > 0.995 || value < 0.005 ? 0 : 1).replace(/\.0$/, "")} %`;
-const times = (part, time) => (Number.isFinite(time) ? `${part} within ${digits(time)} s` : `fewer than ${part} at all`);
+const times = ({ half, most }) => {
+  if (!Number.isFinite(half)) return "Fewer than half settle.";
+  return `Half settle within ${digits(half)} s; ${Number.isFinite(most) ? `90 % within ${digits(most)} s` : "fewer than 90 % settle"}.`;
+};
 
 export class Many {
   /** `watch(device)` and `choose(valve)` are called for what a reader picks. */
   constructor(content, pool, { watch, choose }) {
     Object.assign(this, { content, pool, watch, choose, dots: [], valves: [] });
-    this.root = document.getElementById("dots");
+    this.root = get("dots");
     this.root.addEventListener("keydown", (event) => this.#move(event));
-    const rows = document.getElementById("valves"), own = content.valve ?? "valve that acts at once, as the scene has it";
+    const rows = get("valves"), own = content.valve ?? "valve that acts at once, as the scene has it";
+    rows.append(make("p", { className: "need" }, make("span", { textContent: `${percent(content.rules.fraction)} required` })));
     [own, ...content.valves.map((each) => each.name)].forEach((name, i) => {
       const radio = make("input", { type: "radio", name: "valve", value: i - 1 });
       radio.addEventListener("change", () => choose(i - 1));
-      const text = make("span"), bar = make("span", { className: "bar" });
-      rows.append(make("label", {}, radio, make("span", { textContent: name }), bar, text));
-      this.valves.push({ radio, text, bar, result: summary([], 0) });
+      const [text, word, bar] = [make("span"), make("b"), make("span", { className: "bar" })];
+      rows.append(make("label", {}, radio, make("span", { textContent: name }), bar, text, word));
+      this.valves.push({ radio, text, word, bar, outcomes: [] });
     });
   }
 
-  /** Run the devices of a state, then with each other valve a first part of them and the rest. */
-  run(state, suited) {
-    const { settings, seed } = state, { count } = this.content.designs[settings.design];
+  /** Run the devices of a state, then block by block with each other valve. `program`: its fraction of them, or null. */
+  run(state, suited, program) {
+    const { settings, seed } = state, { count } = this.content.designs[settings.design], outcomes = [];
     this.pool.stop();
     this.#grid(count, state.device);
-    this.#show([], count);
+    this.#show([], count, program);
+    this.valves.forEach((row, i) => {
+      row.radio.checked = i - 1 === settings.valve;
+      row.outcomes = row.radio.checked ? outcomes : [];
+    });
+    this.#compare(count);
     const all = Array.from({ length: count }, (_, device) => device);
-    this.pool.run(settings, all, seed, (outcomes) => {
-      this.#show(outcomes, count);
-      this.#row(settings.valve, outcomes);
+    this.pool.run(settings, all, seed, (outcome) => {
+      outcomes.push(outcome);
+      this.#show(outcomes, count, program);
+      this.#compare(count);
     });
-    const others = this.valves.map((_, i) => i - 1).filter((valve) => valve !== settings.valve), first = new Map();
-    this.valves.forEach(({ radio }, i) => {
-      radio.checked = i - 1 === settings.valve;
-      this.#row(i - 1, []);
-    });
-    for (const valve of others)
-      this.pool.run(suited(valve), all.slice(0, FIRST), seed, (outcomes) => {
-        first.set(valve, outcomes);
-        this.#row(valve, outcomes);
+    for (let from = 0; from < count; from += BLOCK)
+      this.valves.forEach((row, i) => {
+        if (row.radio.checked) return;
+        this.pool.run(suited(i - 1), all.slice(from, from + BLOCK), seed, (outcome) => {
+          row.outcomes.push(outcome);
+          this.#compare(count);
+        });
       });
-    for (const valve of others)
-      this.pool.run(suited(valve), all.slice(FIRST), seed, (more) => this.#row(valve, [...(first.get(valve) ?? []), ...more]));
   }
 
   #grid(count, watched) {
@@ -89,34 +96,40 @@ export class Many {
     next.focus();
   }
 
-  #show(outcomes, count) {
-    const { rules, designs } = this.content, result = summary(outcomes, rules.settlingTime);
+  #show(outcomes, count, program) {
+    const { rules } = this.content, result = summary(outcomes, rules.settlingTime), { low, high } = result;
     for (const { device, ended, time } of outcomes) {
       const dot = this.dots[device], text = ended === "settled" ? `settles in ${digits(time)} s` : CAUSES[ended];
       dot.className = ended === "settled" && time <= rules.settlingTime ? "ok" : "no";
       dot.title = `device ${device + 1}: ${text}`;
       dot.setAttribute("aria-label", dot.title);
     }
-    const some = result.of > 0, { low, high } = result;
-    document.getElementById("share").textContent = some ? percent(result.count / result.of) : "–";
-    document.getElementById("share-text").textContent = some
-      ? `settle: ${result.count} of ${result.of}${result.of < count ? " so far" : ""}, 95 % bounds ${percent(low)} to ${percent(high)}; ${percent(rules.fraction)} are required`
+    const some = result.of > 0, all = result.of === count, need = `${percent(rules.fraction)} are required`;
+    get("share").textContent = some ? percent(result.count / result.of) : "–";
+    get("share-text").textContent = some
+      ? `settle: ${result.count} of ${result.of}${all ? "" : " so far"}, 95 % bounds ${percent(low)} to ${percent(high)}; ${need}${all ? `: ${verdict(result, rules.fraction)}` : ""}`
       : "running …";
-    fill(document.getElementById("bar"), result, rules.fraction);
-    document.getElementById("times").textContent = some ? `They settle: ${times("half", result.half)}, ${times("nine of ten", result.most)}.` : " ";
+    fill(get("bar"), result, rules.fraction);
+    get("times").textContent = some ? times(result) : " ";
     const causes = result.causes.map(([cause, number]) => make("li", { textContent: `${number} × ${CAUSES[cause]}` }));
-    document.getElementById("causes").replaceChildren(...causes);
+    get("causes").replaceChildren(...causes);
+    get("check").textContent = all && program ? `Check: the full program finds ${program.count} of ${program.of} with the scene's settings (page: ${result.count}).` : "";
   }
 
-  #row(valve, outcomes) {
-    const row = this.valves[valve + 1], result = (row.result = summary(outcomes, this.content.rules.settlingTime));
-    row.text.textContent = result.of ? `${result.count} of ${result.of}, ${times("half", result.half)}` : "…";
-    fill(row.bar, result, this.content.rules.fraction);
-    // Of the valves that can be had, the one that serves most devices, and of equals the fastest.
-    const sold = this.valves.slice(1), part = ({ count, of }) => (of ? count / of : 0);
-    const ready = sold.every(({ result: other }) => other.of === this.dots.length);
-    const best = [...sold].sort((a, b) => part(b.result) - part(a.result) || a.result.half - b.result.half)[0];
-    sold.forEach((each) => each.text.classList.toggle("best", ready && each === best && part(best.result) > 0));
+  /** Compare the valves on the same devices: the first that have run with all of them, in whole blocks. */
+  #compare(count) {
+    const whole = (end) => this.valves.every(({ outcomes }) => outcomes.filter(({ device }) => device < end).length === end);
+    let first = 0;
+    while (first < count && whole(Math.min(first + BLOCK, count))) first = Math.min(first + BLOCK, count);
+    const { settlingTime, fraction } = this.content.rules;
+    for (const { outcomes, text, word, bar } of this.valves) {
+      const result = summary(outcomes.filter(({ device }) => device < first), settlingTime);
+      const median = Number.isFinite(result.half) ? `; median ${digits(result.half)} s` : "";
+      text.textContent = first ? `${result.count} of ${first} settle${median}` : "…";
+      word.textContent = first ? verdict(result, fraction) : "";
+      word.classList.toggle("good", word.textContent === "met");
+      fill(bar, result, fraction);
+    }
   }
 }
 
@@ -127,5 +140,3 @@ function fill(bar, { count, of, low, high }, need) {
   bar.title = of ? `${percent(at)}, 95 % bounds ${percent(low)} to ${percent(high)}` : "";
   if (bar.id) bar.setAttribute("aria-label", bar.title);
 }
-
-

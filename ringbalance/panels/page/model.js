@@ -34,8 +34,11 @@ export function discOf(content, numbers, settings, device) {
   return { c, k: block.cells, p: block.pieces, q: block.levels, start: block.start, facts };
 }
 
+const LOWER = 2; // row of the best that any lower pressure reaches
+
 /** Least fill of a driven chamber at a gas pressure: of row 0 by stall and gas in its port, of row 1 by the latter. */
 function leastFill(content, facts, pressure, row) {
+  if (row === LOWER) return Math.min(...facts.least[0].filter((_, i) => content.pressures[i] <= pressure));
   return between(content.pressures, facts.least[row], pressure);
 }
 
@@ -54,36 +57,28 @@ function between(x, y, pressure) {
 
 /** Constants, tables and row of the controller under settings. */
 function controllerOf(content, numbers, settings) {
-  const scene = sceneSettings(content), squares = [settings.noise ** 2, settings.phase_noise ** 2];
-  if (settings.algorithm !== "law_based") {
-    const { constants, start, row } = content.controllers[settings.algorithm];
-    const c = Float64Array.from(constants), at = content.places.target;
-    if (settings.algorithm === "trial") {
-      c[content.places.trialLimit] = settings.limit;
-      return { arguments: [c], w: Float64Array.from(start), row };
-    }
-    c[at.LIMIT] = settings.limit;
+  const { algorithm } = settings, { places } = content, scene = sceneSettings(content), byLaw = algorithm === "law_based";
+  const { device } = content.designs[settings.design], { cells, pieces, levels } = numbers[device];
+  const own = byLaw ? numbers[content.devices.length + settings.design] : content.controllers[algorithm];
+  const c = Float64Array.from(own.constants), at = byLaw ? places.lawBased : places.target;
+  const w = Float64Array.from(own.start), row = byLaw ? places.lawBasedRow : own.row;
+  if (algorithm === "trial") {
+    c[places.trialLimit] = settings.limit;
+    return { arguments: [c], w, row };
+  }
+  c[at.LIMIT] = settings.limit;
+  [c[at.AMPLITUDE_SQUARE], c[at.PHASE_SQUARE]] = [settings.noise ** 2, settings.phase_noise ** 2];
+  if (settings.offset !== scene.offset)
+    for (let i = 0; i < content.disc.chambers; i++) c[byLaw ? at.OFFSETS + i : at.DIRECTIONS + 3 * i + 2] = settings.offset;
+  if (!byLaw) {
     c[at.GAIN] = settings.gain;
     c[at.PER_TIME] = settings.integral === null ? 0 : 1 / settings.integral;
     c[at.DERIVATIVE] = settings.derivative;
-    [c[at.AMPLITUDE_SQUARE], c[at.PHASE_SQUARE]] = squares;
-    if (settings.offset !== scene.offset)
-      for (let i = 0; i < content.disc.chambers; i++) c[at.DIRECTIONS + 3 * i + 2] = settings.offset;
-    return { arguments: [c], w: Float64Array.from(start), row };
+  } else if (settings.pressure !== scene.pressure) {
+    c[places.disc.SUPPLY] += settings.pressure - scene.pressure;
+    c[at.LEAST_FILL] = leastFill(content, content.devices[device], settings.pressure, 1);
   }
-  const design = content.designs[settings.design], law = numbers[design.device];
-  const block = numbers[content.devices.length + settings.design];
-  const c = Float64Array.from(block.constants), at = content.places.lawBased;
-  c[at.LIMIT] = settings.limit;
-  [c[at.AMPLITUDE_SQUARE], c[at.PHASE_SQUARE]] = squares;
-  if (settings.offset !== scene.offset)
-    for (let i = 0; i < content.disc.chambers; i++) c[at.OFFSETS + i] = settings.offset;
-  if (settings.pressure !== scene.pressure) {
-    c[content.places.disc.SUPPLY] += settings.pressure - scene.pressure;
-    c[at.LEAST_FILL] = leastFill(content, content.devices[design.device], settings.pressure, 1);
-  }
-  const tables = [law.cells, law.pieces, law.levels];
-  return { arguments: [c, ...tables], w: Float64Array.from(block.start), row: content.places.lawBasedRow };
+  return { arguments: byLaw ? [c, cells, pieces, levels] : [c], w, row };
 }
 
 /** A reading with noise, by + - * / and a root alone: a small phase turns it by a rational rotation. */
@@ -94,14 +89,14 @@ export function noisy(x, y, [amplitude, phase], settings) {
   return [factor * (x * cosine - y * sine), factor * (x * sine + y * cosine)];
 }
 
-/** Largest moment of a pair, kg m, with its liquid moved to one side as far as a gas can (row 0) or the disc lets (row 1). */
+/** Largest moment of a pair, kg m, with its liquid moved to one side, by rows of `leastFill`. */
 function pairMoment(content, plant, settings, row) {
   const { c, k, p } = plant, total = c[content.places.disc.TOTAL];
   const least = Math.min(leastFill(content, plant.facts, settings.pressure, row), total / 2);
   return moment(c, k, p, total - least) - moment(c, k, p, least);
 }
 
-/** Vibration that is left with the best fills of all pairs, m, that a gas can reach (row 0) or the disc has (row 1). */
+/** Vibration that is left with the best fills of all pairs, m, by rows of `leastFill`. */
 function leftAtBest(content, plant, settings, row) {
   const at = content.places.disc, { c } = plant, most = pairMoment(content, plant, settings, row);
   const [ix, iy] = [c[at.INFLUENCE_X], c[at.INFLUENCE_Y]], square = ix * ix + iy * iy;
@@ -144,41 +139,21 @@ export class Run {
     this.#note();
   }
 
-  at(name) {
-    return this.content.places.disc[name];
-  }
-
-  get x() {
-    return this.w[this.content.places.row.vibration_x];
-  }
-
-  get y() {
-    return this.w[this.content.places.row.vibration_y];
-  }
-
-  get amplitude() {
-    return Math.hypot(this.x, this.y);
-  }
+  at(name) { return this.content.places.disc[name]; }
+  get x() { return this.value("vibration_x"); }
+  get y() { return this.value("vibration_y"); }
+  get amplitude() { return Math.hypot(this.x, this.y); }
+  leftAtBest(row) { return leftAtBest(this.content, this.plant, this.settings, row); }
+  /** Moment of a pair with its liquid moved to one side, kg m. */
+  largestMoment() { return pairMoment(this.content, this.plant, this.settings, 0); }
+  /** Value of a variable of the disc, such as "fill_ratio_a". */
+  value(name) { return this.w[this.content.places.row[name]]; }
 
   /** End of the run, with the cause that formulas give where it has not settled. */
   get outcome() {
     if (this.ended === "" || this.ended === "settled") return this.ended;
-    if (this.leftAtBest(1) > this.limit) return "capacity_exceeded";
+    if (this.leftAtBest(1) > this.limit) return this.leftAtBest(LOWER) > this.limit ? "capacity_exceeded" : "emptied";
     return this.leftAtBest(0) > this.limit ? "stalled" : this.ended;
-  }
-
-  leftAtBest(row) {
-    return leftAtBest(this.content, this.plant, this.settings, row);
-  }
-
-  /** Moment of a pair with its liquid moved to one side, kg m. */
-  largestMoment() {
-    return pairMoment(this.content, this.plant, this.settings, 0);
-  }
-
-  /** Value of a variable of the disc, such as "fill_ratio_a". */
-  value(name) {
-    return this.w[this.content.places.row[name]];
   }
 
   isOpen(chamber) {
@@ -197,24 +172,28 @@ export class Run {
     this.part = Math.min(w[row.wait], most);
     this.#pass(this.part);
     this.time += this.part;
-    for (; this.done < this.loads.length && this.loads[this.done].time <= this.time + INSTANT; this.done++)
-      this.#load(this.loads[this.done]);
+    this.#load();
     this.#note();
   }
 
-  #load({ x, y }) {
-    const { row } = this.content.places;
+  /** Take up the loads that are due. */
+  #load() {
+    if (this.done === this.loads.length || this.loads[this.done].time > this.time + INSTANT) return;
+    const { row } = this.content.places, { x, y } = this.loads[this.done++];
     this.plant.c[this.at("START_X")] += x;
     this.plant.c[this.at("START_Y")] += y;
     this.w[row.vibration_x] += x;
     this.w[row.vibration_y] += y;
     this.deadline = this.time + this.rules.timeLimit;
-    Object.assign(this, { ended: "", settled: null, heldSince: Infinity, held: Infinity, rises: 0, first: NaN });
+    Object.assign(this, { ended: "", settled: null, since: Infinity, heldSince: Infinity, held: Infinity, lost: 0, rises: 0, first: NaN });
+    this.#load();
   }
 
   /** Add a step of the unbalance, as vibration, now. */
   addLoad(x, y) {
     this.loads = [...this.loads.slice(0, this.done), { time: this.time, x, y }];
+    this.#load();
+    this.#note();
   }
 
   /** Advance the disc, unless the step before, with all valves shut, has changed no number of its pairs by more than `slack`. */
@@ -242,7 +221,8 @@ export class Run {
 
   /** Judge the run at a sample, by the rules of the program's own loop. */
   #sample(x, y) {
-    const { rules, controller } = this, moved = this.#moved(), seen = Math.hypot(x, y);
+    const { rules, controller } = this, seen = Math.hypot(x, y);
+    const moved = this.before !== null && this.fills.some((index, i) => Math.abs(this.w[index] - this.before[i]) > 1e-12);
     if (seen > this.limit && x * this.seen[0] + y * this.seen[1] < 0) this.overshoots += 1;
     this.seen = [x, y];
     this.samples += 1;
@@ -258,8 +238,9 @@ export class Run {
     const watched = Math.min(this.since, this.heldSince) <= this.deadline && this.settled === null;
     const more = watched ? rules.hold + rules.watch + 2 * rules.period : 0;
     if (this.settled !== null) this.ended ||= "settled";
-    else if (this.rises > most || (this.rises === most && rose)) this.ended ||= "diverging";
-    else if (this.time >= this.deadline + more) this.ended ||= this.#late();
+    else if (this.rises > most || (this.rises === most && rose)) this.ended ||= "overshooting";
+    else if (this.time >= this.deadline + more)
+      this.ended ||= this.lost > 0 ? "hovering" : this.idle >= rules.idle ? "gas_time_too_short" : 2 * this.overshoots > this.samples ? "overshooting" : "time_limit";
     this.operated = false;
     this.commands.forEach((index, chamber) => {
       const duration = controller.w[index];
@@ -267,16 +248,6 @@ export class Run {
       this.operated ||= duration > 0;
     });
     this.before = this.fills.map((index) => this.w[index]);
-  }
-
-  #moved() {
-    return this.before !== null && this.fills.some((index, i) => Math.abs(this.w[index] - this.before[i]) > 1e-12);
-  }
-
-  #late() {
-    if (this.lost > 0) return "hovering";
-    if (this.idle >= this.rules.idle) return "gas_time_too_short";
-    return 2 * this.overshoots > this.samples ? "overshooting" : "time_limit";
   }
 
   #hold() {
@@ -302,17 +273,13 @@ const COARSE = 0.1; // s, longest step of a run of many
 const LONGEST_PART = 5e-3; // s
 const OUT_OF_REACH = 2; // vibration left at best over the limit beyond which a run need not be carried out
 
-/** Longer parts of a step than a host takes, stable with the gas line: they change no outcome and save most of the time. */
-function setLongestPart(content, c) {
-  const at = content.places.disc, volume = (1 - c[content.places.largestFill]) * c[at.VOLUME] + c[at.DEAD];
-  c[at.LONGEST] = Math.min(LONGEST_PART, c[at.LINE] === 0 ? LONGEST_PART : (content.rules.partOfTimeConstant * volume) / c[at.PASSING]);
-}
-
 /** End of a device's run: whether and when it settles, and what stops it. */
 export function outcomeOf(content, numbers, settings, device, noise) {
   const run = new Run(content, numbers, settings, { device, noise, slack: 1e-9 });
-  setLongestPart(content, run.plant.c);
-  if (run.leftAtBest(1) > OUT_OF_REACH * run.limit) return { device, ended: "capacity_exceeded", time: Infinity };
+  const { c } = run.plant, at = content.places.disc, volume = (1 - c[content.places.largestFill]) * c[at.VOLUME] + c[at.DEAD];
+  // Longer parts of a step than a host takes, stable with the gas line: they change no outcome and save most of the time.
+  c[at.LONGEST] = Math.min(LONGEST_PART, c[at.LINE] === 0 ? LONGEST_PART : (content.rules.partOfTimeConstant * volume) / c[at.PASSING]);
+  if (run.leftAtBest(1) > OUT_OF_REACH * run.limit) run.ended = "capacity_exceeded";
   while (!run.ended) run.advance(COARSE);
   return { device, ended: run.outcome, time: run.settled ?? Infinity };
 }

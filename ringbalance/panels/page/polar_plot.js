@@ -7,7 +7,8 @@ import { peak } from "./time_plot.js";
 export function drawPolarPlot(canvas, { trace, limit, reference }) {
   const { context, width, height, colour } = prepared(canvas);
   const most = Math.max(peak(trace), reference ? peak(reference) : 0, 3 * limit) * 1.15;
-  const size = Math.min(width / 2 - 44, height / 2 - 20);
+  const size = Math.min(width / 2 - 44, height / 2 - 20), labels = [];
+  if (size <= 0) return;
   const radius = (amplitude) => (size * Math.log1p((2 * amplitude) / limit)) / Math.log1p((2 * most) / limit);
   const place = (x, y) => {
     const amplitude = Math.hypot(x, y), factor = amplitude > 0 ? radius(amplitude) / amplitude : 0;
@@ -18,12 +19,11 @@ export function drawPolarPlot(canvas, { trace, limit, reference }) {
   circle(context, radius(limit));
   context.fill();
   context.strokeStyle = colour("grid");
-  context.textAlign = "center";
+  context.lineWidth = 1;
   for (const mark of decades(limit * 1.5, most)) {
     circle(context, radius(mark));
     context.stroke();
-    context.fillStyle = colour("muted");
-    context.fillText(lengthText(mark), 0, radius(mark) - 4);
+    labels.push([lengthText(mark), radius(mark) - 4]);
   }
   for (const [x, y, label] of [[1, 0, "0°"], [0, 1, "90°"], [-1, 0, "180°"], [0, -1, "270°"]]) {
     context.beginPath();
@@ -49,6 +49,11 @@ export function drawPolarPlot(canvas, { trace, limit, reference }) {
     for (let i = 0; i < shown.x.length; i += stride) context.lineTo(...place(shown.x[i], shown.y[i]));
     context.stroke();
   }
+  context.textAlign = "center";
+  context.fillStyle = colour("muted");
+  // A halo keeps lines off the labels.
+  Object.assign(context, { strokeStyle: colour("card"), lineWidth: 5 });
+  for (const [label, y] of labels) for (const part of ["strokeText", "fillText"]) context[part](label, 0, y);
   const [x, y] = place(trace.x.at(-1), trace.y.at(-1));
   context.translate(x, y);
   context.fillStyle = colour("accent");

@@ -1,4 +1,5 @@
 // The page that replays runs: its state, its clock, and what is drawn.
+import { whenSeenAnew } from "./canvas.js";
 import { digits, lengthText } from "./controls.js";
 import { MassPicture } from "./mass_picture.js";
 import { drawPolarPlot } from "./polar_plot.js";
@@ -19,8 +20,7 @@ class Replay {
     addEventListener("hashchange", () => {
       if (location.hash.slice(1) !== replayAddress(this.state)) this.set(replayState(location.hash, runs));
     });
-    new ResizeObserver(() => this.draw()).observe(get("time"));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    whenSeenAnew(get("time"), () => this.draw());
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.play(!calm && !location.hash);
     this.set(calm && !location.hash ? { time: this.run.end } : {});

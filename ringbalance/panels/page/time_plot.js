@@ -11,6 +11,7 @@ const LEAST_SPAN = 8;
  */
 export function drawTimePlot(canvas, { trace, injections, letters, limit, reference, marks = [] }) {
   const { context, width, height, colour } = prepared(canvas);
+  if (width <= LEFT + RIGHT) return;
   const span = Math.max(LEAST_SPAN, trace.time.at(-1) * 1.03), lanes = LANE * letters.length;
   const bottom = height - AXIS - lanes - 8;
   const most = Math.max(peak(trace), reference ? peak(reference) : 0, 2 * limit) * 1.4, least = limit / 40;

@@ -94,8 +94,15 @@ def read_with_noise(
     return factor * (x * cosine - y * sine), factor * (x * sine + y * cosine)
 
 
+def begun(page: Page) -> Page:
+    """Wait until the page has unpacked its numbers, which may be after it has loaded."""
+    page.locator("#load:not(:empty)").wait_for()
+    return page
+
+
 def settled(page: Page) -> None:
     """Wait for the end of the run and for all devices."""
+    begun(page)
     page.locator("#end").click()
     until = monotonic() + 20.0
     # The page's policy forbids what the driver would wait with.
@@ -107,7 +114,7 @@ def settled(page: Page) -> None:
 def test_a_run_has_the_bits_of_the_exported_python(
     panel: Path, open_page: OpenPage, noise: list[list[float]], looped: list[list[float]]
 ) -> None:
-    assert open_page(panel).evaluate(RUN, [SAMPLES, noise]) == looped
+    assert begun(open_page(panel)).evaluate(RUN, [SAMPLES, noise]) == looped
     assert len(looped[0]) > 20 * SAMPLES
 
 
@@ -190,7 +197,7 @@ def test_every_control_by_keyboard(panel: Path, open_page: OpenPage) -> None:
 
 
 def test_a_double_click_returns_to_the_marked_value(panel: Path, open_page: OpenPage) -> None:
-    page = open_page(panel, fragment="#gain=0.5")
+    page = begun(open_page(panel, fragment="#gain=0.5"))
     assert page.evaluate("panel.state.settings.gain !== panel.scene.gain")
     page.locator("#control-gain").dblclick()
     assert page.evaluate("panel.state.settings.gain === panel.scene.gain")
@@ -210,7 +217,7 @@ def test_a_load_after_the_end_lets_the_run_go_on(panel: Path, open_page: OpenPag
 
 def test_pictures_without_room_are_left_out(panel: Path, open_page: OpenPage) -> None:
     """Nothing is reported; the largest circle of a picture narrower than its labels has no radius."""
-    page = open_page(panel)
+    page = begun(open_page(panel))
     for width in ("0px", "60px"):
         page.evaluate(
             """(width) => {
@@ -280,7 +287,7 @@ def fuzzed(count: int) -> list[str]:
 
 def test_no_address_does_harm(panel: Path, open_page: OpenPage) -> None:
     """Nothing is executed or reported, and every number stays within its range."""
-    page = open_page(panel)
+    page = begun(open_page(panel))
     page.on("dialog", lambda _: pytest.fail("a dialog"))
     for address in [*HARMFUL, *fuzzed(30)]:
         page.evaluate("(address) => { location.hash = address; }", address)

@@ -123,6 +123,10 @@ def test_in_firefox(
 ) -> None:
     """From a local file: it runs, its workers run the devices, nothing is reported, the bits are the same."""
     firefox.open(panel.as_uri())
+    begun_there = """const done = arguments[arguments.length - 1];
+        const look = () => document.querySelector("#load:not(:empty)") ? done(true) : setTimeout(look, 50);
+        look();"""
+    assert firefox.command("WebDriver:ExecuteAsyncScript", script=begun_there, args=[])
     assert firefox.run(f"return ({RUN})(arguments[0])", [SAMPLES, noise]) == looped
     firefox.run("document.getElementById('end').click()")
     wait = f"""const done = arguments[arguments.length - 1];

@@ -70,17 +70,19 @@ def document_of(
 ) -> str:
     """HTML document of a panel, which needs no other file, from all its numbers and texts.
 
-    Args: `page`: template. `modules`: names of its modules, in their order.
+    Args: `page`: template of its body. `modules`: names of its modules, in their order.
     """
     program, style = joined({name: module_text(name) for name in modules}), _part("page/panel.css")
     policy = (
         f"default-src 'none'; script-src {_digest(program)}; style-src {_digest(style)}; worker-src blob:; "
         "base-uri 'none'; form-action 'none'"
     )
-    return Template(_part(f"templates/{page}")).substitute(
+    title = html.escape(content["name"])
+    return Template(_part("templates/frame.html")).substitute(
         policy=policy,
-        title=html.escape(content["name"]),
+        title=title,
         style=style,
+        body=Template(_part(f"templates/{page}")).substitute(title=title),
         # No text of the scene can end the element that holds it.
         content=json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         program=program,

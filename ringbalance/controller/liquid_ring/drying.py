@@ -54,7 +54,7 @@ def part_per_gas(scene: Scene, model: BalancerModel) -> float:
 
 def _liquid(scene: Scene, model: BalancerModel) -> float:
     """Mass of all liquid of the disc, kg."""
-    volume = 2 * scene.disc.initial_fill * model.chamber_volume * scene.disc.chambers / 2
+    volume = scene.disc.initial_fill * model.chamber_volume * scene.disc.chambers
     return scene.liquid.density * volume
 
 
